@@ -62,7 +62,15 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
 """What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
 
 DATA_SET_KEYS = {
-    "top": {"folder": ("folder of the recordings, from the folder of this file", "`.`")},
+    "top": {
+        "keep": (
+            "list of what is kept beside the clouds: `spectrograms`, `range_doppler`, "
+            "`range_azimuth`, `joints`; intervals then have one `duration_s`, and radars one size "
+            "of maps",
+            "`[]`",
+        ),
+        "folder": ("folder of the recordings, from the folder of this file", "`.`"),
+    },
     "[windows]": {
         "start_s": ("start of the first interval [s]", None),
         "duration_s": (

@@ -19,7 +19,14 @@ from rtradar import __version__
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
 from rtradar.campaign.spec import read_spec
-from rtradar.clouds.dataset_store import is_whole, sample_path, sweep, write_index, write_sample
+from rtradar.clouds.dataset_store import (
+    check_size,
+    is_whole,
+    sample_path,
+    sweep,
+    write_index,
+    write_sample,
+)
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.files import cleanup_on_exit
 from rtradar.system.output_folder import exclusive_lock
@@ -222,10 +229,11 @@ def make_and_store(plan: SamplePlan, folder: str, made: Callable[[SamplePlan], M
     # Two at a time in one process would share Mitsuba and record each other's warnings.
     with _one_at_a_time:
         try:
-            sample, spatial, work_s = made(plan)
+            sample, spatial, work_s, maps = made(plan)
+            check_size(maps)
         except (InputError, OSError) as error:  # such as a mesh file that this machine lacks
             return Outcome(plan.identity, 0.0, 0, str(error))
-    size = write_sample(Path(folder), plan.identity, sample, spatial)
+    size = write_sample(Path(folder), plan.identity, sample, spatial, maps)
     return Outcome(plan.identity, work_s, size)
 
 

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar import __version__
+from rtradar.campaign.kept import JOINTS, capture_of
 from rtradar.campaign.spec import DRAWN, RUN_KEYS, Actor, Combination, Recorded, Spec, check_samples
 from rtradar.clouds.dataset_store import FORMAT, Sample
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
-from rtradar.pipeline import clouds_of
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
@@ -123,6 +123,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     usual = asdict(RunSettings())
     common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
+    if spec.keep:
+        common["keep"] = list(spec.keep)
     planned = [
         _plan(interval, combination, common)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
@@ -236,11 +238,15 @@ def _seed(*values: object) -> int:
 
 
 class Made(NamedTuple):
-    """Sample, spatial cloud (m, 3) [m] of the same capture, and time ``work_s`` without warm-up."""
+    """Sample, spatial cloud (m, 3) [m] of the same capture, time ``work_s`` without warm-up.
+
+    ``maps`` are the arrays that the data set keeps beside the clouds.
+    """
 
     sample: Sample
     spatial: NDArray[np.float64]
     work_s: float
+    maps: Mapping[str, NDArray[np.floating]] = {}
 
 
 def make_sample(plan: SamplePlan) -> Made:
@@ -257,7 +263,9 @@ def make_sample(plan: SamplePlan) -> Made:
     settings: Any = vars(plan.run_settings())
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
-        clouds, warmup_s = clouds_of(motion, plan.radar, plan.scene, **settings)
+        clouds, maps, warmup_s = capture_of(
+            motion, plan.radar, plan.scene, values.get("keep", ()), **settings
+        )
     limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}
     found = {
         "detections": clouds.rdt.n_voxels,
@@ -265,12 +273,14 @@ def make_sample(plan: SamplePlan) -> Made:
         "xyz_points_found": clouds.n_spatial,
         "limits": sorted(limits),
     }
+    if "joints" in maps:
+        found["joint_names"] = list(JOINTS)
     places = clouds.spatial.points
     if len(places) > SPATIAL_POINTS:
         random = np.random.default_rng(stream(values["seed"], _SPATIAL_STREAM))
         places = places[np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))]
     sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
-    return Made(sample, places, time.perf_counter() - began - warmup_s)
+    return Made(sample, places, time.perf_counter() - began - warmup_s, maps)
 
 
 def scene_digest(scene: Scene) -> str:

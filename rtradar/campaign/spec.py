@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rtradar.campaign.kept import KEPT, sizes
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
-from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions
+from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions, measured_angles
 from rtradar.radar import Radar
 from rtradar.scatter import MODELS
 from rtradar.scatter.common.polarization import BODY_MATERIALS
@@ -68,7 +69,7 @@ RUN_KEYS = ("pfa", *_NAMED, *_WINDOWS, "order", *_SWITCHES)
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5), "order": (0, 3)}
 """Limits of those that are numbers."""
 
-_TOP = ("seed", *RUN_KEYS, "folder", "windows", "each", "drawn", "synthetic", "recordings")
+_TOP = ("seed", *RUN_KEYS, "keep", "folder", "windows", "each", "drawn", "synthetic", "recordings")
 EACH: Mapping[str, list[Any]] = {
     "radar": ["paper-12ghz"],
     "scene": ["free-space"],
@@ -184,7 +185,10 @@ class Combination(NamedTuple):
 
 
 class Spec(NamedTuple):
-    """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`."""
+    """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
+
+    ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
+    """
 
     run: RunSettings
     intervals: Intervals
@@ -192,6 +196,7 @@ class Spec(NamedTuple):
     drawn: Mapping[str, tuple[float, float]]
     actors: tuple[Actor, ...]
     recordings: tuple[Recorded, ...]
+    keep: tuple[str, ...] = ()
 
 
 def check_samples(intervals: int, combinations: int) -> None:
@@ -252,7 +257,48 @@ def _spec(table: Table, folder: Path) -> Spec:
         for key, (usual, least, most) in DRAWN.items()
     }
     run = _run_settings(table)
-    return Spec(run, intervals, _combinations(lists, folder), drawn, actors, recordings)
+    combinations = _combinations(lists, folder)
+    keep = _keep(table)
+    if keep:
+        lengths = {recorded.intervals.duration_s for recorded in recordings}
+        check_equal_sizes(
+            keep, lengths | ({intervals.duration_s} if actors else set()), combinations
+        )
+    return Spec(run, intervals, combinations, drawn, actors, recordings, keep)
+
+
+def _keep(table: Table) -> tuple[str, ...]:
+    """Return the kinds of arrays to keep, in the order of `KEPT`."""
+    kinds = table.get("keep", [])
+    known = isinstance(kinds, list) and all(
+        isinstance(kind, str) and kind in KEPT for kind in kinds
+    )
+    if not known:
+        raise InputError(f"keep = {brief(kinds)}; it must be a list of: {', '.join(KEPT)}")
+    return tuple(kind for kind in KEPT if kind in kinds)
+
+
+def check_equal_sizes(
+    keep: tuple[str, ...], lengths_s: set[float | None], combinations: tuple[Combination, ...]
+) -> None:
+    """Refuse maps of several sizes, which could not be batched, and angles not measured."""
+    if len(lengths_s) > 1 or None in lengths_s:
+        raise InputError(
+            f"keep = {list(keep)}: intervals differ in length; give all the same duration_s, "
+            "so that their maps have one size"
+        )
+    radars = list({each.radar.name: each.radar for each in combinations}.values())
+    if len(set(map(sizes, radars))) > 1:
+        raise InputError(
+            f"keep = {list(keep)}: maps of radars {', '.join(radar.name for radar in radars)} "
+            "have several sizes; make a data set for each of them"
+        )
+    for radar in radars if "range_azimuth" in keep else ():
+        if "azimuth" not in measured_angles(radar):
+            raise InputError(
+                f"keep = {list(keep)}: radar '{radar.name}' measures no azimuth; "
+                "leave range_azimuth out"
+            )
 
 
 def _run_settings(table: Table) -> RunSettings:

@@ -18,7 +18,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,7 @@ from rtradar.system.files import atomic_file, open_regular, read_json, remove_pa
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
     from rtradar.clouds.torch_dataset import SampleDataset
 
@@ -40,12 +41,63 @@ FORMAT = 1
 INDEX = "collection.json"
 """Name of the file that lists the samples of a data set."""
 
-KINDS = {"clouds": "points", "spatial": "spatial"}
-"""What a sample may hold, and the name of its array in the file."""
+
+class Array(NamedTuple):
+    """Axes, unit, meaning and type of an array of a sample."""
+
+    dims: tuple[str, ...]
+    unit: str
+    meaning: str
+    dtype: str = "<f8"
+
+
+_SINCE = "since the start of the capture"
+ARRAYS: Mapping[str, Array] = {
+    "points": Array(("point", "coordinate"), "s, m, m/s", "time, range and velocity of the points"),
+    "spatial": Array(("spatial_point", "axis"), "m", "world x, y and z of the points"),
+    "spectrogram": Array(
+        ("spectrogram_time", "spectrogram_velocity"),
+        "m2",
+        "power of one channel summed over range",
+        "<f4",
+    ),
+    "range_doppler": Array(
+        ("time", "range", "velocity"), "m2", "power summed over all channels", "<f4"
+    ),
+    "range_azimuth": Array(
+        ("time", "range", "azimuth"), "m2", "power summed over detected cells", "<f4"
+    ),
+    "joints": Array(("time", "joint", "axis"), "m", "world x, y and z of the joints"),
+    "time": Array(("time",), "s", f"centre of the processing window {_SINCE}"),
+    "range": Array(("range",), "m", "half the path from Tx to Rx"),
+    "velocity": Array(("velocity",), "m/s", "rate of range, positive receding"),
+    "azimuth": Array(("azimuth",), "rad", "azimuth in the radar's frame, positive to the left"),
+    "spectrogram_time": Array(
+        ("spectrogram_time",), "s", f"centre of the spectrogram's window {_SINCE}"
+    ),
+    "spectrogram_velocity": Array(
+        ("spectrogram_velocity",), "m/s", "rate of range, positive receding"
+    ),
+}
+"""Arrays that the file of a sample may hold: clouds, maps, joints, and the axes of those."""
+
+KINDS = {
+    "clouds": "points",
+    "spatial": "spatial",
+    "spectrograms": "spectrogram",
+    "range_doppler": "range_doppler",
+    "range_azimuth": "range_azimuth",
+    "joints": "joints",
+}
+"""What a data set may hold of each sample, and the name of its array."""
 
 _DIGEST = 64  # hexadecimal digits of SHA-256
 _MAX_BYTES = 200_000_000
-_DTYPES = {"points": np.dtype("<f8"), "spatial": np.dtype("<f8"), "about": np.dtype("u1")}
+_MAX_MAP_BYTES = 190_000_000  # of maps, which leaves room for clouds and provenance
+_DTYPES = {name: np.dtype(array.dtype) for name, array in ARRAYS.items()} | {
+    "about": np.dtype("u1")
+}
+_OF_THREE = ("coordinate", "axis")
 _IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a plain name, which cannot lead to another folder
 
 
@@ -70,16 +122,28 @@ class Sample:
     provenance: Mapping[str, Any]
 
 
+def attributes(name: str) -> dict[str, str]:
+    """Return the attributes of an array: ``units`` and ``long_name``."""
+    return {"units": ARRAYS[name].unit, "long_name": ARRAYS[name].meaning}
+
+
 def sample_path(folder: Path, identity: str) -> Path:
     """Path of a sample's file."""
     return folder / f"{identity}.npz"
 
 
-def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike) -> int:
+def write_sample(
+    folder: Path,
+    identity: str,
+    sample: Sample,
+    spatial: ArrayLike,
+    maps: Mapping[str, ArrayLike] | None = None,
+) -> int:
     """Write the file of a sample, flush it to disk, and return its size [bytes].
 
-    ``spatial`` (m, 3) is the spatial cloud of the same capture [m]. Equal samples give equal bytes.
-    InputError if the file cannot be written; the folder is then unchanged.
+    ``spatial`` (m, 3) is the spatial cloud of the same capture [m], ``maps`` are more of `ARRAYS`.
+    Equal samples give equal bytes. InputError if the file cannot be written; the folder is then
+    unchanged.
     """
     content = {"format": FORMAT, "label": sample.label, "provenance": sample.provenance}
     about = json.dumps(content, sort_keys=True, allow_nan=False)
@@ -88,6 +152,8 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
         "spatial": np.asarray(spatial, dtype="<f8").reshape(-1, 3),
         "about": np.frombuffer(about.encode(), dtype=np.uint8),
     }
+    for name, values in sorted((maps or {}).items()):
+        arrays[name] = np.ascontiguousarray(values, dtype=_DTYPES[name])
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, values in arrays.items():
@@ -99,6 +165,15 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
     whole = body + hashlib.sha256(body).hexdigest().encode()
     _write_durably(sample_path(folder, identity), whole)
     return len(whole)
+
+
+def check_size(maps: Mapping[str, NDArray[Any]]) -> None:
+    """Raise InputError if a sample with these maps would be too large to be read again."""
+    if (size := sum(values.nbytes for values in maps.values())) > _MAX_MAP_BYTES:
+        raise InputError(
+            f"maps and joints have {size / 1e6:.0f} MB; {_MAX_MAP_BYTES / 1e6:.0f} MB are allowed: "
+            "keep less (keep), or take shorter intervals (duration_s)"
+        )
 
 
 def is_whole(path: Path) -> bool:
@@ -126,7 +201,7 @@ def read_digest(path: Path) -> str:
 
 
 def read_sample(path: Path, name: str) -> Any:
-    """Read one entry of a sample's file: ``points``, ``spatial``, or the dict ``about``.
+    """Read one entry of a sample's file: one of `ARRAYS`, or the dict ``about``.
 
     The others are not read: the archive holds a checksum for each entry, and its comment marks the
     end of the file. InputError if the file is damaged or larger than 200 MB.
@@ -136,30 +211,61 @@ def read_sample(path: Path, name: str) -> Any:
             size = os.fstat(file.fileno()).st_size
             if size <= _MAX_BYTES:
                 array = _read_array(file, name)
-                return _parse_about(array) if name == "about" else array.astype(np.float64)
+                if name == "about":
+                    return _parse_about(array)
+                return array.astype(array.dtype.newbyteorder("="))
     except Exception:  # readers of archives and headers raise any type if the file is damaged
-        raise InputError(
-            f"sample '{path}' is damaged; mend the collection with: rtradar dataset build"
-        ) from None
+        raise _damaged(path) from None
     raise InputError(
         f"sample '{path}' has {size / 1e6:.0f} MB; {_MAX_BYTES / 1e6:.0f} MB are allowed: "
         "it is none of rtradar's"
     )
 
 
+def read_shape(path: Path, name: str) -> tuple[int, ...]:
+    """Read the shape of an array of a sample's file, without its values."""
+    try:
+        with (
+            open_regular(path) as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(_entry(archive, name)) as data,
+        ):
+            return _header(data, name)[0]
+    except Exception:  # see read_sample
+        raise _damaged(path) from None
+
+
+def _damaged(path: Path) -> InputError:
+    return InputError(
+        f"sample '{path}' is damaged; mend the collection with: rtradar dataset build"
+    )
+
+
 def _read_array(file: BinaryIO, name: str) -> NDArray[Any]:
     with zipfile.ZipFile(file) as archive:
-        entry = archive.getinfo(f"{name}.npy")
-        # Our archives are not compressed, so that no entry is larger than the file.
-        if len(archive.comment) != _DIGEST or entry.compress_type != zipfile.ZIP_STORED:
-            raise ValueError
-        data = io.BytesIO(archive.read(entry))
+        data = io.BytesIO(archive.read(_entry(archive, name)))
+    shape, dtype = _header(data, name)
+    return np.frombuffer(data.getvalue(), dtype, offset=data.tell()).reshape(shape)
+
+
+def _entry(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
+    """Return the entry of an array; our archives are not compressed: no entry exceeds the file."""
+    entry = archive.getinfo(f"{name}.npy")
+    if len(archive.comment) != _DIGEST or entry.compress_type != zipfile.ZIP_STORED:
+        raise ValueError
+    return entry
+
+
+def _header(data: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the shape and the type of an array from its header."""
     if np.lib.format.read_magic(data) != (1, 0):
         raise ValueError
     shape, _, dtype = np.lib.format.read_array_header_1_0(data)
-    if dtype != _DTYPES[name] or (name != "about" and shape[1:] != (3,)):
+    dims = ARRAYS[name].dims if name in ARRAYS else ("byte",)
+    threes = all(size == 3 for size, axis in zip(shape, dims, strict=True) if axis in _OF_THREE)
+    if dtype != _DTYPES[name] or not threes:
         raise ValueError
-    return np.frombuffer(data.getvalue(), dtype, offset=data.tell()).reshape(shape)
+    return shape, dtype
 
 
 def _parse_about(data: NDArray[np.uint8]) -> dict[str, Any]:
@@ -345,6 +451,49 @@ class Collection:
         column[:] = values
         return column
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of arrays that every sample holds: clouds, and what the data set keeps."""
+        kept = [about["provenance"].get("keep", ()) for about in self._about]
+        return (
+            "clouds",
+            "spatial",
+            *(kind for kind in KINDS if kept and all(kind in one for one in kept)),
+        )
+
+    def maps(self, index: int) -> xr.Dataset:
+        """Read the maps and joints that the data set keeps of a sample.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        Dataset
+            Those of ``spectrogram``, ``range_doppler``, ``range_azimuth`` and ``joints`` that are
+            kept, with their axes; units are attributes.
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        import xarray as xr
+
+        path, provenance = self._paths[index], self._about[index]["provenance"]
+        kept = [KINDS[kind] for kind in provenance.get("keep", ())]
+        axes = {axis for name in kept for axis in ARRAYS[name].dims if axis in ARRAYS}
+        found = {
+            name: (ARRAYS[name].dims, read_sample(path, name), attributes(name))
+            for name in (*kept, *sorted(axes))
+        }
+        names = (
+            {"joint": provenance["joint_names"], "axis": list("xyz")} if "joints" in kept else {}
+        )
+        return xr.Dataset(found, names).set_coords(axes)
+
     def to_pandas(self) -> pd.DataFrame:
         """Return what is known of every sample, without reading the clouds.
 
@@ -386,7 +535,10 @@ class Collection:
         ----------
         kind : str
             Array of each sample: ``clouds`` gives (point, 3) time [s], range [m] and velocity
-            [m/s], ``spatial`` (point, 3) world coordinates [m].
+            [m/s], ``spatial`` (point, 3) world coordinates [m]. If the data set keeps them,
+            ``spectrograms`` gives (time, velocity), ``range_doppler`` (time, range, velocity) and
+            ``range_azimuth`` (time, range, azimuth) power [m^2], and ``joints`` (time, joint, 3)
+            world coordinates [m].
         points : int
             Number of points of each cloud. Of larger clouds as many are taken, a random sample of
             an RDT cloud; points of smaller ones are repeated, and an empty one becomes zeros.
@@ -399,7 +551,8 @@ class Collection:
         Raises
         ------
         InputError
-            If torch is missing, the kind is unknown, or the number of points is not positive.
+            If torch is missing, the kind is unknown or not kept, its arrays have several sizes, or
+            the number of points is not positive.
         """
         if kind not in KINDS:
             raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
@@ -412,7 +565,19 @@ class Collection:
                 "Collection.torch needs torch; install the extra 'learn' of rtradar, "
                 "in a checkout: pip install -e '.[learn]'"
             ) from None
+        if kind not in self.kinds:
+            raise InputError(
+                f"not every sample of collection {self._name} holds {kind}, only "
+                f'{", ".join(self.kinds)}; build it anew with keep = ["{kind}"]'
+            )
         clouds = kind in ("clouds", "spatial")
+        shapes = set() if clouds else {read_shape(path, KINDS[kind]) for path in self._paths}
+        if len(shapes) > 1:
+            raise InputError(
+                f"{kind} of collection {self._name} have {len(shapes)} sizes, such as "
+                f"{' and '.join(map(str, sorted(shapes)[:2]))}, which cannot be batched; "
+                "build data sets of one duration_s and one radar"
+            )
         return SampleDataset(
             self._paths, self.labels.tolist(), KINDS[kind], points if clouds else None
         )

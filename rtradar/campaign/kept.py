@@ -1,0 +1,123 @@
+"""What a data set keeps of each sample beside its clouds: maps, and the joints as labels."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.clouds.dataset_store import ARRAYS, KINDS
+from rtradar.motion import Motion
+from rtradar.motion.skeleton import NODES
+from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.processing import CloudMaker, Clouds, Processing
+from rtradar.process import (
+    SlidingSpectrogram,
+    angle_grid,
+    measured_angles,
+    range_azimuth,
+    window_cycles,
+)
+from rtradar.radar import Radar
+from rtradar.scene import Scene
+from rtradar.settings import RunOptions, RunSettings
+
+KEPT = tuple(kind for kind in KINDS if kind not in ("clouds", "spatial"))
+"""Kinds that a specification may keep."""
+
+JOINTS = NODES
+"""Names of the joints, those of the body's 22 nodes, whatever skeleton the recording has."""
+
+
+class Capture(NamedTuple):
+    """Clouds of one sample, the arrays that it keeps by name, and the time of warming up [s]."""
+
+    clouds: Clouds
+    maps: dict[str, NDArray[np.floating]]
+    warmup_s: float
+
+
+def capture_of(
+    motion: Motion, radar: Radar, scene: Scene, keep: Sequence[str], **options: Unpack[RunOptions]
+) -> Capture:
+    """Compute the clouds of a run with these settings, and the kinds of arrays to ``keep``."""
+    capture = prepare(motion, radar, scene, RunSettings(**options))
+    keeper = MapKeeper(capture.processing, keep)
+    capture.stream(keeper, progress=False)
+    maps = keeper.maps()
+    if "joints" in keep:
+        maps["joints"] = capture.body.motion.at(maps["time"])[0]
+    return Capture(keeper.finish(), maps, capture.warmup_s)
+
+
+def sizes(radar: Radar) -> tuple[object, ...]:
+    """Return what decides the sizes and axes of a radar's maps, for comparison."""
+    return (
+        radar.range_m.tobytes(),
+        *(radar.velocity_mps(n).tobytes() for n in (radar.cycles_per_frame, window_cycles(radar))),
+        measured_angles(radar) and angle_grid(radar).tobytes(),
+        radar.cycle_duration_s,
+        radar.hop_cycles,
+    )
+
+
+class MapKeeper:
+    """Makes the clouds of one capture from its range spectra, and collects maps on the way.
+
+    So that memory stays low, `push` takes at most ``max_chirps`` chirps.
+    """
+
+    def __init__(self, processing: Processing, keep: Sequence[str]) -> None:
+        self._processing, self._keep, radar = processing, keep, processing.radar
+        self._clouds = CloudMaker(processing)
+        self.max_chirps = self._clouds.max_chirps
+        self._spectrogram = SlidingSpectrogram(
+            radar, removal=processing.removal, window_functions=processing.window_functions
+        )
+        self._steps: defaultdict[str, list[NDArray[np.floating]]] = defaultdict(list)
+
+    def push(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """Process the next chirps, (chirp, rx, range) of whole TDM cycles from ``first`` on."""
+        spectra = self._clouds.without_clutter(spectra, first)
+        if "spectrograms" in self._keep:
+            columns = self._spectrogram.push(spectra)
+            self._add(spectrogram_time=columns.time, spectrogram=columns.power)
+        for frame in self._clouds.frames(spectra):
+            self._add(time=[frame.middle_s])
+            if "range_doppler" in self._keep:
+                self._add(range_doppler=frame.power[None])
+            if "range_azimuth" in self._keep and frame.angles is not None:
+                self._add(range_azimuth=range_azimuth(frame.angles, self._processing.radar)[None])
+
+    def _add(self, **steps: ArrayLike) -> None:
+        for name, values in steps.items():
+            self._steps[name].append(np.asarray(values, dtype=ARRAYS[name].dtype))
+
+    def maps(self) -> dict[str, NDArray[np.floating]]:
+        """Return the maps of all frames so far by name, with their axes; nothing if none is kept.
+
+        The axis of time is that of the frames, and so that of joints.
+        """
+        if not self._keep:
+            return {}
+        maps = {name: np.concatenate(steps) for name, steps in self._steps.items()}
+        return maps | _axes(self._processing.radar, maps)
+
+    def finish(self) -> Clouds:
+        """Return the clouds of all frames so far."""
+        return self._clouds.finish()
+
+
+def _axes(radar: Radar, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:
+    """Return the axes beside time that these maps have."""
+    known = {
+        "range": radar.range_m,
+        "velocity": radar.velocity_mps(radar.cycles_per_frame),
+        "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
+        "azimuth": angle_grid(radar) if measured_angles(radar) else np.zeros(0),
+    }
+    needed = {axis for name in maps for axis in ARRAYS[name].dims}
+    return {name: values for name, values in known.items() if name in needed}

@@ -1,0 +1,168 @@
+"""Maps and joints that a data set keeps: those of a run, of one size, the same to the byte."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import torch
+from torch.utils.data import DataLoader
+
+import rtradar as rt
+from rtradar.campaign import build_dataset
+from rtradar.campaign.samples import make_sample, plan_samples
+from rtradar.campaign.spec import read_spec
+from rtradar.clouds.dataset_store import check_size
+from rtradar.errors import InputError
+from rtradar.motion.skeleton import NODES
+
+RADAR = """
+tx_y = 2
+tx_z = 0
+rx_y = 4
+rx_z = 0
+chirp_duration_s = 250e-6
+samples_per_chirp = 128
+frame_duration_s = 0.05
+"""
+TALL = (
+    RADAR.replace("x_z = 0", "x_y = 0")
+    .replace("tx_y = 2", "tx_z = 2")
+    .replace("rx_y = 4", "rx_z = 4")
+)
+KEEP = 'keep = ["spectrograms", "joints", "range_azimuth", "range_doppler"]\n'
+SPEC = """
+[windows]
+start_s = 0.1
+duration_s = 0.2
+[each]
+radar = ["small.toml"]
+fidelity = ["analytic"]
+[drawn]
+offset_x_m = [0.5, 0.5]
+[[synthetic]]
+label = "walk"
+count = 2
+[[synthetic]]
+label = "kick"
+count = 1
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    (folder / "small.toml").write_text(RADAR)
+    (folder / "set.toml").write_text(text)
+    return folder / "set.toml"
+
+
+@pytest.fixture
+def built(here: None, tmp_path: Path) -> rt.Collection:
+    build_dataset(write(tmp_path, KEEP + SPEC), tmp_path / "out")
+    return rt.Collection(tmp_path / "out")
+
+
+def test_maps_are_those_of_a_run(built: rt.Collection, tmp_path: Path) -> None:
+    maps, told = built.maps(0), built[0].provenance
+    motion = rt.synthetic_motion(
+        built[0].label,
+        seed=told["subject_seed"],
+        duration_s=told["take_s"],
+        **{key: told[key] for key in ("height_m", "build", "tempo", "amplitude", "side", "take")},
+    )
+    (plan,) = (
+        plan
+        for plan in plan_samples(read_spec(tmp_path / "set.toml"))
+        if plan.identity == built.ids[0]
+    )
+    rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", **vars(plan.run_settings()))
+    with h5py.File(tmp_path / "run" / "maps.h5") as file:
+        for name in ("spectrogram", "range_doppler", "range_azimuth"):
+            np.testing.assert_array_equal(maps[name], file[name])
+            for axis in maps[name].dims:
+                np.testing.assert_array_equal(maps[axis], file[axis])
+            assert maps[name].attrs["units"] == file[name].attrs["units"] == "m2"
+    assert maps["joints"].dims == ("time", "joint", "axis")
+    assert maps["joint"].values.tolist() == list(NODES)
+    # The interval stands with its mean root at the place of the person.
+    root = maps["joints"].sel(joint="root").mean("time")
+    assert float(root.sel(axis="x")) == pytest.approx(0.5, abs=0.1)
+    assert 0.7 < float(root.sel(axis="z")) < 1.2
+
+
+def test_everything_kept_can_be_batched(built: rt.Collection) -> None:
+    assert set(built.kinds) == {"clouds", "spatial", *eval(KEEP.partition("=")[2])}
+    for kind in built.kinds:
+        ((values, labels),) = DataLoader(built.torch(kind), batch_size=8)
+        assert (values.dtype, len(values), len(labels)) == (torch.float32, 3, 3)
+        if kind not in ("clouds", "spatial"):
+            own = built.maps(2)[{"spectrograms": "spectrogram"}.get(kind, kind)]
+            np.testing.assert_array_equal(values[2].numpy(), own.astype(np.float32))
+
+
+def test_a_second_build_gives_the_same_bytes_and_mends_what_is_damaged(
+    built: rt.Collection, tmp_path: Path
+) -> None:
+    paths = sorted((tmp_path / "out").glob("*.npz"))
+    before = [path.read_bytes() for path in paths]
+    paths[1].write_bytes(before[1][:-100_000])
+    assert build_dataset(tmp_path / "set.toml", tmp_path / "out")["made"] == 1
+    assert [path.read_bytes() for path in paths] == before
+
+
+def test_what_is_kept_changes_ids_and_its_order_does_not(tmp_path: Path) -> None:
+    ids = [
+        [plan.identity for plan in plan_samples(read_spec(write(tmp_path, keep + SPEC)))]
+        for keep in (
+            "",
+            "keep = []\n",
+            KEEP,
+            KEEP.replace('"joints", ', "").replace("]", ', "joints"]'),
+        )
+    ]
+    assert ids[0] == ids[1] != ids[2] == ids[3]
+
+
+def test_nothing_more_is_kept_unless_asked_for(tmp_path: Path) -> None:
+    made = make_sample(plan_samples(read_spec(write(tmp_path, SPEC)))[0].packed())
+    assert made.maps == {}
+    assert "keep" not in made.sample.provenance
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            'keep = ["pictures"]\n' + SPEC,
+            "keep = ['pictures']; it must be a list of: spectrograms,",
+        ),
+        ('keep = "joints"\n' + SPEC, "keep = 'joints'; it must be a list of"),
+        (
+            KEEP + SPEC.replace('"small.toml"', '"small.toml", "paper-12ghz"'),
+            "maps of radars small, paper-12ghz have several sizes",
+        ),
+        (
+            KEEP + SPEC.replace("small", "tall"),
+            "radar 'tall' measures no azimuth; leave range_azimuth out",
+        ),
+        (
+            KEEP + '[[recordings]]\nfile = "a.bvh"\nlabel = "a"\nsubject = "b"\nlicence = "c"\n',
+            "intervals differ in length",
+        ),
+    ],
+)
+def test_what_could_not_be_batched_is_refused(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "a.bvh").touch()
+    (tmp_path / "tall.toml").write_text(TALL)
+    with pytest.raises(InputError) as caught:
+        read_spec(write(tmp_path, text))
+    assert says in str(caught.value)
+
+
+def test_a_collection_without_maps_says_so(here: None, tmp_path: Path) -> None:
+    build_dataset(write(tmp_path, SPEC.replace("count = 2", "count = 1")), tmp_path / "out")
+    with pytest.raises(InputError, match=r'holds spectrograms, .* keep = \["spectrograms"\]'):
+        rt.Collection(tmp_path / "out").torch("spectrograms")
+    with pytest.raises(InputError, match="have 200 MB; 190 MB are allowed"):
+        check_size({"joints": np.zeros(25_000_000)})
