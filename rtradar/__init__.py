@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
     from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
-    from rtradar.pipeline import Comparison, Result, compare, run
+    from rtradar.pipeline import Comparison, Result, Simulation, compare, run, simulate
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
     from rtradar.scatter import register_model, scattering_length
@@ -37,7 +37,7 @@ _NAMES = {
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
     "motion": "Motion load_motion register_reader synthetic_motion",
-    "pipeline": "Comparison Result compare run",
+    "pipeline": "Comparison Result Simulation compare run simulate",
     "process": "register_detector",
     "radar": "Radar register_radar",
     "scatter": "register_model scattering_length",
@@ -62,6 +62,7 @@ __all__ = [
     "Result",
     "RunSettings",
     "Scene",
+    "Simulation",
     "ValidityWarning",
     "classify",
     "compare",
@@ -76,6 +77,7 @@ __all__ = [
     "run",
     "scattering_length",
     "signal",
+    "simulate",
     "synthetic_motion",
 ]
 

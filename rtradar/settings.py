@@ -18,28 +18,41 @@ MAX_SNR_DB = 200.0
 """The largest ratio of echo and noise power, either way [dB]: float32 samples hold no more."""
 
 
-class RunOptions(TypedDict, total=False):
-    """The options that `run` and `compare` take by name; `RunSettings` documents them."""
+class _Seed(TypedDict, total=False):
+    seed: int
+
+
+class SimulationOptions(_Seed, total=False):
+    """The options that `simulate` takes by name; `RunSettings` documents them."""
 
     fidelity: str
     start_s: float
     duration_s: float | None
     heading_deg: float
     snr_db: float | Literal["physical"]
-    pfa: float
-    seed: int
     variant: str
     spreading: bool
     model_options: Mapping[str, Any] | None
-    clutter_removal: str
     body_material: str
     order: int
     keep_all: bool
-    save_if: bool
+    noise_power_m2: float | None
+
+
+class ProcessingOptions(_Seed, total=False):
+    """The options that `process_samples` takes by name; `RunSettings` documents them."""
+
+    pfa: float
+    clutter_removal: str
     detector: str
     range_window: str | tuple[str, float]
     doppler_window: str | tuple[str, float]
-    noise_power_m2: float | None
+
+
+class RunOptions(SimulationOptions, ProcessingOptions, total=False):
+    """The options that `run` and `compare` take by name; `RunSettings` documents them."""
+
+    save_if: bool
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,8 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
     )
     if options := options_of(thing):
         assert "rtradar.RunSettings" in section(text, "Parameters")
-        assert options == named(inspect.getdoc(rt.RunSettings) or "", "Parameters")
+        documented = named(inspect.getdoc(rt.RunSettings) or "", "Parameters")
+        assert options == documented if name == "rtradar.run" else options <= documented
     if inspect.isfunction(thing) and names and thing.__annotations__.get("return") != "None":
         assert (section(text, "Returns") + section(text, "Yields")).strip(), (
             "it does not say what it returns"

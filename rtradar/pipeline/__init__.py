@@ -1,7 +1,18 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
 from rtradar.pipeline.compare import Comparison, compare
+from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import clouds_of, run
+from rtradar.pipeline.simulation import Simulation, simulate
 
-__all__ = ["Comparison", "Result", "clouds_of", "compare", "run"]
+__all__ = [
+    "MEMORY_LIMIT_BYTES",
+    "Comparison",
+    "Result",
+    "Simulation",
+    "clouds_of",
+    "compare",
+    "run",
+    "simulate",
+]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -14,15 +14,15 @@ from tqdm import tqdm
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.pipeline.indoors import Indoors
-from rtradar.pipeline.processing import Processing
+from rtradar.pipeline.processing import Processing, block_chirps
 from rtradar.pipeline.timing import Stages
-from rtradar.process import range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.signal import Noise, receive, separate, synthesize
+from rtradar.signal import Noise, receive, synthesize
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.files import uninterruptible
 
 
@@ -79,28 +79,39 @@ class Capture:
         names = [self.motion, self.radar.name, self.settings.fidelity]
         return ", ".join(names + ([self.scene.name] if self.inside else []))
 
-    @property
-    def block_chirps(self) -> int:
-        """Number of chirps whose echoes are computed together: a hop of the frames, or a frame."""
-        return min(math.ceil(self.radar.hop_cycles), self.radar.cycles_per_frame) * self.radar.n_tx
-
     def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
         """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.
 
         The sink receives the range spectra. The array ``kept`` (chirp, rx, sample), if there is
         one, receives the IF samples with noise; with DDM it has one chirp for each cycle.
         """
-        radar, stages = self.radar, self.stages
-        room = self.inside.room if self.inside else None
+        most = block_chirps(self.radar)
         # The blocks of an array on disk are its chunks.
-        at_once = self.block_chirps if kept is not None else min(sink.max_chirps, self.block_chirps)
+        at_once = most if kept is not None else min(sink.max_chirps, most)
+        range_spectra = self.processing.range_spectra(at_once)
+        for first, received in self.received(at_once, progress=progress):
+            if kept is not None:
+                # Zarr makes folders as it writes, which must not be after they were removed.
+                with self.stages.time("write"), uninterruptible():
+                    begin = first // chirps_together(self.radar)
+                    kept[begin : begin + len(received)] = received
+            sink.push(range_spectra(received, first), first)
 
-        # The largest arrays but for the frames. Allocated anew for each block, they would now and
-        # then find no hole in the heap.
-        shape = at_once, radar.n_rx, radar.samples_per_chirp
-        samples_of, spectra_of = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
+    def received(
+        self, at_once: int, *, progress: bool = True
+    ) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+        """Compute echoes in blocks of chirps, and from them IF samples (chirp, rx, sample).
 
-        def range_spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
+        Yields the first chirp of at most ``at_once`` and their samples with noise; the next may
+        come in the same array. With DDM there is one row for each cycle.
+        """
+        radar, stages, most = self.radar, self.stages, block_chirps(self.radar)
+        room = self.inside.room if self.inside else None
+        # The largest array but for the frames. Allocated anew for each block, it would now and then
+        # find no hole in the heap.
+        samples_of = np.empty((at_once, radar.n_rx, radar.samples_per_chirp), np.complex64)
+
+        def if_samples(echoes: Echoes, first: int) -> NDArray[np.complex64]:
             n = len(echoes.tx)
             with stages.time("signal"):
                 times = radar.chirp_times(n, first)
@@ -111,29 +122,21 @@ class Capture:
             with stages.time("noise"):
                 received = receive(samples, radar, first)
                 self.noise.add(received, radar, first)
-            if kept is not None:
-                # Zarr makes folders as it writes, which must not be after they were removed.
-                with stages.time("write"), uninterruptible():
-                    begin = first * len(received) // n
-                    kept[begin : begin + len(received)] = received
-            with stages.time("range"):
-                windows, whole = self.processing.window_functions, spectra_of[:n]
-                separated = separate(received, radar, first)
-                return range_spectrum(separated, radar, window_functions=windows, out=whole)
+            return received
 
         # A function of its own: names that a loop binds would keep echoes alive while the next
         # block is computed.
-        def stream_block(chirps: NDArray[np.int64]) -> None:
+        def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
             with stages.time("scatter"):
                 echoes = self.model.echoes(chirps)
             for begin in range(0, len(chirps), at_once):
                 first = int(chirps[begin])
-                sink.push(range_spectra(chirps_of(echoes, begin, begin + at_once), first), first)
+                yield first, if_samples(chirps_of(echoes, begin, begin + at_once), first)
 
         silent = None if progress else True  # None: silent where there is no terminal
-        blocks = range(0, self.n_chirps, self.block_chirps)
+        blocks = range(0, self.n_chirps, most)
         for first in tqdm(blocks, desc=self.title, unit="block", disable=silent):
-            stream_block(np.arange(first, min(first + self.block_chirps, self.n_chirps)))
+            yield from block(np.arange(first, min(first + most, self.n_chirps)))
 
 
 def chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:

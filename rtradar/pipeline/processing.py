@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -24,10 +25,13 @@ from rtradar.process import (
     clutter_removal,
     measured_angles,
     power_map,
+    range_spectrum,
 )
 from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
+from rtradar.signal import separate
+from rtradar.signal.multiplexing import chirps_together
 
 CLOUD_POINTS = 3000
 """Points in the RDT cloud (paper, section 3.2.4)."""
@@ -67,6 +71,33 @@ class Processing:
             WindowFunctions(settings.range_window, settings.doppler_window),
             settings.seed,
         )
+
+    def range_spectra(
+        self, at_once: int
+    ) -> Callable[[NDArray[np.complex64], int], NDArray[np.complex64]]:
+        """Return a function that makes range spectra of the samples of at most ``at_once`` chirps.
+
+        It takes received samples and the number of their first chirp, and gives (chirp, rx, range)
+        in an array that the next call fills anew.
+        """
+        radar = self.radar
+        filled = np.empty((at_once, radar.n_rx, radar.samples_per_chirp), np.complex64)
+
+        def range_spectra(received: NDArray[np.complex64], first: int) -> NDArray[np.complex64]:
+            with self.stages.time("range"):
+                windows, n = self.window_functions, len(received) * chirps_together(radar)
+                separated = separate(received, radar, first)
+                return range_spectrum(separated, radar, window_functions=windows, out=filled[:n])
+
+        return range_spectra
+
+
+def block_chirps(radar: Radar) -> int:
+    """Return how many chirps are computed or processed together: a hop of the frames, or a frame.
+
+    Maps depend on it in their last bits, for steps of the range-time map end with a block.
+    """
+    return min(math.ceil(radar.hop_cycles), radar.cycles_per_frame) * radar.n_tx
 
 
 class Clouds(NamedTuple):

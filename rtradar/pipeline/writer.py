@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.map_store import MapStore
-from rtradar.pipeline.processing import RANGE_TIME_S, CloudMaker, Clouds, Processing, frame_angles
+from rtradar.pipeline.processing import (
+    RANGE_TIME_S,
+    CloudMaker,
+    Clouds,
+    Processing,
+    block_chirps,
+    frame_angles,
+)
 from rtradar.process import (
     SlidingRangeTime,
     SlidingSpectrogram,
@@ -23,6 +30,7 @@ from rtradar.process import (
     window_cycles,
 )
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.output_folder import OutputFiles, one_of
 
 _FILES = (
@@ -166,13 +174,12 @@ def if_array(path: Path, capture: Capture) -> Any:
     import zarr
 
     radar = capture.radar
-    # With DDM a receiver gets the sum of all transmitters.
-    together = radar.n_tx if radar.multiplexing == "ddm" else 1
+    together = chirps_together(radar)
     shape = (radar.n_rx, radar.samples_per_chirp)
     array = zarr.create_array(
         path,
         shape=(capture.n_chirps // together, *shape),
-        chunks=(capture.block_chirps // together, *shape),
+        chunks=(block_chirps(radar) // together, *shape),
         dtype="complex64",
         dimension_names=("chirp", "rx", "sample"),
     )

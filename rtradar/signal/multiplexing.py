@@ -25,6 +25,11 @@ def codes(radar: Radar, first_chirp: int, count: int) -> NDArray[np.complex64]:
     return np.exp(2j * np.pi * steps / radar.n_doppler_bands).astype(np.complex64)
 
 
+def chirps_together(radar: Radar) -> int:
+    """Number of chirps in each row of what `receive` gives: all of a cycle under DDM, else 1."""
+    return radar.n_tx if radar.multiplexing == "ddm" else 1
+
+
 def receive(
     samples: NDArray[np.complexfloating], radar: Radar, first_chirp: int
 ) -> NDArray[np.complexfloating]:
