@@ -173,7 +173,9 @@ def theme_of(axes: Axes) -> Theme:
     return DARK if opacity > 0 and luminance < 0.4 else LIGHT
 
 
-def dress(axes: Axes, *, title: str = "", note: str = "", grid: bool = True) -> None:
+def dress(
+    axes: Axes, *, title: str = "", note: str = "", grid: bool = True, across: int = 1
+) -> None:
     """Give axes that are drawn on their title, note, fonts, grid and colours.
 
     Call it before a colour bar takes its room from the axes, and once more for the axes of the bar.
@@ -188,11 +190,13 @@ def dress(axes: Axes, *, title: str = "", note: str = "", grid: bool = True) -> 
         Sentence in small letters below the axes, broken into lines that fit.
     grid : bool
         Whether to draw grid lines.
+    across : int
+        Number of axes side by side, of which these are the first, that title and note may cover.
     """
     theme = theme_of(axes)
     is_3d = axes.name == "3d"
     figure: Any = axes.get_figure(root=True)
-    width_pt = 72 * axes.get_position().width * figure.get_size_inches()[0]
+    width_pt = 72 * across * axes.get_position().width * figure.get_size_inches()[0]
     if title:
         size, place = STYLE["axes.titlesize"], STYLE["axes.titlelocation"]
         style: dict[str, Any] = {"fontsize": size, "color": theme.text, "loc": place}

@@ -21,6 +21,7 @@ Pictures therefore use one of three units:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -33,6 +34,7 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar import Radar
+from rtradar.system.figure_style import dress, theme_of
 
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
@@ -49,6 +51,11 @@ class FieldUnit:
 
     name: str
     scale: float | NDArray[np.float64]
+
+    @property
+    def decibels(self) -> str:
+        """Unit of a level, such as ``dBsm``; plain ``dB`` where it is relative to the maximum."""
+        return self.name.split(" ")[0]
 
     def level(self, power_m2: ArrayLike) -> NDArray[np.float64]:
         """Convert powers [m^2] to levels in this unit [dB], about -380 dB for a power of 0."""
@@ -136,3 +143,45 @@ def draw_levels(
     extent = (*bin_edges(across), *bin_edges(up))
     style = {"cmap": "viridis", "aspect": "auto", "origin": "lower"} | style
     return axes.imshow(level_db, vmin=low, vmax=high, extent=extent, **style)
+
+
+def draw_view(
+    axes: Axes,
+    level_db: NDArray[np.float64],
+    across: NDArray[np.float64],
+    up: NDArray[np.float64],
+    view: tuple[tuple[float, float] | None, tuple[float, float]],
+    *,
+    unit: FieldUnit,
+    below_peak_db: float = 60.0,
+) -> tuple[AxesImage, str]:
+    """Draw ``level_db`` (up, across) within the limits of a ``view``, coloured for what it shows.
+
+    ``view`` has the limits across, None for the whole axis, and up. Returns the image, and a
+    sentence on the floor and the ceiling of its colours, as `colour_limits` sets them.
+    """
+    x_limits, y_limits = view[0] or bin_edges(across), view[1]
+    seen = level_db[np.ix_(_inside(up, y_limits), _inside(across, x_limits))]
+    low, high = colour_limits(seen if seen.size else level_db, below_peak_db)
+    image = draw_levels(axes, level_db, across, up, (low, high), interpolation="nearest")
+    axes.set(xlim=x_limits, ylim=y_limits)
+    floor = (
+        f"{below_peak_db:.0f} dB below that"
+        if low <= high - below_peak_db
+        else "3 dB below the median of the view"
+    )
+    words = f"Colours: ceiling {high:.0f} {unit.decibels}, the strongest cell; "
+    return image, f"{words}floor {low:.0f} {unit.decibels}, {floor}."
+
+
+def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArray[np.bool_]:
+    return (centres >= limits[0]) & (centres <= limits[1])
+
+
+def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any) -> None:
+    """Put a colour bar beside axes that are dressed, with this label."""
+    figure: Any = axes[0].get_figure(root=True)
+    extend = "min" if isinstance(image, AxesImage) else "neither"
+    bar = figure.colorbar(image, ax=list(axes), label=label, extend=extend, **options)
+    dress(bar.ax, grid=False)
+    bar.outline.set_edgecolor(theme_of(axes[0]).faint)

@@ -1,0 +1,71 @@
+"""Limits of axes, fitted to where there is something to be seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+HANDFUL = 3
+"""Detections that may lie beyond each end of an axis, as false alarms do."""
+
+_FRACTION = 1e-3
+_FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
+_MARGIN, _LEAST_BINS = 0.15, 8
+
+
+def fitted_limits(
+    counts: ArrayLike, centres: NDArray[np.float64], *, include: ArrayLike = ()
+) -> tuple[float, float]:
+    """Return the limits of an axis that show where something is, and not where outliers are.
+
+    At each end, a thousandth of the counts may lie outside, or `HANDFUL` if those are more, but
+    never more than a twentieth. The rest is inside, with a margin of 15 % of its extent, and at
+    least eight bins in all. The limits never pass the ends of the axis, and are those ends
+    if nothing is counted.
+
+    Parameters
+    ----------
+    counts : (bin,) array_like
+        Number of detections, or of other things to be shown, in each bin of the axis.
+    centres : (bin,) float64
+        Middle of each bin, evenly spaced and ascending.
+    include : array_like
+        Values of the axis that are shown whatever is counted, such as velocity 0.
+
+    Returns
+    -------
+    low, high : float
+        Limits in the unit of ``centres``.
+    """
+    number = np.asarray(counts, dtype=np.float64)
+    step = float(centres[1] - centres[0]) if len(centres) > 1 else 1.0
+    first, last = float(centres[0]) - step / 2, float(centres[-1]) + step / 2
+    total = number.sum()
+    if total == 0:
+        return first, last
+    outside = min(max(_FRACTION * total, HANDFUL), total / 20)
+    passed = np.cumsum(number)
+    begin = int(np.argmax(passed > outside))
+    end = len(number) - 1 - int(np.argmax(np.cumsum(number[::-1]) > outside))
+    shown = [float(centres[begin]) - step / 2, float(centres[end]) + step / 2]
+    shown += [float(value) for value in np.ravel(include) if first <= value <= last]
+    low, high = min(shown), max(shown)
+    margin = max(_MARGIN * (high - low), (_LEAST_BINS * step - (high - low)) / 2)
+    return max(low - margin, first), min(high + margin, last)
+
+
+def above_floor(power: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return where a map is more than its floor: 6 dB above its median, 50 dB below its peak.
+
+    Parameters
+    ----------
+    power : array of float
+        Power of the cells of a map, in linear units.
+
+    Returns
+    -------
+    array of bool
+        Whether a cell stands above both levels.
+    """
+    level = max(_FLOOR * float(np.median(power)), _BELOW_PEAK * float(power.max(initial=0)))
+    return np.asarray(power > level)

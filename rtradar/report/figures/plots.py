@@ -1,0 +1,530 @@
+"""`Plots`: the pictures of a run's maps and clouds, in a notebook and as the files of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from rtradar.clouds import SpatialCloud
+from rtradar.errors import InputError
+from rtradar.process import measured_angles
+from rtradar.process.window_functions import noise_bandwidth_bins
+from rtradar.radar import Radar
+from rtradar.report.figures.canvas import (
+    VELOCITY_LABEL,
+    FieldUnit,
+    add_colour_bar,
+    draw_view,
+    field_unit,
+)
+from rtradar.report.figures.fitting import above_floor, fitted_limits
+from rtradar.report.figures.maps import angle_label, rdt_points
+from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_COLUMNS = 600
+"""Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""
+
+_FRAMES_AT_ONCE = 64
+_DOTS = 20_000
+_STRONGEST = 20
+"""Strongest cells of a frame, of which a picture says how many were not detected."""
+
+_ANGLE_DB = 20.0  # below the peak: sidelobes of a line of eight are 13 dB or more below
+_TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
+
+
+class _Found(NamedTuple):
+    """Detections of all frames by range and by velocity, and the moving energy of each frame."""
+
+    by_range: NDArray[np.float64]
+    by_velocity: NDArray[np.float64]
+    moving: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plots:
+    """Pictures of the maps and clouds of a run; each method returns Matplotlib axes.
+
+    Without ``ax``, a method draws on a new figure, which a notebook shows; with it, on these axes
+    of the user's own figure. Colours suit the background of the figure, light or dark. Range,
+    velocity and angle are limited to where something is, as `fitted_limits` explains. Powers are in
+    units of the field, which each picture names: dBm, dBsm or dB relative to the maximum.
+
+    Parameters
+    ----------
+    maps : xarray.Dataset
+        Maps as ``maps.h5`` has them.
+    points : (point, 3) float64
+        RDT cloud: time [s], range [m], velocity [m/s].
+    spatial_cloud : SpatialCloud
+        Spatial cloud.
+    radar : Radar
+        Radar at its position in the scene.
+    summary : mapping
+        Contents of ``summary.json``, of which ``parameters`` are read.
+    new_figure : callable
+        Function that makes the figure, from its height [inch].
+    """
+
+    maps: xr.Dataset
+    points: NDArray[np.float64]
+    spatial_cloud: SpatialCloud
+    radar: Radar
+    summary: Mapping[str, Any]
+    new_figure: Callable[[float], Figure] = field(default=figure_for)
+
+    def range_doppler(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the range-Doppler map of one frame, and its detections in a second panel beside it.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time of the frame [s]; the frame in which what moves has most energy if left out.
+        ax : Axes, optional
+            Axes for the map alone.
+
+        Returns
+        -------
+        Axes
+            Axes of the map.
+        """
+        frame, when = self._frame(time_s)
+        map_, mask = self.maps["range_doppler"][frame], self.maps["detections"][frame].values > 0
+        unit = self._unit(range_m=self.radar.range_m[:, None])
+        level = unit.level(map_.values / self.radar.n_channels)
+        velocity, distance = self.maps["velocity"].values, self.radar.range_m
+        view = (
+            fitted_limits(mask.sum(axis=0), velocity, include=0.0),
+            fitted_limits(mask.sum(axis=1), distance),
+        )
+        if ax is None:
+            left, right = self.new_figure(4.6).subplots(1, 2, sharex=True, sharey=True)
+        else:
+            left, right = ax, None
+        image, colours = draw_view(left, level, velocity, distance, view, unit=unit)
+        left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
+        note = f"{colours} {self._masking_note(map_.values, mask)}"
+        title = self._title(f"Range-Doppler map, {when}", map_)
+        axes = [left]
+        if right is not None:
+            rows, columns = np.nonzero(mask)
+            colour = theme_of(right).detection
+            right.scatter(velocity[columns], distance[rows], s=3, color=colour, linewidths=0)
+            right.set_xlabel(_TWO_LINES)
+            dress(right, title=f"{len(rows)} detections")
+            title += "\nMap"
+            axes.append(right)
+        dress(left, title=title, note=note, grid=False, across=len(axes))
+        add_colour_bar(image, axes, unit.label("mean of channels"))
+        return left
+
+    def range_time(self, ax: Axes | None = None) -> Axes:
+        """Draw power over time and range.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            Axes of the map.
+        """
+        axes = self._axes(ax)
+        data = self.maps["range_time"]
+        power, times = thinned(data, "slow_time")
+        unit = self._unit(range_m=self.radar.range_m)
+        view = None, self._range_limits
+        level = unit.level(power).T
+        image, colours = draw_view(axes, level, times, self.radar.range_m, view, unit=unit)
+        axes.set(xlabel="Time [s]", ylabel="Range [m]")
+        dress(axes, title=self._title("Range over time", data), note=colours, grid=False)
+        add_colour_bar(image, [axes], unit.label("mean of channels"))
+        return axes
+
+    def spectrogram(self, ax: Axes | None = None) -> Axes:
+        """Draw power over time and velocity.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            Axes of the spectrogram.
+
+        Raises
+        ------
+        InputError
+            If the capture is shorter than a window of the spectrogram.
+        """
+        data = self.maps["spectrogram"]
+        if not len(data):
+            raise InputError(
+                "spectrogram: the capture is shorter than one window; simulate a longer one"
+            )
+        axes = self._axes(ax)
+        power, times = thinned(data, "spectrogram_time")
+        velocity = self.maps["spectrogram_velocity"].values
+        # One echo is spread over as many range bins.
+        power = power / noise_bandwidth_bins(
+            self._parameters.get("range_window", "hann"), self.radar.samples_per_chirp
+        )
+        unit = self._unit(strongest_m2=float(power.max()))
+        fitted = fitted_limits(above_floor(power).sum(axis=0), velocity, include=0.0)
+        seen = self._velocity_limits if self._found.by_velocity.any() else fitted
+        view = None, (min(fitted[0], seen[0]), max(fitted[1], seen[1]))
+        image, colours = draw_view(axes, unit.level(power).T, times, velocity, view, unit=unit)
+        axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL)
+        dress(axes, title=self._title("Spectrogram", data), note=colours, grid=False)
+        add_colour_bar(image, [axes], unit.label("one channel"))
+        return axes
+
+    def range_angle(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+        """Draw power over range and each measured angle of one frame, in a panel for each.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time of the frame, as for `range_doppler`.
+        ax : Axes, optional
+            Axes for the first angle alone.
+
+        Returns
+        -------
+        Axes
+            Axes of the first angle, azimuth where it is measured.
+
+        Raises
+        ------
+        InputError
+            If the radar measures no angle.
+        """
+        names = self._angles
+        if not names:
+            raise InputError(
+                f"range_angle: radar '{self.radar.name}' measures no angle; "
+                "it needs more receivers on a line"
+            )
+        if ax is not None or len(names) == 1:
+            return self._range_angle(names[0], time_s, ax)
+        upper, lower = self.new_figure(7.0).subplots(2, 1, sharey=True)
+        self._range_angle(names[0], time_s, upper)
+        self._range_angle(names[1], time_s, lower, heading=False)
+        return cast(Axes, upper)
+
+    def range_azimuth(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+        """Draw power over range and azimuth of one frame.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time of the frame, as for `range_doppler`.
+        ax : Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            Axes of the map.
+
+        Raises
+        ------
+        InputError
+            If the radar does not measure azimuth.
+        """
+        return self._range_angle("azimuth", time_s, ax)
+
+    def range_elevation(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+        """Draw power over range and elevation of one frame.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time of the frame, as for `range_doppler`.
+        ax : Axes, optional
+            Axes to draw on.
+
+        Returns
+        -------
+        Axes
+            Axes of the map.
+
+        Raises
+        ------
+        InputError
+            If the radar does not measure elevation.
+        """
+        return self._range_angle("elevation", time_s, ax)
+
+    def rdt(self, ax: Axes | None = None) -> Axes:
+        """Draw the range-Doppler-time cloud in three dimensions, coloured by velocity.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes to draw on, made with ``projection="3d"``.
+
+        Returns
+        -------
+        Axes
+            Axes of the cloud.
+
+        Raises
+        ------
+        InputError
+            If the axes have no z axis.
+        """
+        if ax is not None and ax.name != "3d":
+            raise InputError("rdt: ax has no z axis; make it with projection='3d'")
+        axes: Any = self._axes(ax, 4.7, projection="3d")
+        points = self.points
+        (low, high), (slow, fast) = self._range_limits, self._velocity_limits
+        shown = (points[:, 1] >= low) & (points[:, 1] <= high)
+        shown &= (points[:, 2] >= slow) & (points[:, 2] <= fast)
+        dots = rdt_points(axes, points[shown], "", fastest=max(abs(slow), abs(fast)), s=4)
+        axes.set(ylim=(low, high), zlim=(slow, fast), zlabel="Velocity [m/s]")
+        axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
+        title = f"Range-Doppler-time cloud, {_drawn(len(points), int(shown.sum()))}"
+        dress(axes, title=self._title(title, self.maps["range_doppler"]))
+        add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
+        return cast(Axes, axes)
+
+    def spatial(self, ax: Axes | None = None) -> Axes:
+        """Draw the strongest points of the spatial cloud from above and from the side.
+
+        Points are coloured by velocity. A linear array has only the view that it measures.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes for the first view alone, that from above where azimuth is measured.
+
+        Returns
+        -------
+        Axes
+            Axes of the first view.
+
+        Raises
+        ------
+        InputError
+            If the radar measures no angle.
+        """
+        if not self._angles:
+            raise InputError(
+                f"spatial: radar '{self.radar.name}' measures no angle; "
+                "it needs more receivers on a line"
+            )
+        ups = [1 if name == "azimuth" else 2 for name in self._angles]
+        cloud = self._strongest
+        every = math.ceil(max(len(cloud.points), 1) / _DOTS)
+        points, velocity = cloud.points[::every], cloud.velocity[::every]
+        slow, fast = self._velocity_limits
+        fastest = max(abs(slow), abs(fast))
+        colours: dict[str, Any] = {
+            "c": velocity,
+            "cmap": DIVERGING,
+            "vmin": -fastest,
+            "vmax": fastest,
+        }
+        heading = f"Spatial cloud, {_drawn(len(self.spatial_cloud.points), len(points))}"
+        note = "Drawn: the points at most 40 dB below the strongest"
+        note += f", each {every}th of them." if every > 1 else "."
+        place = self.radar.position_m
+        limits = [_of_values(points[:, axis], place[axis]) for axis in range(3)]
+        width = limits[0][1] - limits[0][0]
+        if ax is not None:
+            panels, ups = [ax], ups[:1]
+        else:
+            # As high as equal scales make the panels, with their titles, labels and notes.
+            high = [4.3 * (limits[up][1] - limits[up][0]) / width for up in ups]
+            figure = self.new_figure(sum(high) + 0.7 * len(ups) + 0.9)
+            panels = list(figure.subplots(len(ups), 1, squeeze=False, height_ratios=high)[:, 0])
+        for axes, up in zip(panels, ups, strict=True):
+            dots = axes.scatter(points[:, 0], points[:, up], s=2.5, linewidths=0, **colours)
+            own: dict[str, Any] = {"color": theme_of(axes).radar, "label": "radar"}
+            own |= {"markersize": 8, "clip_on": False}
+            axes.plot(place[0], place[up], "^", **own)
+            axes.set(xlabel=self._x_label, ylabel=f"{'xyz'[up]} [m]")
+            axes.set(xlim=limits[0], ylim=limits[up], aspect="equal")
+            axes.legend(loc="best")
+            title = "From above" if up == 1 else "From the side"
+            if axes is panels[0]:
+                title = f"{self._title(heading, self.maps['range_doppler'])}\n{title}"
+            dress(axes, title=title, note=note if axes is panels[-1] else "")
+        add_colour_bar(dots, panels, VELOCITY_LABEL)
+        return panels[0]
+
+    # -- what the pictures share -------------------------------------------------------------------
+
+    @cached_property
+    def _strongest(self) -> SpatialCloud:
+        """Points of the spatial cloud that are strong enough to be drawn."""
+        return self.spatial_cloud.strongest()
+
+    @cached_property
+    def _parameters(self) -> Mapping[str, Any]:
+        return cast(Mapping[str, Any], self.summary.get("parameters", {}))
+
+    @property
+    def _angles(self) -> list[str]:
+        return [name for name in ("azimuth", "elevation") if f"range_{name}" in self.maps]
+
+    @property
+    def _x_label(self) -> str:
+        if len(self._angles) == 2:
+            return "x [m]"
+        other = "elevation" if self._angles == ["azimuth"] else "azimuth"
+        return f"x [m], from the distance to the array's line\n({other} is not measured)"
+
+    def _axes(self, ax: Axes | None, height_in: float = 4.4, **options: Any) -> Axes:
+        return self.new_figure(height_in).add_subplot(**options) if ax is None else ax
+
+    def _unit(self, **options: Any) -> FieldUnit:
+        return field_unit(self.radar, spreading=self._parameters.get("spreading", True), **options)
+
+    def _title(self, what: str, data: xr.DataArray) -> str:
+        lines = [what, str(self.maps.attrs.get("title", ""))]
+        how = str(data.attrs.get("clutter_removal", "none"))
+        lines += [] if how == "none" else [f"static clutter removed: {how}"]
+        return "\n".join(line for line in lines if line)
+
+    @cached_property
+    def _found(self) -> _Found:
+        """Pass once over the frames, some at a time, so that memory does not grow."""
+        masks, maps = self.maps["detections"], self.maps["range_doppler"]
+        n_frames, n_range, n_velocity = maps.shape
+        by_range, by_velocity = np.zeros(n_range), np.zeros(n_velocity)
+        moving = np.zeros(n_frames)
+        # Not static clutter, which fills the main lobe of the window function at velocity 0.
+        still = 2.5 * self.radar.velocity_bin_mps
+        walks = np.abs(self.maps["velocity"].values) > still
+        for first in range(0, n_frames, _FRAMES_AT_ONCE):
+            some = slice(first, first + _FRAMES_AT_ONCE)
+            mask = masks[some].values > 0
+            by_range += mask.sum(axis=(0, 2))
+            by_velocity += mask.sum(axis=(0, 1))
+            power = np.where(mask, maps[some].values, 0)
+            moving[some] = power[..., walks].sum(axis=(1, 2))
+            if not moving[some].any():
+                moving[some] = 1e-30 * power.sum(axis=(1, 2))
+        return _Found(by_range, by_velocity, moving)
+
+    def _frame(self, time_s: float | None) -> tuple[int, str]:
+        """Index of the frame, and its words for a title."""
+        times = self.maps["time"].values
+        if time_s is None:
+            frame = int(self._found.moving.argmax())
+            return frame, f"window of most energy, {times[frame]:.2f} s"
+        if not times[0] - 0.5 <= time_s <= times[-1] + 0.5:
+            raise InputError(
+                f"time_s = {time_s}; the frames are from {times[0]:.3f} to {times[-1]:.3f} s"
+            )
+        frame = int(np.abs(times - time_s).argmin())
+        return frame, f"window at {times[frame]:.2f} s"
+
+    @cached_property
+    def _range_limits(self) -> tuple[float, float]:
+        counts = self._found.by_range
+        if not counts.any():
+            counts = above_floor(thinned(self.maps["range_time"], "slow_time")[0]).sum(axis=0)
+        return fitted_limits(counts, self.radar.range_m)
+
+    @cached_property
+    def _velocity_limits(self) -> tuple[float, float]:
+        counts, velocity = self._found.by_velocity, self.maps["velocity"].values
+        return fitted_limits(counts, velocity, include=0.0)
+
+    def _masking_note(self, power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
+        """Say how many of the strongest cells are not detected, if some are."""
+        strongest = np.argsort(power, axis=None)[-_STRONGEST:]
+        missed = int(np.count_nonzero(~mask.ravel()[strongest]))
+        if not missed or not mask.any():
+            return ""
+        return (
+            f"{missed} of the {_STRONGEST} strongest cells are not detected: strong cells about "
+            "them raise the threshold there (self-masking of CFAR)."
+        )
+
+    def _range_angle(
+        self, name: str, time_s: float | None, ax: Axes | None, heading: bool = True
+    ) -> Axes:
+        if name not in self._angles:
+            raise InputError(
+                f"range_{name}: radar '{self.radar.name}' does not measure {name}; "
+                f"it measures {' and '.join(measured_angles(self.radar)) or 'no angle'}"
+            )
+        frame, when = self._frame(time_s)
+        axes = self._axes(ax)
+        data, angles = self.maps[f"range_{name}"][frame], np.degrees(self.maps[name].values)
+        # One echo is spread over as many velocities.
+        power = data.values / noise_bandwidth_bins(
+            self._parameters.get("doppler_window", "hann"), self.radar.cycles_per_frame
+        )
+        unit = self._unit(range_m=self.radar.range_m[:, None])
+        level = unit.level(power)
+        strong = level > level.max() - _ANGLE_DB
+        view = (
+            fitted_limits(strong.sum(axis=0), angles),
+            fitted_limits(strong.sum(axis=1), self.radar.range_m),
+        )
+        image, colours = draw_view(
+            axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=30
+        )
+        axes.set(xlabel=angle_label(name, self.radar), ylabel="Range [m]")
+        what = f"Range-{name}"
+        title = self._title(f"{what}, {when}", data) if heading else what
+        dress(axes, title=title, note=colours, grid=False)
+        add_colour_bar(image, [axes], unit.label("detected cells"))
+        return axes
+
+
+def _drawn(there: int, shown: int) -> str:
+    return f"{there} points" + ("" if there == shown else f" ({shown} of them drawn)")
+
+
+def _of_values(values: NDArray[np.float64], own: float) -> tuple[float, float]:
+    """Limits that show values [m] but a few outliers, and the radar at its ``own`` place."""
+    if not len(values):
+        return own - 1, own + 1
+    edges = np.linspace(min(values.min(), own) - 0.05, max(values.max(), own) + 0.05, 401)
+    counts = np.histogram(values, edges)[0]
+    return fitted_limits(counts, (edges[1:] + edges[:-1]) / 2, include=own)
+
+
+def thinned(data: xr.DataArray, axis: str) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """Return a map (time, ...) and its times [s], averaged to a few hundred steps.
+
+    Parameters
+    ----------
+    data : xarray.DataArray
+        Map whose first dimension is that of time.
+    axis : str
+        Name of this dimension.
+
+    Returns
+    -------
+    power : (step, ...) float
+        Mean of the map in each step.
+    times : (step,) float64
+        Middle of each step [s].
+    """
+    every = max(1, math.ceil(len(data) / _COLUMNS))
+    times = data[axis].values
+    steps = [slice(first, first + every) for first in range(0, len(data), every)]
+    power = np.stack([data[step].values.mean(axis=0) for step in steps])
+    return power, np.array([times[step].mean() for step in steps])
