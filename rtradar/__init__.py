@@ -17,7 +17,15 @@ if TYPE_CHECKING:
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
     from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
-    from rtradar.pipeline import Comparison, Result, Simulation, compare, run, simulate
+    from rtradar.pipeline import (
+        Comparison,
+        Result,
+        Simulation,
+        compare,
+        process_samples,
+        run,
+        simulate,
+    )
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
     from rtradar.scatter import register_model, scattering_length
@@ -37,7 +45,7 @@ _NAMES = {
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
     "motion": "Motion load_motion register_reader synthetic_motion",
-    "pipeline": "Comparison Result Simulation compare run simulate",
+    "pipeline": "Comparison Result Simulation compare process_samples run simulate",
     "process": "register_detector",
     "radar": "Radar register_radar",
     "scatter": "register_model scattering_length",
@@ -69,6 +77,7 @@ __all__ = [
     "exchange",
     "load_motion",
     "process",
+    "process_samples",
     "rcs",
     "register_detector",
     "register_model",

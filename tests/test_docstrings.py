@@ -101,7 +101,8 @@ def options_of(thing: Any) -> set[str]:
     """Names of options that a function takes by ``**options: Unpack[...]``."""
     if not inspect.isfunction(thing) or "Unpack" not in str(thing.__annotations__.get("options")):
         return set()
-    (options,) = get_args(get_type_hints(thing)["options"])
+    # The other annotations may name types that are only imported for checkers of types.
+    (options,) = get_args(eval(thing.__annotations__["options"], thing.__globals__))
     return set(get_type_hints(options))
 
 

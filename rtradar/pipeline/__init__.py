@@ -2,6 +2,7 @@
 
 from rtradar.pipeline.compare import Comparison, compare
 from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
+from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import clouds_of, run
 from rtradar.pipeline.simulation import Simulation, simulate
@@ -13,6 +14,7 @@ __all__ = [
     "Simulation",
     "clouds_of",
     "compare",
+    "process_samples",
     "run",
     "simulate",
 ]

@@ -70,8 +70,9 @@ class Result:
 
     def _lines(self) -> Iterator[str]:
         summary, parameters = self.summary, self.summary["parameters"]
-        named = (f"{name} {parameters[name]}" for name in ("fidelity", "scene"))
-        yield f"Result of {parameters['motion']}, radar {self.radar.name}, {', '.join(named)}"
+        named = [f"{key} {parameters[key]}" for key in ("fidelity", "scene") if key in parameters]
+        title = parameters.get("motion", "IF samples")
+        yield f"Result of {', '.join([title, f'radar {self.radar.name}', *named])}"
         yield (
             f"  {summary['capture_s']:.2f} s of radar in {summary['windows']} frames, "
             f"{summary['detections']} detections"

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import time
-import warnings
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
-from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.map_store import open_maps
@@ -22,7 +20,7 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.timing import forget_peak_memory
-from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_array
+from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_array, write_clouds
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
@@ -125,9 +123,7 @@ def run_into(
         clouds = _stream(capture, folder / "maps.h5", kept)
         points = clouds.rdt.points
         with capture.stages.time("write"):
-            save_cloud_npz(folder / "cloud_rdt.npz", points)
-            save_ply(folder / "cloud_rdt.ply", points)
-            save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
+            write_clouds(folder, clouds)
         with capture.stages.time("pictures"):
             pictures = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
@@ -181,10 +177,7 @@ def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds
         received = ReceivedFrame(capture.radar, int(starts[len(starts) // 2]))
     with RunWriter(maps, capture.processing, capture.title, received) as writer:
         capture.stream(writer, kept)
-        clouds = writer.finish()
-    if not len(clouds.rdt.points):
-        warnings.warn("nothing was detected: the clouds are empty", ValidityWarning, stacklevel=4)
-    return clouds
+        return writer.finish()
 
 
 def clouds_of(

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.processing import Clouds
+from rtradar.pipeline.processing import Clouds, Processing
 from rtradar.pipeline.timing import peak_memory_mb
+from rtradar.radar import Radar
 from rtradar.scatter import account_of
+from rtradar.settings import ProcessingOptions, RunSettings
 
 _PACKAGES = (
     "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
@@ -23,12 +25,18 @@ _PACKAGES = (
 
 def cost(capture: Capture, started_s: float) -> dict[str, Any]:
     """Return time and memory since the run started, at ``started_s`` of `time.perf_counter`."""
-    wall_s = time.perf_counter() - started_s - capture.warmup_s
-    capture_s = capture.n_chirps * capture.radar.chirp_interval_s
+    return _cost(capture.processing, capture.n_chirps, started_s, capture.warmup_s)
+
+
+def _cost(
+    processing: Processing, n_chirps: int, started_s: float, warmup_s: float = 0.0
+) -> dict[str, Any]:
+    wall_s = time.perf_counter() - started_s - warmup_s
+    capture_s = n_chirps * processing.radar.chirp_interval_s
     return {
-        "stages": {name: round(spent, 4) for name, spent in capture.stages.seconds.items()},
+        "stages": {name: round(spent, 4) for name, spent in processing.stages.seconds.items()},
         "wall_s": round(wall_s, 4),
-        "warmup_s": round(capture.warmup_s, 4),
+        "warmup_s": round(warmup_s, 4),
         "capture_s": capture_s,
         "real_time_factor": round(wall_s / capture_s, 4),
         "peak_memory_mb": round(peak_memory_mb(), 1),
@@ -54,13 +62,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
         **cost(capture, started_s),
-        "windows": len(capture.frame_starts),
-        "chirps": capture.n_chirps,
-        "detections": clouds.rdt.n_voxels,
-        "rdt_triangles": clouds.rdt.n_triangles,
-        "rdt_points": len(clouds.rdt.points),
-        "xyz_points": len(clouds.spatial.points),
-        "xyz_points_found": clouds.n_spatial,
+        **_found(radar, capture.n_chirps, clouds),
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
         "noise_power_m2": capture.noise.power,
@@ -79,6 +81,43 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
     if capture.inside:
         summary["room"] = capture.inside.summary
     return summary
+
+
+def summary_of_samples(
+    processing: Processing,
+    settings: RunSettings,
+    n_chirps: int,
+    clouds: Clouds,
+    started_s: float,
+) -> dict[str, Any]:
+    """Return the summary of so many chirps of IF samples; their processing began at ``started_s``.
+
+    It has no entries of motion, scene, echoes and noise, which are not known.
+    """
+    radar = processing.radar
+    names = set(ProcessingOptions.__annotations__)
+    of_processing = {key: value for key, value in settings.parameters().items() if key in names}
+    capture_s = n_chirps * radar.chirp_interval_s
+    return {
+        "parameters": of_processing | {"duration_s": capture_s, "radar": dataclasses.asdict(radar)},
+        "seed": settings.seed,
+        "versions": {"python": platform.python_version(), **_versions()},
+        **_cost(processing, n_chirps, started_s),
+        **_found(radar, n_chirps, clouds),
+        "limits": [],
+    }
+
+
+def _found(radar: Radar, n_chirps: int, clouds: Clouds) -> dict[str, Any]:
+    return {
+        "windows": len(radar.window_starts(n_chirps)),
+        "chirps": n_chirps,
+        "detections": clouds.rdt.n_voxels,
+        "rdt_triangles": clouds.rdt.n_triangles,
+        "rdt_points": len(clouds.rdt.points),
+        "xyz_points": len(clouds.spatial.points),
+        "xyz_points_found": clouds.n_spatial,
+    }
 
 
 def plain(value: object) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -9,6 +10,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
+from rtradar.errors import ValidityWarning
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.map_store import MapStore
 from rtradar.pipeline.processing import (
@@ -142,7 +145,18 @@ class RunWriter:
         power, times = self._range_time.finish()
         self._store.extend("slow_time", times, range_time=power)
         self._store.close()
-        return self._clouds.finish()
+        clouds = self._clouds.finish()
+        if not len(clouds.rdt.points):
+            text = "nothing was detected: the clouds are empty"
+            warnings.warn(text, ValidityWarning, stacklevel=5)
+        return clouds
+
+
+def write_clouds(folder: Path, clouds: Clouds) -> None:
+    """Write the files of both clouds."""
+    save_cloud_npz(folder / "cloud_rdt.npz", clouds.rdt.points)
+    save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
+    save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
 
 
 class ReceivedFrame:

@@ -1,0 +1,236 @@
+"""`process_samples`: maps and clouds of anybody's IF samples, simulated or measured."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from rtradar.errors import InputError
+from rtradar.pipeline.map_store import open_maps
+from rtradar.pipeline.memory import IN_A_FOLDER, bytes_of_maps, refuse_large
+from rtradar.pipeline.processing import Clouds, Processing, block_chirps
+from rtradar.pipeline.result import Result
+from rtradar.pipeline.summary import plain, summary_of_samples
+from rtradar.pipeline.timing import forget_peak_memory
+from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, write_clouds
+from rtradar.radar import Radar
+from rtradar.settings import ProcessingOptions, RunSettings
+from rtradar.signal.multiplexing import chirps_together
+from rtradar.system.output_folder import atomic_folder
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    Block: TypeAlias = NDArray[np.complexfloating[Any, Any]] | xr.DataArray
+
+_NAME = "IF samples"
+_DIMENSIONS = ("chirp", "rx", "sample"), ("cycle", "tx", "rx", "sample")
+
+
+def process_samples(
+    samples: Block | Iterable[Block],
+    radar: Radar,
+    out: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    **options: Unpack[ProcessingOptions],
+) -> Result:
+    """Process IF samples, simulated or measured, as `run` does: maps, detections, angles, clouds.
+
+    Parameters
+    ----------
+    samples : (chirp, rx, sample) complex, or iterable of such blocks
+        IF samples from the first Tx of a cycle on, as an array of NumPy, or as a DataArray whose
+        dimensions have these names, in any order. Frames of whole cycles, (cycle, tx, rx, sample),
+        will do as well, and so will blocks of any length, one after another. Precision is single
+        inside. Chirps after the last whole cycle are left out. Under Doppler division a chirp is a
+        whole cycle. Powers of the maps are in the square of the samples' unit, which is m where
+        pictures are to show cross-sections.
+    radar : Radar
+        Radar that has received the samples, at its position.
+    out : path, optional
+        Folder for maps, clouds, pictures, report and summary; as for `run`.
+    overwrite : bool
+        Whether files of others in ``out`` are replaced; as for `run`.
+    **options
+        Settings of the processing, such as ``pfa`` or ``clutter_removal``: fields of
+        `rtradar.RunSettings`.
+
+    Returns
+    -------
+    Result
+        It has no link budget, and no view of a body.
+
+    Raises
+    ------
+    InputError
+        If a value is invalid, the samples are of another shape or type than the radar gives, one is
+        not finite, they hold no whole frame, or the maps are too large for memory and ``out`` is
+        left out; nothing is written then.
+    """
+    settings = RunSettings(**options)
+    forget_peak_memory()
+    started = time.perf_counter()
+    blocks = _Blocks(samples, radar, in_memory=out is None)
+    processing = Processing.of(radar, settings)
+    folder_of_files = (
+        nullcontext() if out is None else atomic_folder(Path(out), RUN_FILES, overwrite=overwrite)
+    )
+    with folder_of_files as folder:
+        file: Path | BinaryIO = BytesIO() if folder is None else folder / "maps.h5"
+        clouds = _stream(blocks, processing, settings, file)
+        maps = None
+        with processing.stages.time("write"):
+            if folder is not None:
+                write_clouds(folder, clouds)
+            else:
+                with open_maps(file) as maps:
+                    maps.load()
+        summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
+        if folder is not None:
+            summary["files"] = RUN_FILES.list_of(folder)
+        text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
+        if folder is not None:
+            (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    return Result(
+        points=clouds.rdt.points,
+        spatial=clouds.spatial,
+        summary=json.loads(text),
+        radar=radar,
+        out=None if out is None else Path(out),
+        _in_memory=maps,
+    )
+
+
+def _stream(
+    blocks: _Blocks, processing: Processing, settings: RunSettings, file: Path | BinaryIO
+) -> Clouds:
+    """Stream samples into a file of maps; return their clouds."""
+    radar, received = processing.radar, None
+    if settings.clutter_removal != "none":
+        starts = radar.window_starts(blocks.known_chirps or radar.chirps_per_frame)
+        received = ReceivedFrame(radar, int(starts[len(starts) // 2]))
+    together = chirps_together(radar)
+    with RunWriter(file, processing, f"{_NAME}, {radar.name}", received) as writer:
+        # The same pieces as those of a run, so that the maps are the same to the last bit.
+        at_once = min(writer.max_chirps, block_chirps(radar))
+        range_spectra = processing.range_spectra(at_once)
+        for first, block in tqdm(blocks, desc=_NAME, unit="block", disable=None):
+            for begin in range(0, len(block) * together, at_once):
+                part = block[begin // together : (begin + at_once) // together]
+                writer.push(range_spectra(part, first + begin), first + begin)
+        return writer.finish()
+
+
+class _Blocks:
+    """Blocks of `block_chirps` of checked samples, and the number of the first chirp of each.
+
+    ``known_chirps`` is how many there are in all, None where that is not known, and ``n_chirps``
+    how many there were so far.
+    """
+
+    def __init__(self, samples: Block | Iterable[Block], radar: Radar, *, in_memory: bool) -> None:
+        self._radar, self._in_memory = radar, in_memory
+        self._cycle_rows = radar.n_tx // chirps_together(radar)
+        self.n_chirps, self.known_chirps = 0, None
+        if hasattr(samples, "dtype"):
+            rows = _rows(samples, radar)
+            self.known_chirps = len(rows) // self._cycle_rows * radar.n_tx
+            self._check_length(self.known_chirps)
+            self._pieces: Iterator[NDArray[Any]] = iter([rows])
+        elif isinstance(samples, Iterable):
+            self._pieces = (_rows(block, radar) for block in samples)
+        else:
+            raise InputError(
+                f"samples are of type {type(samples).__name__}; give an array (chirp, rx, sample) "
+                "of complex numbers, or blocks of them"
+            )
+
+    def __iter__(self) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+        most = block_chirps(self._radar) // chirps_together(self._radar)
+        held: list[NDArray[np.complex64]] = []
+        missing = most
+        for piece in self._pieces:
+            begin = 0
+            while begin < len(piece):
+                part = _single(piece[begin : begin + missing])
+                held.append(part)
+                begin, missing = begin + len(part), missing - len(part)
+                if missing == 0:
+                    yield self._joined(held)
+                    held, missing = [], most
+        if most - missing >= self._cycle_rows:
+            yield self._joined(held)
+        self._check_length(self.n_chirps)
+
+    def _joined(self, held: list[NDArray[np.complex64]]) -> tuple[int, NDArray[np.complex64]]:
+        block = held[0] if len(held) == 1 else np.concatenate(held)
+        block = block[: len(block) // self._cycle_rows * self._cycle_rows]
+        first, n_chirps = self.n_chirps, len(block) * chirps_together(self._radar)
+        if not np.isfinite(block).all():
+            where = first + int(np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))[0])
+            raise InputError(
+                f"IF samples: chirp {where} holds NaN, infinity, or more than single precision "
+                "does; every sample must be finite"
+            )
+        self.n_chirps += n_chirps
+        self._check_size(self.n_chirps)
+        return first, block
+
+    def _check_length(self, n_chirps: int) -> None:
+        radar = self._radar
+        if not len(radar.window_starts(n_chirps)):
+            raise InputError(
+                f"IF samples: {n_chirps} chirps in whole cycles hold no frame of radar "
+                f"'{radar.name}', which has {radar.chirps_per_frame}; give a longer capture, or a "
+                "radar with a shorter frame_duration_s"
+            )
+        self._check_size(n_chirps)
+
+    def _check_size(self, n_chirps: int) -> None:
+        if self._in_memory:
+            what = f"maps of {n_chirps} chirps of radar '{self._radar.name}'"
+            refuse_large(what, bytes_of_maps(self._radar, n_chirps), IN_A_FOLDER)
+
+
+def _rows(samples: Any, radar: Radar) -> NDArray[Any]:
+    """Return samples as rows (chirp, rx, sample), one for each cycle under DDM."""
+    ddm = radar.multiplexing == "ddm"
+    allowed = _DIMENSIONS[:1] if ddm else _DIMENSIONS
+    if hasattr(samples, "dims"):
+        order = next((names for names in allowed if set(names) == set(samples.dims)), None)
+        if order is None:
+            given, texts = samples.dims, (f"({', '.join(names)})" for names in allowed)
+            raise InputError(
+                f"IF samples: dimensions are ({', '.join(map(str, given))}); "
+                f"allowed: {' or '.join(texts)}"
+            )
+        samples = samples.transpose(*order)
+    values = np.asarray(samples)
+    if values.dtype.kind != "c":
+        raise InputError(f"IF samples are of type {values.dtype}; they must be complex numbers")
+    end = radar.n_rx, radar.samples_per_chirp
+    if values.ndim == 4 and not ddm and values.shape[1:] == (radar.n_tx, *end):
+        return values.reshape(-1, *end)
+    if values.ndim != 3 or values.shape[1:] != end:
+        whole = f" or (cycle, tx, rx, sample) = (any, {radar.n_tx}, {end[0]}, {end[1]})"
+        raise InputError(
+            f"IF samples have shape {values.shape}; radar '{radar.name}' needs "
+            f"(chirp, rx, sample) = (any, {end[0]}, {end[1]}){'' if ddm else whole}"
+        )
+    return values
+
+
+def _single(values: NDArray[Any]) -> NDArray[np.complex64]:
+    """Return a copy in single precision, for the caller may fill the same array again."""
+    with np.errstate(over="ignore"):
+        return np.array(values, dtype=np.complex64)

@@ -1,0 +1,134 @@
+"""Anybody's IF samples give what a run gives of the same samples, to the bit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import rtradar as rt
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.pipeline import memory
+from rtradar.settings import SimulationOptions
+
+RADAR = rt.Radar(
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=128,
+    frame_duration_s=0.05,
+)
+MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
+OPTIONS: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "seed": 3}
+
+
+@pytest.fixture(scope="module")
+def samples() -> xr.DataArray:
+    return rt.simulate(MOTION, RADAR, **OPTIONS).samples
+
+
+def assert_same(found: rt.Result, expected: rt.Result) -> None:
+    ours, other = (one.maps.drop_attrs(deep=False) for one in (found, expected))
+    xr.testing.assert_identical(ours, other)
+    np.testing.assert_array_equal(found.points, expected.points)
+    np.testing.assert_array_equal(found.spatial.points, expected.spatial.points)
+
+
+@pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
+def test_samples_of_a_simulation_give_the_maps_of_a_run(multiplexing: str) -> None:
+    radar = dataclasses.replace(RADAR, multiplexing=multiplexing)
+    found = rt.simulate(MOTION, radar, **OPTIONS).samples
+    processed = rt.process_samples(found, radar, clutter_removal="mean", seed=3)
+    ran = rt.run(MOTION, radar, clutter_removal="mean", **OPTIONS)
+    assert_same(processed, ran)
+    known = processed.summary.keys() & ran.summary.keys()
+    assert {"windows", "chirps", "detections", "capture_s"} <= known
+    for name in ("windows", "chirps", "detections", "capture_s"):
+        assert processed.summary[name] == ran.summary[name]
+    assert repr(processed).startswith("Result of IF samples, radar small\n")
+
+
+def reused(samples: xr.DataArray) -> Iterator[np.ndarray[Any, Any]]:
+    """Blocks of uneven length, each in the memory of the one before."""
+    buffer = np.empty((47, 4, 128), np.complex64)
+    for first in range(0, len(samples), 47):
+        part = samples.values[first : first + 47]
+        buffer[: len(part)] = part
+        yield buffer[: len(part)]
+
+
+def test_other_shapes_and_blocks_give_the_same(samples: xr.DataArray) -> None:
+    expected = rt.process_samples(samples, RADAR)
+    values = samples.values
+    cycles = xr.DataArray(values.reshape(-1, 2, 4, 128), dims=("cycle", "tx", "rx", "sample"))
+    for same in (
+        values.astype(np.complex128),
+        values.reshape(-1, 2, 4, 128),
+        cycles.transpose("sample", "rx", "cycle", "tx"),
+        np.concatenate([values, values[:1]]),  # half a cycle
+        reused(samples),
+        rt.simulate(MOTION, RADAR, **OPTIONS).blocks(),
+    ):
+        assert_same(rt.process_samples(same, RADAR), expected)
+
+
+def test_a_folder_holds_the_maps_and_clouds(samples: xr.DataArray, tmp_path: Path) -> None:
+    written = rt.process_samples(samples, RADAR, tmp_path / "out")
+    assert_same(written, rt.process_samples(samples, RADAR))
+    assert set(written.summary["files"]) >= {"maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"}
+    again = rt.process_samples(samples, RADAR, out=tmp_path / "out", pfa=1e-4)
+    assert again.summary["parameters"]["pfa"] == 1e-4
+
+
+def broken(samples: xr.DataArray, value: complex) -> np.ndarray[Any, Any]:
+    values = samples.values.astype(np.complex128)
+    values[301, 1, 5] = value
+    return values
+
+
+@pytest.mark.parametrize(
+    ("wrong", "says"),
+    [
+        (lambda x: x[:, :3], r"shape \(920, 3, 128\); radar 'small' needs .* 4, 128\) or \(cycle"),
+        (lambda x: x.values.real, "are of type float32; they must be complex"),
+        (lambda x: x.rename(chirp="pulse"), r"dimensions are \(pulse, rx, sample\); allowed: \(ch"),
+        (lambda x: x[:100], r"100 chirps in whole cycles hold no frame of radar 'small', which"),
+        (lambda x: iter([x[:100]]), "100 chirps in whole cycles hold no frame"),
+        (lambda x: iter([]), "0 chirps in whole cycles"),
+        (lambda x: broken(x, np.nan), "chirp 301 holds NaN"),
+        (lambda x: broken(x, 1e300), "chirp 301 holds NaN, infinity, or more than single"),
+        (lambda x: 5, "samples are of type int; give an array"),
+    ],
+)
+def test_samples_that_are_none_of_the_radar_are_refused_and_leave_nothing(
+    samples: xr.DataArray, wrong: Any, says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=says) as caught:
+        rt.process_samples(wrong(samples), RADAR, out=tmp_path / "out")
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_maps_too_large_for_memory_are_refused(
+    samples: xr.DataArray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e6)
+    for given in (samples, iter([samples])):
+        with pytest.raises(InputError, match=r"maps of .* chirps of radar 'small' would take"):
+            rt.process_samples(given, RADAR)
+
+
+def test_noise_alone_gives_empty_clouds_and_says_so() -> None:
+    noise = np.random.default_rng(0).standard_normal((600, 4, 256)).view(np.complex128)
+    with pytest.warns(ValidityWarning, match="nothing was detected"):
+        result = rt.process_samples(noise, RADAR, pfa=1e-12)
+    assert result.points.shape == (0, 3)
+    assert len(repr(result).splitlines()) <= 10
