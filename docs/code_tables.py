@@ -101,12 +101,15 @@ DATA_SET_KEYS = {
         ),
     },
     "[[recordings]]": {
-        "file": ("the recording, in `folder` or below", "must be given"),
-        "skeleton": ("the `.asf` of an `.amc`", ""),
-        **dict.fromkeys(
-            ("label", "subject", "licence"),
-            ("text that goes into the provenance", "must be given"),
+        "file": (
+            "the recording, in `folder` or below, or a pattern of several (`*`, `?`, `**`, "
+            "`{label}`, `{subject}`)",
+            "must be given",
         ),
+        "skeleton": ("the `.asf` of an `.amc`; may hold `{label}` and `{subject}`, too", ""),
+        "label": ("activity; must be given unless `file` has `{label}`", "as in `file`"),
+        "subject": ("who moves", "as in `file`, or `unknown`"),
+        "licence": ("terms of the recording", "`unknown`"),
         **dict.fromkeys(
             ("start_s", "duration_s", "hop_s", "end_s"),
             ("in place of that of `[windows]`", "that of `[windows]`"),

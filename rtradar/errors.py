@@ -1,7 +1,11 @@
 """Errors and warnings: bad input, and machines that cannot do what was asked.
 
-The message of each error is one line, which the command line prints.
+The message of each error is one line, which the command line prints; only `InputErrors` has more.
 """
+
+from __future__ import annotations
+
+from collections.abc import Sequence
 
 
 class InputError(ValueError):
@@ -10,6 +14,23 @@ class InputError(ValueError):
     The message says what is wrong, where, what is allowed, and how to mend it. The command line
     exits with status 2.
     """
+
+
+class InputErrors(InputError):  # noqa: N818 - several of them
+    """Several things that the user gave cannot be used.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        Message about each of them, one line each as that of `InputError`.
+    """
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = tuple(lines)
+
+    def __reduce__(self) -> tuple[type[InputErrors], tuple[tuple[str, ...]]]:
+        return InputErrors, (self.lines,)
 
 
 class BackendError(RuntimeError):

@@ -75,7 +75,8 @@ def allowed(read, text: str, path: Path) -> set[str]:
     path.write_text(f"{text}no_such_key = 1\n")
     with pytest.raises(InputError, match="unknown key 'no_such_key'; allowed: ") as caught:
         read(path)
-    return set(str(caught.value).rpartition("allowed: ")[2].split(", "))
+    line = next(line for line in str(caught.value).splitlines() if "no_such_key" in line)
+    return set(line.rpartition("allowed: ")[2].split(", "))
 
 
 def rows(name: str) -> dict[str, set[str]]:

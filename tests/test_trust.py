@@ -20,7 +20,7 @@ import rtradar
 from rtradar.campaign.spec import read_spec
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.dataset_store import write_index, write_sample
-from rtradar.errors import InputError
+from rtradar.errors import InputError, InputErrors
 from rtradar.motion import load_motion
 from rtradar.radar import Radar
 from rtradar.scene import Scene
@@ -355,13 +355,14 @@ def bent(draw: st.DrawFn, text: str) -> str:
 
 
 def one_line_or_well(read: Any, *paths: Path) -> None:
+    said: tuple[str, ...] = ("it was read",)
     try:
         read(*paths)
+    except InputErrors as error:
+        said = error.lines
     except InputError as error:
-        said = str(error)
-    else:
-        said = "it was read"
-    assert len(said.splitlines()) == 1
+        said = (str(error),)
+    assert all(len(line.splitlines()) == 1 for line in said)
 
 
 @settings(

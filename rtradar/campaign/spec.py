@@ -10,13 +10,15 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from rtradar.campaign.kept import KEPT, sizes
-from rtradar.errors import InputError
+from rtradar.campaign.patterns import FIELD, file_in, matching_files
+from rtradar.clouds.dataset_store import UNKNOWN
+from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions, measured_angles
 from rtradar.radar import Radar
@@ -25,9 +27,9 @@ from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.system.checks import (
+    Complaints,
     Table,
     brief,
-    check_keys,
     check_number,
     check_text,
     check_vector,
@@ -35,6 +37,7 @@ from rtradar.system.checks import (
     read_toml,
     table_at,
     tables_at,
+    wrong_keys,
 )
 from rtradar.system.seeds import check_seed
 
@@ -82,7 +85,7 @@ EACH: Mapping[str, list[Any]] = {
 """Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
-_RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *INTERVAL_KEYS)
+_RECORDING = ("file",), ("label", "subject", "licence", "skeleton", *INTERVAL_KEYS)
 _MOST = 1_000_000
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 _SLACK_S = 1e-6  # by which rounding may shorten a recording
@@ -214,56 +217,61 @@ def read_spec(path: Path) -> Spec:
     """Read the specification of a data set from a TOML file.
 
     InputError, in one line with the file and the key, if the file cannot be read, a key is unknown,
-    a value is invalid, or a file that it names is missing.
+    a value is invalid, or a file that it names is missing; InputErrors, a line for each, if several
+    things are wrong.
     """
     table = read_toml(path, "data set", "give a TOML file")
     try:
         # The path is absolute, because other processes read the meshes of scenes.
         return _spec(table, path.resolve().parent)
+    except InputErrors as errors:
+        raise InputErrors([f"data set file '{path}': {line}" for line in errors.lines]) from None
     except InputError as error:
         raise InputError(f"data set file '{path}': {error}") from None
 
 
 def _spec(table: Table, folder: Path) -> Spec:
-    check_keys("", table, (), _TOP)
-    drawn_table, each = table_at("drawn", table), table_at("each", table)
-    check_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
-    check_keys("[each] ", each, (), tuple(EACH))
-    for key in drawn_table:
-        if key in each:
-            raise InputError(f"{key} is under [each] and under [drawn]; give it once")
-    interval_table = table_at("windows", table)
-    check_keys("[windows] ", interval_table, (), INTERVAL_KEYS)
-    intervals = Intervals.read("[windows]", interval_table)
-    actors = _actors(table)
-    beside = _folder(table, folder)
-    recordings = tuple(
-        _recorded(where, one, interval_table, beside)
-        for where, one in tables_at("recordings", table)
+    wrong = Complaints()
+    wrong.lines += wrong_keys("", table, (), _TOP)
+    drawn_table, each, windows = (
+        wrong.of(table_at, key, table) or {} for key in ("drawn", "each", "windows")
     )
-    if not actors and not recordings:
-        raise InputError("there is neither [[synthetic]] nor [[recordings]]; give one of them")
-    if actors and intervals.needed_s is None:
-        raise InputError(
+    wrong.lines += wrong_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
+    wrong.lines += wrong_keys("[each] ", each, (), tuple(EACH))
+    wrong.lines += wrong_keys("[windows] ", windows, (), INTERVAL_KEYS)
+    wrong.lines += [
+        f"{key} is under [each] and under [drawn]; give it once"
+        for key in drawn_table
+        if key in each
+    ]
+    intervals = wrong.of(Intervals.read, "[windows]", windows)
+    actors = _actors(table, wrong)
+    recordings = _recordings(table, windows if intervals else {}, folder, wrong)
+    if not table.get("synthetic") and not table.get("recordings"):
+        wrong.lines.append("there is neither [[synthetic]] nor [[recordings]]; give one of them")
+    if table.get("synthetic") and intervals and intervals.needed_s is None:
+        wrong.lines.append(
             "[windows] duration_s is missing; synthetic actors have no end of their own"
         )
-    lists = {key: _several(each, key, usual) for key, usual in EACH.items()}
+    lists = _lists(each, folder, wrong)
+    drawn = {
+        key: wrong.of(_range, key, drawn_table.get(key, usual), least, most) or (0.0, 0.0)
+        for key, (usual, least, most) in DRAWN.items()
+    }
+    keep = wrong.of(_keep, table) or ()
+    run = wrong.of(_run_settings, table)
+    wrong.check()
+    assert intervals is not None  # for else there are complaints
+    assert run is not None
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.count(intervals.needed_s)
     count += sum(recorded.intervals.count() for recorded in recordings)
     check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
-    drawn = {
-        key: _range(key, drawn_table.get(key, usual), least, most)
-        for key, (usual, least, most) in DRAWN.items()
-    }
-    run = _run_settings(table)
-    combinations = _combinations(lists, folder)
-    keep = _keep(table)
+    combinations = _combinations(lists)
     if keep:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
-        check_equal_sizes(
-            keep, lengths | ({intervals.duration_s} if actors else set()), combinations
-        )
+        lengths |= {intervals.duration_s} if actors else set()
+        check_equal_sizes(keep, lengths, combinations)
     return Spec(run, intervals, combinations, drawn, actors, recordings, keep)
 
 
@@ -302,26 +310,34 @@ def check_equal_sizes(
 
 
 def _run_settings(table: Table) -> RunSettings:
-    given = {key: table[key] for key in RUN_KEYS if key in table}
+    wrong, given = Complaints(), {key: table[key] for key in RUN_KEYS if key in table}
     for key, allowed in _NAMED.items():
         value = given.get(key)
         if key in given and not (isinstance(value, str) and value in allowed):
-            raise InputError(f"{key} = {brief(value)}; allowed: {', '.join(allowed)}")
+            wrong.lines.append(f"{key} = {brief(value)}; allowed: {', '.join(allowed)}")
     for key in _SWITCHES:
         if not isinstance(given.get(key, True), bool):
-            raise InputError(f"{key} = {brief(given[key])}; allowed: true, false")
+            wrong.lines.append(f"{key} = {brief(given[key])}; allowed: true, false")
     for key in _WINDOWS:
         value = given.get(key, "")
         if not isinstance(value[0] if isinstance(value, list) and value else value, str):
-            raise InputError(
+            wrong.lines.append(
                 f"{key} = {brief(value)}; it must be a name, or a list of a name and a number"
             )
+            del given[key]
     if "pfa" in given:
-        given["pfa"] = check_number("data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
+        given["pfa"] = wrong.of(check_number, "data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
     if "order" in given:
-        _whole("", "order", given["order"], int(RUN_LIMITS["order"][1]))
-    run = RunSettings(seed=check_seed("", table.get("seed", 0)), **given)
-    windows = WindowFunctions(run.range_window, run.doppler_window)
+        wrong.of(_whole, "", "order", given["order"], int(RUN_LIMITS["order"][1]))
+    seed = wrong.of(check_seed, "", table.get("seed", 0))
+    named = {
+        axis: given[f"{axis}_window"] for axis in ("range", "doppler") if f"{axis}_window" in given
+    }
+    windows = wrong.of(lambda: WindowFunctions(**named))
+    wrong.check()
+    assert windows is not None  # for else there are complaints
+    assert seed is not None
+    run = RunSettings(seed=seed, **given)
     return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
 
 
@@ -348,30 +364,56 @@ def _folder(table: Table, beside: Path) -> Path:
     return there
 
 
-def _combinations(each: Mapping[str, list[Any]], folder: Path) -> tuple[Combination, ...]:
-    radars = [_loaded("radar", value, folder, Radar.load) for value in each["radar"]]
-    scenes = [_loaded("scene", value, folder, Scene.load) for value in each["scene"]]
-    models = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
-    for model in models:
-        if model not in MODELS:
-            raise InputError(
-                f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"
-            )
+def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]:
+    """Return the values under ``[each]``, checked; radars and scenes are loaded."""
 
-    def number(key: str, value: object) -> float | None:
-        return None if value is None else check_number("[each]", key, value, *DRAWN[key][1:])
+    def number(key: str) -> Callable[[object], float]:
+        return lambda value: check_number("[each]", key, value, *DRAWN[key][1:])
 
-    def place(key: str, value: object, size: int) -> dict[str, Any]:
-        return {} if value is None else {key: check_vector("[each]", key, value, size, 100.0)}
+    def place(key: str, size: int) -> Callable[[object], tuple[float, ...]]:
+        return lambda value: check_vector("[each]", key, value, size, 100.0)
 
-    numbers = [[number(key, one) for one in each[key]] for key in ("heading_deg", "snr_db")]
-    sizes = {"person_position_m": 2, "radar_position_m": 3}
-    places = [[place(key, one, size) for one in each[key]] for key, size in sizes.items()]
+    readers: dict[str, Callable[[Any], Any]] = {
+        "radar": lambda value: _loaded("radar", value, folder, Radar.load),
+        "scene": lambda value: _loaded("scene", value, folder, Scene.load),
+        "fidelity": _fidelity,
+        "heading_deg": number("heading_deg"),
+        "snr_db": number("snr_db"),
+        "person_position_m": place("person_position_m", 2),
+        "radar_position_m": place("radar_position_m", 3),
+    }
+    lists = {key: wrong.of(_several, each, key, usual) or [] for key, usual in EACH.items()}
+    # A default of None stays: it is no value of the file.
+    return {
+        key: [
+            None if key not in each and value is None else wrong.of(readers[key], value)
+            for value in values
+        ]
+        for key, values in lists.items()
+    }
+
+
+def _fidelity(value: object) -> str:
+    model = check_text("[each]", "fidelity", value)
+    if model not in MODELS:
+        raise InputError(
+            f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"
+        )
+    return model
+
+
+def _combinations(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
+    places = [
+        [{} if value is None else {key: value} for value in lists[key]]
+        for key in ("person_position_m", "radar_position_m")
+    ]
     placed = [
         dataclasses.replace(scene, **person, **radar)
-        for scene, person, radar in itertools.product(scenes, *places)
+        for scene, person, radar in itertools.product(lists["scene"], *places)
     ]
-    values = itertools.product(radars, placed, models, *numbers)
+    values = itertools.product(
+        lists["radar"], placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
+    )
     return tuple(itertools.starmap(Combination, values))
 
 
@@ -406,25 +448,35 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
         raise InputError(f"[each] {key}: {error}") from None
 
 
-def _actors(table: Table) -> tuple[Actor, ...]:
+def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
     found: dict[str, Actor] = {}
-    for where, one in tables_at("synthetic", table):
-        check_keys(where, one, *_SYNTHETIC)
-        label = check_text(where.strip(), "label", one["label"])
-        if label not in ACTIVITIES:
-            raise InputError(
-                f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+    for where, one in wrong.of(tables_at, "synthetic", table) or ():
+        wrong.lines += wrong_keys(where, one, *_SYNTHETIC)
+        actor = wrong.of(_actor, where, one) if "label" in one else None
+        if actor and actor.label in found:
+            wrong.lines.append(
+                f"[[synthetic]] label = '{actor.label}' is given twice; give its takes together"
             )
-        if ("count" in one) == ("seeds" in one):
-            raise InputError(f"{where}: give count or seeds, one of them")
-        seeds = _numbers(where, "seeds" if "seeds" in one else "count", one)
-        subjects = _numbers(where, "subjects", {"subjects": 10, **one})
-        if label in found:
-            raise InputError(
-                f"[[synthetic]] label = '{label}' is given twice; give its takes together"
-            )
-        found[label] = Actor(label, seeds, subjects)
+        elif actor:
+            found[actor.label] = actor
     return tuple(found.values())
+
+
+def _actor(where: str, table: Table) -> Actor:
+    wrong = Complaints()
+    label = wrong.of(check_text, where.strip(), "label", table["label"])
+    if label is not None and label not in ACTIVITIES:
+        wrong.lines.append(
+            f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+        )
+    seeds = None
+    if ("count" in table) == ("seeds" in table):
+        wrong.lines.append(f"{where}: give count or seeds, one of them")
+    else:
+        seeds = wrong.of(_numbers, where, "seeds" if "seeds" in table else "count", table)
+    subjects = wrong.of(_numbers, where, "subjects", {"subjects": 10, **table})
+    wrong.check()
+    return Actor(label or "", seeds or (), subjects or ())
 
 
 def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
@@ -443,27 +495,46 @@ def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
     return tuple(range(count))
 
 
-def _recorded(where: str, table: Table, intervals: Table, folder: Path) -> Recorded:
-    check_keys(where, table, *_RECORDING)
-    place = where.strip()
-    texts = {key: check_text(place, key, table[key]) for key in _RECORDING[0]}
-    skeleton = check_text(place, "skeleton", table["skeleton"]) if "skeleton" in table else None
-    for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
-        if name is not None and inside(folder, name) is None:
-            raise InputError(
-                f"{where}{key} = {brief(name)} leaves the folder of recordings; "
-                "name files in it or below"
-            )
-        if name is not None and not (folder / name).is_file():
-            raise InputError(f"{where}{key} = {brief(name)}: there is no such file in '{folder}'")
+def _recordings(
+    table: Table, windows: Table, folder: Path, wrong: Complaints
+) -> tuple[Recorded, ...]:
+    beside = wrong.of(_folder, table, folder)
+    found: list[Recorded] = []
+    for where, one in wrong.of(tables_at, "recordings", table) or ():
+        wrong.lines += wrong_keys(where, one, *_RECORDING)
+        if beside is not None and "file" in one:
+            found += wrong.of(_recorded, where, one, windows, beside) or ()
+    return tuple(found)
+
+
+def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Recorded]:
+    """Return the recordings of one table: those of its pattern, or the one that it names."""
+    wrong, place = Complaints(), where.strip()
+    texts = {
+        key: wrong.of(check_text, place, key, table[key]) or ""
+        for key in ("file", "label", "subject", "licence", "skeleton")
+        if key in table
+    }
     own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
-    return Recorded(
-        name=(name := texts.pop("file")),
-        path=folder / name,
-        skeleton=None if skeleton is None else folder / skeleton,
-        intervals=Intervals.read(place, {**intervals, **own}),
-        **texts,
-    )
+    intervals = wrong.of(Intervals.read, place, {**windows, **own})
+    if "label" not in texts and "{label}" not in texts["file"]:
+        wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
+    matches = wrong.of(matching_files, where, texts["file"], folder) if texts["file"] else None
+    wrong.check()
+    assert intervals is not None  # for else there are complaints
+    found = []
+    for name, fields in matches or ():
+        values = {"subject": UNKNOWN, "licence": UNKNOWN, **texts, **fields}
+        skeleton = None
+        if "skeleton" in texts:
+            named = FIELD.sub(lambda field: values[field[1]], texts["skeleton"])  # noqa: B023
+            skeleton = wrong.of(file_in, where, "skeleton", named, folder)
+        about = {key: values[key] for key in ("label", "subject", "licence")}
+        for key in fields:
+            wrong.of(check_text, place, key, fields[key])
+        found.append(Recorded(name, folder / name, skeleton, intervals=intervals, **about))
+    wrong.check()
+    return found
 
 
 def _range(key: str, value: object, least: float, most: float) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.dataset_store import UNKNOWN, Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 
@@ -57,7 +57,8 @@ def make_splits(
         Labelled clouds, of which only labels and provenance are read.
     scheme : str
         Scheme of the splits. ``folds``: the paper's, stratified over clouds. ``recording``,
-        ``subject``: each recording or subject is on one side only. ``recorded``: train on synthetic
+        ``subject``: each recording or subject is on one side only; a recording whose subject is
+        ``unknown`` counts as a subject of its own. ``recorded``: train on synthetic
         motion, test on recorded motion. ``across:COLUMN`` (or ``across:A,B``): for every value of
         the column(s) and every fold over recordings, train on the clouds of that value, test on
         clouds of all values from other recordings.
@@ -93,7 +94,7 @@ def make_splits(
     elif scheme in _MAX_FOLDS:
         groups = {"folds": intervals, "recording": recordings}.get(scheme)
         if groups is None:
-            groups = _numbered(clouds.column(scheme))
+            groups = subjects_of(clouds)
         splits = _folds(clouds, scheme, groups, folds, _MAX_FOLDS[scheme], seed)
     else:
         raise InputError(f"split '{scheme}' is unknown; give one of {', '.join(SCHEMES)}")
@@ -143,6 +144,13 @@ def recordings_of(clouds: Collection) -> NDArray[np.int64]:
     n_nodes = names.max() + 1 + len(known)
     links = coo_array((np.ones(len(known)), (names[known], ends)), shape=(n_nodes, n_nodes))
     return np.asarray(connected_components(links, directed=False)[1][names], dtype=np.int64)
+
+
+def subjects_of(clouds: Collection) -> NDArray[np.int64]:
+    """Number the subjects, (cloud,); each recording of an unknown one counts as somebody else."""
+    subjects = clouds.column("subject").astype(str)
+    alone = [f"recording {number}" for number in recordings_of(clouds)]
+    return _numbered(np.where(subjects == UNKNOWN, alone, subjects))
 
 
 def check(split: Split, intervals: NDArray[np.int64], labels: NDArray[np.str_]) -> None:

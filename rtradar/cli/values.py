@@ -57,8 +57,9 @@ OVERWRITE_HELP = "replace files of others that have the names of new ones"
 
 
 def fail(status: int, why: object) -> int:
-    """Print in one line on stderr what went wrong, and return the exit status."""
-    print("rtradar: " + " ".join(str(why).split()), file=sys.stderr)
+    """Print on stderr what went wrong, each thing in one line, and return the exit status."""
+    for line in getattr(why, "lines", None) or [why]:
+        print("rtradar: " + " ".join(str(line).split()), file=sys.stderr)
     return status
 
 

@@ -91,6 +91,9 @@ KINDS = {
 }
 """What a data set may hold of each sample, and the name of its array."""
 
+UNKNOWN = "unknown"
+"""Subject and licence of a recording about which a specification says nothing."""
+
 _DIGEST = 64  # hexadecimal digits of SHA-256
 _MAX_BYTES = 200_000_000
 _MAX_MAP_BYTES = 190_000_000  # of maps, which leaves room for clouds and provenance

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, InputErrors
 from rtradar.system.files import read_bytes
 
 Vector = tuple[float, float, float]
@@ -19,6 +19,8 @@ Table = Mapping[str, Any]
 
 _MAX_TOML_BYTES = 1_000_000
 _MAX_TABLES = 1000
+_MOST_LINES = 50  # of complaints about one file
+_T = TypeVar("_T")
 
 
 def brief(value: object) -> str:
@@ -173,10 +175,55 @@ def check_keys(
     where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]
 ) -> None:
     """Refuse unknown and missing keys; ``where`` ends with a blank if it is not empty."""
+    for complaint in wrong_keys(where, table, needed, optional):
+        raise InputError(complaint)
+
+
+def wrong_keys(
+    where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]
+) -> list[str]:
+    """Return a message about each key that is unknown or missing; see `check_keys`."""
     allowed = (*needed, *optional)
-    for key in table:
-        if key not in allowed:
-            raise InputError(f"{where}unknown key {brief(key)}; allowed: {', '.join(allowed)}")
-    for key in needed:
-        if key not in table:
-            raise InputError(f"{where}{key} is missing; needed: {', '.join(needed)}")
+    unknown = [
+        f"{where}unknown key {brief(key)}; allowed: {', '.join(allowed)}"
+        for key in table
+        if key not in allowed
+    ]
+    return unknown + [
+        f"{where}{key} is missing; needed: {', '.join(needed)}"
+        for key in needed
+        if key not in table
+    ]
+
+
+class Complaints:
+    """Errors of parts of a file that do not depend on each other, told all at once.
+
+    Attributes
+    ----------
+    lines : list of str
+        Message about each.
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def of(self, read: Callable[..., _T], *values: Any) -> _T | None:
+        """Return what a function gives for some values; None if it complains about them."""
+        try:
+            return read(*values)
+        except InputErrors as error:
+            self.lines += error.lines
+        except InputError as error:
+            self.lines.append(str(error))
+        return None
+
+    def check(self) -> None:
+        """Raise InputError if there is a complaint, InputErrors if there are several."""
+        lines = list(dict.fromkeys(self.lines))
+        if len(lines) == 1:
+            raise InputError(lines[0])
+        if len(lines) > _MOST_LINES:
+            lines[_MOST_LINES:] = [f"and {len(lines) - _MOST_LINES} more"]
+        if lines:
+            raise InputErrors(lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 import time
 import tracemalloc
 from pathlib import Path
@@ -12,8 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rtradar.campaign.patterns import matching_files
 from rtradar.campaign.spec import Intervals, _spec, read_spec
-from rtradar.errors import InputError
+from rtradar.errors import InputError, InputErrors
 
 SMALL = """
 [windows]
@@ -242,7 +244,11 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             RECORDING.replace("licence", "license"),
             "unknown key 'license'; allowed: file, label, subject, licence",
         ),
-        (RECORDING.replace('licence = "CC0"', ""), "licence is missing; needed: file"),
+        (RECORDING.replace('file = "walk.bvh"', ""), "file is missing; needed: file"),
+        (RECORDING.replace('label = "walk"', ""), "label is missing; give it, or have {label} in"),
+        (RECORDING.replace("walk.bvh", "*.bvh"), "file = '*.bvh' matches no file in"),
+        (RECORDING.replace("walk.bvh", "../*.bvh"), "file = '../*.bvh' leaves the folder"),
+        (RECORDING.replace("walk.bvh", "*" * 11), "10 wildcards are allowed"),
         (
             RECORDING.replace('"her"', "7"),
             "[[recordings]] number 1: subject = 7; it must be a string",
@@ -257,10 +263,92 @@ def test_nonsense_is_refused_in_one_line_that_names_the_key(
 ) -> None:
     with pytest.raises(InputError) as caught:
         read_spec(write(tmp_path, text))
-    message = str(caught.value)
-    assert says in message
-    assert message.startswith("data set file '")
-    assert "\n" not in message
+    lines = getattr(caught.value, "lines", (str(caught.value),))
+    assert any(says in line for line in lines)
+    assert all(line.startswith("data set file '") for line in lines)
+    assert not any("\n" in line for line in lines)
+
+
+def test_everything_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+    text = """
+pfa = 2
+colour = 1
+keep = ["sound"]
+range_window = 7
+[windows]
+duration_s = -1
+[each]
+radar = ["moon", "none.toml"]
+snr_db = [10, "loud"]
+[drawn]
+snr_db = [1, 2]
+tempo = [3, 1]
+[[synthetic]]
+label = "dance"
+count = 0
+[[synthetic]]
+label = "walk"
+[[recordings]]
+file = "no/*.bvh"
+subject = 7
+"""
+    with pytest.raises(InputErrors) as caught:
+        read_spec(write(tmp_path, text))
+    says = [
+        "unknown key 'colour'", "snr_db is under [each] and under [drawn]", "duration_s = -1",
+        "label = 'dance'", "count = 0", "number 2 : give count or seeds", "subject = 7",
+        "label is missing", "matches no file", "radar 'moon' is unknown", "none.toml",
+        "snr_db = 'loud'", "tempo = 3", "keep = ['sound']", "range_window = 7", "pfa = 2",
+    ]  # fmt: skip
+    assert [one for one in says if not any(one in line for line in caught.value.lines)] == []
+    assert len(caught.value.lines) == len(says)
+    assert pickle.loads(pickle.dumps(caught.value)).lines == caught.value.lines
+
+
+def test_patterns_find_recordings_subjects_and_activities(tmp_path: Path) -> None:
+    for name in ("walk/anna_1.bvh", "walk/anna_2.bvh", "kick/ben_1.bvh", "kick/ben_1.txt"):
+        (tmp_path / "all" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "all" / name).touch()
+    (tmp_path / "anna.asf").touch()
+    (tmp_path / "ben.asf").touch()
+    text = '[[recordings]]\nfile = "all/{label}/{subject}_*.bvh"\nskeleton = "{subject}.asf"\n'
+    found = read_spec(write(tmp_path, text)).recordings
+    assert [(one.name, one.label, one.subject, one.licence) for one in found] == [
+        ("all/kick/ben_1.bvh", "kick", "ben", "unknown"),
+        ("all/walk/anna_1.bvh", "walk", "anna", "unknown"),
+        ("all/walk/anna_2.bvh", "walk", "anna", "unknown"),
+    ]
+    assert [one.skeleton for one in found] == [
+        tmp_path / f"{name}.asf" for name in ("ben", "anna", "anna")
+    ]
+    text = '[[recordings]]\nfile = "**/*_?.bvh"\nlabel = "moves"\nlicence = "CC0"\n'
+    found = read_spec(write(tmp_path, text)).recordings
+    assert {(one.label, one.subject, one.licence) for one in found} == {("moves", "unknown", "CC0")}
+    assert len(found) == 3
+
+
+@pytest.mark.parametrize(
+    ("pattern", "name", "fields"),
+    [
+        ("{subject}_{label}_*.bvh", "a_b_c_d.bvh", {"subject": "a", "label": "b"}),
+        ("{subject}/{subject}_x.bvh", "a/a_x.bvh", {"subject": "a"}),
+        ("{subject}/{subject}_x.bvh", "a/b_x.bvh", None),
+        ("**/{label}.bvh", "walk.bvh", {"label": "walk"}),
+        ("**/{label}.bvh", "a/b/walk.bvh", {"label": "walk"}),
+        ("a[1]*.bvh", "a[1]b.bvh", {}),
+        ("a[1]*.bvh", "a1b.bvh", None),
+    ],
+)
+def test_a_field_ends_where_the_text_behind_it_begins(
+    tmp_path: Path, pattern: str, name: str, fields: dict[str, str] | None
+) -> None:
+    (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / name).touch()
+    if fields is None:
+        with pytest.raises(InputError, match="matches no file"):
+            matching_files("", pattern, tmp_path)
+    else:
+        assert matching_files("", pattern, tmp_path) == [(name, fields)]
 
 
 WHOLE: dict[str, Any] = {
@@ -332,12 +420,14 @@ def test_whatever_stands_where_a_value_should_gets_one_line_or_is_one(
     for key in way[:-1]:
         inside = inside[key]
     inside[way[-1]] = value
-    said = ""
+    lines: tuple[str, ...] = ()
     try:
         _spec(table, tmp_path)
+    except InputErrors as errors:
+        lines = errors.lines
     except InputError as error:
-        said = str(error)
-    assert "\n" not in said
+        lines = (str(error),)
+    assert not any("\n" in line for line in lines)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:

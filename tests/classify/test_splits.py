@@ -17,6 +17,7 @@ from rtradar.classify.splits import (
     intervals_of,
     make_splits,
     recordings_of,
+    subjects_of,
     values_of,
 )
 from rtradar.clouds.dataset_store import Collection
@@ -237,3 +238,18 @@ def test_trainings_are_chosen_by_number(made_up: Callable[..., Any]) -> None:
     assert chosen(splits, [3, 1, 3]) == [0, 2]
     with pytest.raises(InputError, match="--fold 4: there are 3"):
         chosen(splits, [4])
+
+
+def test_a_recording_of_nobody_known_counts_as_somebody_of_its_own() -> None:
+    rows = [
+        {"label": label, "subject": subject, "recording": f"{label}-{number}", "start_s": start_s,
+         "duration_s": 1.0}
+        for label in ("kick", "walk")
+        for number, subject in enumerate(("unknown", "unknown", "her", "her"))
+        for start_s in (0.0, 2.0)
+    ]  # fmt: skip
+    groups = subjects_of(Table(rows)).reshape(2, 4, 2)
+    assert (groups[..., 0] == groups[..., 1]).all()  # both intervals of a recording
+    assert len(np.unique(groups[:, :2])) == 4
+    assert len(np.unique(groups[:, 2:])) == 1
+    assert len(make_splits(Table(rows), "subject", folds=2)) == 2
