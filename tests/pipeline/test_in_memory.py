@@ -87,7 +87,7 @@ def test_maps_too_large_for_memory_are_refused_before_any_work(
     assert 0.8 * size < known < 1.2 * size
     monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1_000_000_000)
     # No array of so many frames is ever made.
-    long = dataclasses.replace(MOTION, rate_hz=1e-3)
+    long = dataclasses.replace(MOTION, rate_hz=1e-3, first_frame_s=0.0, length_s=None)
     with pytest.raises(InputError, match=r"would take [\d.]+ GB .* 1\.0 GB are allowed; .* out="):
         rt.run(long, RADAR)
 
