@@ -96,6 +96,40 @@ def _may_stand_before(antenna, part, other, centres, longest):
     return angle < math.asin(own / to_part) + math.asin(its / to_other)
 
 
+@inlined(fastmath={"contract"})
+def _write_rays(lines, axes, out):
+    """Write the rays of the ``near`` lines; return the count with those that begin in time."""
+    x, y, z, begin, chosen, nearest, near = lines
+    turn, shift, start, slot, other = axes
+    rays, whose, count = out
+    t00, t01, t02 = turn[0, 0], turn[0, 1], turn[0, 2]
+    t10, t11, t12 = turn[1, 0], turn[1, 1], turn[1, 2]
+    t20, t21, t22 = turn[2, 0], turn[2, 1], turn[2, 2]
+    s0, s1, s2 = start[0], start[1], start[2]
+    d0, d1, d2 = shift[0] - s0, shift[1] - s1, shift[2] - s2
+    place = np.uint64(count)
+    for i in near:
+        w0 = t00 * x[i] + t01 * y[i] + t02 * z[i] + d0
+        w1 = t10 * x[i] + t11 * y[i] + t12 * z[i] + d1
+        w2 = t20 * x[i] + t21 * y[i] + t22 * z[i] + d2
+        distance = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+        inverse = 1 / distance
+        ahead = max(nearest[i] - 2 * inverse, 0.0)
+        rays[0, place] = s0 + ahead * w0
+        rays[1, place] = s1 + ahead * w1
+        rays[2, place] = s2 + ahead * w2
+        rays[3, place] = w0 * inverse
+        rays[4, place] = w1 * inverse
+        rays[5, place] = w2 * inverse
+        rays[6, place] = (begin[i] - ahead) * distance
+        rays[7, place] = nearest[i]
+        whose[0, place], whose[1, place] = slot + chosen[i], other
+        # What is met behind the near side of the vertex's own part does not count: the next ray
+        # takes the place of one that would begin there.
+        place += np.uint64(ahead < begin[i])
+    return np.int64(place)
+
+
 @compiled()
 def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     """Return the rays that decide which part occludes which vertex, as `BodyTracer.occluders` asks.
@@ -106,13 +140,13 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     """
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start, local = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-    way, longest = np.empty(3), np.zeros(every)
+    longest = np.zeros(every)
     for part in range(every):
         for i in range(3):
             longest[part] = max(longest[part], semi_axes[part, i])
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
-    nearest = np.empty(n_vertices)
+    nearest, near = np.empty(n_vertices), np.empty(n_vertices, dtype=np.int64)
     rays, whose = np.empty((8, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
     count = 0
     for a in range(len(antennas)):
@@ -146,28 +180,18 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
                 into_ball(part, other, antennas[a], centres, frames, semi_axes, turn, shift, start)
                 if _nearest(x, y, z, start, turn, shift, nearest) == 0:
                     continue
+                # Places of the lines that come near, then their rays: a loop without branches.
+                close = np.uint64(0)
                 for i in range(facing):
-                    if nearest[i] < 0:
-                        continue
-                    if count == rays.shape[1]:
-                        rays, whose = _grown(rays), _grown(whose)
-                    span = 0.0
-                    for j in range(3):
-                        way[j] = turn[j, 0] * x[i] + turn[j, 1] * y[i] + turn[j, 2] * z[i]
-                        way[j] += shift[j] - start[j]
-                        span += way[j] * way[j]
-                    distance = math.sqrt(span)
-                    ahead = max(nearest[i] - 2 / distance, 0.0)
-                    # What is met behind the near side of the vertex's own part does not count.
-                    if ahead >= begin[i]:
-                        continue
-                    for j in range(3):
-                        rays[j, count] = start[j] + ahead * way[j]
-                        rays[3 + j, count] = way[j] / distance
-                    rays[6, count] = (begin[i] - ahead) * distance
-                    rays[7, count] = nearest[i]
-                    whose[0, count], whose[1, count] = slot + chosen[i], other
-                    count += 1
+                    near[close] = i
+                    close += np.uint64(nearest[i] >= 0)
+                while count + close > rays.shape[1]:
+                    rays, whose = _grown(rays), _grown(whose)
+                count = _write_rays(
+                    (x, y, z, begin, chosen, nearest, near[:close]),
+                    (turn, shift, start, slot, other),
+                    (rays, whose, count),
+                )
     return rays[:, :count], whose[:, :count]
 
 
