@@ -47,7 +47,7 @@ _INSTANTS_S = 25e-3
 _INSTANTS_AT_ONCE = 32
 
 _POWER_RAYS = 64
-"""Shadow rays of a forecast where only power matters: at edges they leave an error of 0.035 in the
+"""Shadow rays to a part where only power matters: at edges they leave an error of 0.035 in the
 visible fraction (``validation/other_methods/fresnel.py``)."""
 
 _MARGIN = 0.7
@@ -119,6 +119,7 @@ class Auto(BuiltInModel):
         # A decibel down is a smaller fraction than one up.
         self._power_fraction = 1 - 10 ** (-tolerance_db / 10)
         self._complex_fraction = None if tolerance_complex is None else _MARGIN * tolerance_complex
+        self._shadow_rays = _POWER_RAYS if tolerance_complex is None else SHADOW_RAYS
         self._starts = StartPoints(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
         self._planned: KeyframeCache[int, Planned] = KeyframeCache(_KEPT_CHUNKS, _PASSING)
@@ -240,9 +241,12 @@ class Auto(BuiltInModel):
         instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
         times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
         poses = self._body.at(np.minimum(times, self._body.duration_s))
-        rays = _POWER_RAYS if self._complex_fraction is None else SHADOW_RAYS
         budget = error_budget(
-            self._radar, poses, self._tracer, spreading=self._spreading, shadow_rays=rays
+            self._radar,
+            poses,
+            self._tracer,
+            spreading=self._spreading,
+            shadow_rays=self._shadow_rays,
         )
         chosen = select_candidates(budget, self._power_fraction, self._complex_fraction)[1:-1]
         budget = ErrorBudget(**{name: array[1:-1] for name, array in budget._asdict().items()})
@@ -310,7 +314,8 @@ class Auto(BuiltInModel):
     @cached_property
     def _zones(self) -> ZoneFractions:
         frequency = zone_nodes(self._radar)
-        return ZoneFractions(self._radar, self._body, frequency, self._tracer, self._at_edges)
+        given = self._radar, self._body, frequency, self._tracer, self._at_edges
+        return ZoneFractions(*given, shadow_rays=self._shadow_rays)
 
     @cached_property
     def _physical_optics(self) -> EchoModel:
