@@ -25,7 +25,7 @@ var(--color-foreground-primary, var(--rtradar-ink))));
 .rtradar-card .faint, .rtradar-card caption, .rtradar-card th {
   color: var(--jp-content-font-color2, var(--color-foreground-secondary, var(--rtradar-faint))); }
 .rtradar-card .parts { display: flex; flex-wrap: wrap; gap: 4px 28px; align-items: flex-start; }
-.rtradar-card table { flex: 1 1 300px; max-width: 100%; margin: 0 0 6px; border: 0;
+.rtradar-card table { flex: 1 1 300px; max-width: min(100%, 560px); margin: 0 0 6px; border: 0;
   border-collapse: collapse; font: inherit; table-layout: auto; }
 .rtradar-card caption { padding: 2px 0; font-weight: 600; text-align: left; caption-side: top; }
 .rtradar-card tr, .rtradar-card tbody tr:nth-child(odd) { background: none; }
@@ -33,7 +33,7 @@ var(--color-foreground-primary, var(--rtradar-ink))));
   vertical-align: top; max-width: none; white-space: normal; font-weight: 400;
   border-bottom: 1px solid var(--jp-border-color2, \
 var(--color-background-border, var(--rtradar-line))); }
-.rtradar-card th { padding-right: 14px; min-width: 8em; width: 38%; }
+.rtradar-card th { padding-right: 14px; width: 9em; }
 .rtradar-card img { flex: 1 1 300px; min-width: 0; max-width: min(100%, 520px); height: auto; }
 .rtradar-card p { margin: 2px 0; }
 """

@@ -30,10 +30,13 @@ def brief_rows(radar: Radar) -> dict[str, str]:
 def settings_rows(radar: Radar) -> dict[str, str]:
     """Return what was set, as texts with units by their labels."""
     stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
-    noise = "not stated" if radar.noise_figure_db is None else f"{radar.noise_figure_db:g} dB"
-    power = (
-        "not stated" if radar.transmit_power_dbm is None else f"{radar.transmit_power_dbm:g} dBm"
-    )
+    stated = {
+        "transmitted": (radar.transmit_power_dbm, "dBm"),
+        "noise figure": (radar.noise_figure_db, "dB"),
+    }
+    powers = [
+        f"{name} {value:g} {unit}" for name, (value, unit) in stated.items() if value is not None
+    ]
     pairs = (
         " (each line by itself)" if radar.channels == "pairs" and radar.tx_y * radar.tx_z else ""
     )
@@ -53,7 +56,7 @@ def settings_rows(radar: Radar) -> dict[str, str]:
         f"{quantity(radar.cycle_duration_s, 's')}",
         "Position": f"({', '.join(f'{value:g}' for value in radar.position_m)}) m, boresight +x",
         "Antennas": f"Tx {_antenna(radar.tx_antenna)}, Rx {_antenna(radar.rx_antenna)}",
-        "Power": f"transmitted {power}, noise figure {noise}",
+        "Power": ", ".join(powers) or "not stated",
     }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from rtradar.system.checks import (
     tables_at,
 )
 from rtradar.system.files import shipped_folder
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Piece = TypeVar("Piece", Wall, Furniture)
 
@@ -153,6 +156,31 @@ class Scene:
         except InputError as error:
             raise InputError(f"scene file '{path}': {error}") from None
         return scene
+
+    def plot(self, radar: Radar | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the plan: walls with their materials, furniture, reflectors, radar and person.
+
+        Parameters
+        ----------
+        radar : Radar, optional
+            Radar that is drawn where the scene has no place for one; by default the paper's.
+        ax : Axes, optional
+            Axes of Matplotlib to draw on; by default those of a new figure.
+
+        Returns
+        -------
+        Axes
+            Axes in metres, x to the right and y upward.
+
+        Examples
+        --------
+        >>> axes = rt.Scene.load("living-room").plot()
+        >>> axes.get_xlabel()
+        'x [m]'
+        """
+        from rtradar.scene.plan import plot_scene
+
+        return plot_scene(self, radar, ax)
 
     @property
     def materials(self) -> tuple[Material, ...]:

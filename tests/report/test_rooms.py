@@ -9,7 +9,7 @@ import pytest
 
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms as room_figures
-from rtradar.scene import Furniture, Scene, material
+from rtradar.scene import Furniture, Scene, material, plan
 
 pytestmark = pytest.mark.drawn
 
@@ -18,13 +18,13 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[np.ndarray] = []
-    collection = room_figures.PolyCollection
+    collection = plan.PolyCollection
 
     def counted(corners: list[np.ndarray], **words: object) -> object:
         drawn.append(np.array(corners))
         return collection(corners, **words)
 
-    monkeypatch.setattr(room_figures, "PolyCollection", counted)
+    monkeypatch.setattr(plan, "PolyCollection", counted)
     chair = Furniture(
         name="chair",
         mesh="chair",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,6 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from rtradar.process import WindowFunctions
@@ -18,14 +18,14 @@ from rtradar.radar import Radar
 from rtradar.report.figures import canvas
 from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, field_unit
 from rtradar.report.figures.maps import angle_label
-from rtradar.scene import Scene
+from rtradar.scene import Scene, plan
+from rtradar.system.figure_labels import Label, around
+from rtradar.system.figure_style import STYLE, dress, new_figure, theme_of
 
 _LEGEND: dict[str, Any] = {"fontsize": 8, "facecolor": "dimgrey", "labelcolor": "white"}
 _BOX = {"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1}
 _ARROW = {"arrowstyle": "-", "color": "red", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
 _GHOST: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": "red", "markersize": 9}
-_UPRIGHT = 0.5
-"""Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
 
 
 def draw_plan(
@@ -41,52 +41,24 @@ def draw_plan(
     ``track`` (time, 2) are positions of the person's root [m], ``paths`` the corners (point, 3) of
     each path from Tx to Rx [m] by its name.
     """
-    figure = canvas.new_figure(10, 6)
-    axes = figure.subplots()
-    walls = walls_in_plan(scene)
-    corners = np.array([corner for first, last, _ in walls for corner in (first, last)])
-    for first, last, name in walls:
-        axes.plot(*zip(first, last, strict=True), color="black", linewidth=2.5)
-        middle = (first + last) / 2
-        # Names are outside the room, because those of furniture are inside.
-        across = np.abs(last - first) < np.abs(last - first).max()
-        outward = 9 * across * np.sign(middle - corners.mean(axis=0))
-        style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center"}
-        style |= {"fontsize": 7, "color": "dimgrey"}
-        axes.annotate(name, tuple(middle), tuple(outward), **style)
-    for piece in scene.furniture:
-        triangles = piece.triangles()
-        corners = triangles.corners[..., :2]
-        (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
-        # Faces that look up cover a closed body; upright ones cover nothing.
-        seen = ax * by - ay * bx
-        covering = corners[seen > 0 if triangles.closed else seen != 0]
-        axes.add_collection(PolyCollection(list(covering), color="tan", alpha=0.5, linewidth=0))
-        centre = tuple(corners.reshape(-1, 2).mean(axis=0))
-        axes.annotate(piece.name, centre, fontsize=7, color="saddlebrown", ha="center")
+    place = radar.position_m[:2]
+    limits = plan.plan_limits(scene, [place, *track])
+    figure = new_figure(plan.height_of_plan(limits) + 0.2 * math.ceil((len(paths) + 1) / 2))
+    axes = figure.add_subplot()
+    plan.draw_plan(axes, scene, limits)
     # There may be more than ten paths.
     axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
-    axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
-    axes.plot(*radar.position_m[:2], "k^", markersize=9, label="radar")
-    axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
-    axes.set_aspect("equal")
-    axes.grid(alpha=0.3)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
+    theme = theme_of(axes)
+    axes.plot(track[:, 0], track[:, 1], color=theme.person, linewidth=2.5, label="person")
+    plan.draw_radar(axes, place)
+    words = figure.legend(loc="outside lower center", ncols=2, fontsize=STYLE["legend.fontsize"])
+    for text in words.get_texts():
+        text.set_parse_math(False)
+    dress(axes, title=title, note=plan.plan_note(scene))
+    plan.name_parts(axes, scene, [Label("radar", around(place, 12.0), theme.radar)])
     canvas.save_figure(figure, path)
-
-
-def walls_in_plan(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64], str]]:
-    """Feet of the upright walls: both ends (2,) [m] and the name."""
-    found = []
-    for wall in scene.walls:
-        if abs(float(wall.normal[2])) < _UPRIGHT:
-            corners = wall.corners[:, :2]
-            gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1)
-            one, other = np.unravel_index(int(gaps.argmax()), gaps.shape)
-            found.append((corners[one], corners[other], wall.name))
-    return found
 
 
 def draw_before_after(
@@ -170,7 +142,7 @@ def draw_range_azimuth_with_walls(
     left, right = canvas.bin_edges(np.degrees(azimuth))
     image = draw_levels(axes, values, np.degrees(azimuth), radar.range_m, limits)
     place = np.asarray(radar.position_m)[:2]
-    for first, last, name in walls_in_plan(scene):
+    for first, last, wall in plan.feet_of_walls(scene):
         along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
         angle, distance = np.degrees(np.arctan2(along[:, 1], along[:, 0])), np.hypot(*along.T)
         axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
@@ -178,7 +150,7 @@ def draw_range_azimuth_with_walls(
         inside = np.flatnonzero(shown)
         if len(inside):
             near = inside[len(inside) // 6]  # beside the middle, where names of ghosts stand
-            axes.annotate(name, (angle[near], distance[near]), fontsize=8, color="white")
+            axes.annotate(wall.name, (angle[near], distance[near]), fontsize=8, color="white")
     axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title)
     axes.set(xlim=(left, right), ylim=canvas.bin_edges(radar.range_m))
     _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)

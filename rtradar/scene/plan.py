@@ -1,0 +1,192 @@
+"""The plan of a scene: walls, furniture and radar seen from above."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.radar import Radar
+from rtradar.scene.objects import Wall
+from rtradar.scene.scene import Scene
+from rtradar.system.figure_labels import Label, around, place_labels
+from rtradar.system.figure_style import STYLE, axes_for, dress, theme_of
+
+_UPRIGHT = 0.5
+"""Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
+
+MOST_NAMES = 40
+"""Most pieces of furniture that a plan names, the largest first."""
+
+_ARROW_M = 0.9
+"""Length of the arrow along the boresight [m]."""
+
+
+class Foot(NamedTuple):
+    """Foot of an upright wall: both ends (2,) [m] of its front face, and the wall."""
+
+    first: NDArray[np.float64]
+    last: NDArray[np.float64]
+    wall: Wall
+
+
+def feet_of_walls(scene: Scene) -> list[Foot]:
+    """Find the feet of the upright walls."""
+    found = []
+    for wall in filter(_is_upright, scene.walls):
+        corners = wall.corners[:, :2]
+        gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1)
+        one, other = np.unravel_index(int(gaps.argmax()), gaps.shape)
+        found.append(Foot(corners[one], corners[other], wall))
+    return found
+
+
+def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
+    """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
+    own = Radar().position_m if radar is None else radar.position_m
+    x, y = (own if scene.radar_position_m is None else scene.radar_position_m)[:2]
+    person = scene.person_position_m
+    limits = plan_limits(scene, [(x, y), (x + _ARROW_M, y), person])
+    axes = axes_for(ax, height_of_plan(limits))
+    theme = theme_of(axes)
+    draw_plan(axes, scene, limits)
+    draw_radar(axes, (x, y))
+    axes.plot(*person, "o", color=theme.person, markersize=7)
+    dress(axes, title=f"{scene.name}: {scene.description}", note=plan_note(scene))
+    others = [
+        Label("radar", around((x, y), 12.0), theme.radar),
+        Label("person", around(person, 12.0), theme.person),
+    ]
+    # Names keep off the arrow, the person's mark and the lines of walls.
+    avoided = [_square((x + fraction * _ARROW_M, y)) for fraction in np.linspace(0, 1, 12)]
+    name_parts(axes, scene, others, [*avoided, _square(person)])
+    return axes
+
+
+def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:
+    """Return the limits of a plan, of x and of y (2, 2) [m], with room for names around it.
+
+    ``points`` (point, 2) [m] are those to be shown beside walls and furniture.
+    """
+    corners = [np.asarray(points, dtype=np.float64)]
+    corners += [np.concatenate(foot[:2]).reshape(2, 2) for foot in feet_of_walls(scene)]
+    corners += [piece.triangles().vertices[:, :2] for piece in scene.furniture]
+    every = np.concatenate(corners)
+    low, high = every.min(axis=0), every.max(axis=0)
+    span = high - low
+    margin = 0.3 + 0.08 * span.max() + np.maximum(0, 0.4 * span.max() - span) / 2
+    return np.stack([low - margin, high + margin], axis=1)
+
+
+def height_of_plan(limits: NDArray[np.float64]) -> float:
+    """Return the height [inch] of the picture of a plan, with its title and its note."""
+    wide, high = np.ptp(limits, axis=1)
+    return float(np.clip(5.3 * high / wide, 2.0, 5.5)) + 1.2
+
+
+def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
+    """Draw walls, furniture and reflectors without their names, which `name_parts` writes."""
+    theme = theme_of(axes)
+    page = np.array(to_rgb(theme.page))
+    for piece in scene.furniture:
+        triangles = piece.triangles()
+        corners = triangles.corners[..., :2]
+        (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
+        # Faces that look up cover a closed body; upright ones cover nothing.
+        seen = ax * by - ay * bx
+        covering = corners[seen > 0 if triangles.closed else seen != 0]
+        colour = theme.furniture if triangles.closed else theme.reflector
+        # Boards of a shelf lie over each other, and would add up if they were transparent.
+        pale = tuple((0.45 * np.array(to_rgb(colour)) + 0.55 * page).tolist())
+        axes.add_collection(
+            PolyCollection(list(covering), color=pale, linewidth=0.5), autolim=False
+        )
+        if not triangles.closed:  # a thin sheet of metal, which may be small and upright
+            axes.plot(*corners.reshape(-1, 2).mean(axis=0), "D", color=colour, markersize=5)
+    for first, last, wall in feet_of_walls(scene):
+        behind = wall.thickness_m * wall.normal[:2]
+        axes.fill(*np.array([first, last, last - behind, first - behind]).T, color=theme.wall)
+        axes.plot(*np.array([first, last]).T, color=theme.wall, linewidth=2)
+    axes.set(xlim=limits[0], ylim=limits[1], xlabel="x [m]", ylabel="y [m]")
+    axes.set_aspect("equal")
+
+
+def draw_radar(axes: Axes, position_m: Sequence[float]) -> None:
+    """Draw the radar and an arrow along its boresight, +x."""
+    x, y = position_m
+    colour = theme_of(axes).radar
+    arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.5}
+    axes.annotate("", (x + _ARROW_M, y), (x, y), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
+    axes.plot([x], [y], ">", color=colour, markersize=8)
+
+
+def name_parts(
+    axes: Axes, scene: Scene, first: Sequence[Label] = (), avoided: Sequence[ArrayLike] = ()
+) -> None:
+    """Write the names of walls, reflectors and furniture where they cover nothing.
+
+    Labels in ``first`` get their places before all others, and ``avoided`` are the rectangles
+    (2, 2) [m] that none of them covers. Limits of the axes must be final.
+    """
+    theme = theme_of(axes)
+    feet, pieces = feet_of_walls(scene), []
+    for piece in scene.furniture:
+        triangles = piece.triangles()
+        low, high = triangles.vertices[:, :2].min(axis=0), triangles.vertices[:, :2].max(axis=0)
+        x, y = ((low + high) / 2).tolist()
+        closed, area = triangles.closed, float(np.prod(high - low))
+        places = around((x, y), 0.0 if closed else 12.0)
+        colour = theme.furniture if closed else theme.reflector
+        pieces.append((closed, -area, Label(piece.name, places, colour)))
+    pieces.sort(key=lambda piece: piece[:2])
+    lines = [
+        _square(foot.first + fraction * (foot.last - foot.first))
+        for foot in feet
+        for fraction in np.linspace(0, 1, 100)
+    ]
+    labels = [*first, *(_wall_label(foot, theme.wall) for foot in feet)]
+    labels += [label for *_, label in pieces[:MOST_NAMES]]
+    left_out = len(place_labels(axes, labels, [*avoided, *lines])) + len(pieces[MOST_NAMES:])
+    if left_out:
+        style: dict[str, Any] = {"fontsize": STYLE["font.size"], "color": theme.text, "ha": "right"}
+        style |= {"transform": axes.transAxes, "in_layout": False}
+        axes.text(0.99, 0.015, f"{left_out} pieces are not named", **style)
+
+
+def plan_note(scene: Scene) -> str:
+    """Describe what a plan does not show: floor, ceiling, and other walls that are not upright."""
+    flat = [wall for wall in scene.walls if not _is_upright(wall)]
+    return "; ".join(f"{wall.name}: {_slab(wall)}" for wall in flat).capitalize()
+
+
+def _is_upright(wall: Wall) -> bool:
+    return abs(float(wall.normal[2])) < _UPRIGHT
+
+
+def _slab(wall: Wall) -> str:
+    return f"{wall.material.name}, {1e3 * wall.thickness_m:g} mm"
+
+
+def _square(point: ArrayLike) -> NDArray[np.float64]:
+    """Return two corners of a small square about a point (2,) [m]."""
+    return np.asarray(point) + np.array([[-0.02], [0.02]])
+
+
+def _wall_label(foot: Foot, colour: str) -> Label:
+    """Make a label that stands outside its wall, along it."""
+    first, last, wall = foot
+    along = last - first
+    angle = float(np.degrees(np.arctan2(along[1], along[0])))
+    rotation = (angle + 89.9) % 180 - 89.9
+    outward = -wall.normal[:2] / np.linalg.norm(wall.normal[:2])
+    places = []
+    for distance, depth in ((9, wall.thickness_m), (25, wall.thickness_m), (-10, 0), (-25, 0)):
+        for fraction in (0.5, 0.3, 0.7, 0.15, 0.85):
+            x, y = (first + fraction * along + depth * outward).tolist()
+            places.append(((x, y), (distance * outward[0], distance * outward[1])))
+    return Label(f"{wall.name}: {_slab(wall)}", places, colour, rotation)
