@@ -6,12 +6,13 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
 from rtradar.errors import InputError
 from rtradar.system.checks import check_order
+from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
 MAX_SNR_DB = 200.0
@@ -59,8 +60,7 @@ class RunOptions(SimulationOptions, ProcessingOptions, total=False):
 class RunSettings:
     """The settings of a run, from motion to point cloud.
 
-    Names of models, detectors and window functions, and options of a model, are validated where
-    these are built.
+    Names of window functions, and options of a model, are validated where these are built.
 
     Parameters
     ----------
@@ -111,7 +111,8 @@ class RunSettings:
     Raises
     ------
     InputError
-        If ``snr_db``, ``noise_power_m2``, ``pfa``, ``seed`` or ``order`` is no such value.
+        If ``fidelity`` or ``detector`` is no such name, or ``snr_db``, ``noise_power_m2``, ``pfa``,
+        ``seed`` or ``order`` no such value.
     """
 
     fidelity: str = "specular"
@@ -140,6 +141,8 @@ class RunSettings:
             raise InputError(
                 f"pfa = {self.pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)"
             )
+        MODELS.check(self.fidelity)
+        DETECTORS.check(self.detector)
         check_seed("", self.seed)
         check_order(self.order)
         if self.snr_db == "physical" and not self.spreading:
@@ -177,6 +180,16 @@ def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
     if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
         raise InputError(
             f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0"
+        )
+
+
+def check_fidelities(names: Sequence[str]) -> None:
+    """Raise InputError unless these are two echo models or more to compare, each once."""
+    for name in names:
+        MODELS.check(name)
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise InputError(
+            f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)"
         )
 
 

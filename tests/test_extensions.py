@@ -17,11 +17,11 @@ import pytest
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.motion.formats import READERS
 from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
 from rtradar.scatter import MODELS, build_model
 from rtradar.scene import Wall, material
+from rtradar.system.registries import READERS
 from rtradar.system.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]

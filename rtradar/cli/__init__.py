@@ -117,8 +117,7 @@ def _show_warning(
 
 
 def _parser() -> argparse.ArgumentParser:
-    from importlib.metadata import version
-
+    from rtradar import __version__
     from rtradar.cli import captures, checks, learning, results
     from rtradar.cli.values import OneLineParser
 
@@ -126,9 +125,16 @@ def _parser() -> argparse.ArgumentParser:
         prog="rtradar",
         description="From motion capture to what a 4D MIMO FMCW radar would receive, "
         "and to point clouds.",
+        examples=(
+            "rtradar run synthetic:walk --out out/walk       # then open out/walk/report.html",
+            "rtradar run walk.bvh --scene living-room --out out/room",
+            "rtradar view out/walk                           # the run over time, in the browser",
+            "rtradar compare synthetic:kick --out out/kick   # several models beside each other",
+            "rtradar COMMAND --help                          # options of a command, with examples",
+        ),
     )
-    parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)
+    parser.add_argument("--version", action="version", version=f"rtradar {__version__}")
+    commands = parser.commands()
     for module in (captures, results, learning, checks):
         module.add(commands)
     return parser

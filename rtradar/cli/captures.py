@@ -8,10 +8,18 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import add_files, decibels, number, path, seconds, setting, whole, window
+from rtradar.cli.values import (
+    add_command,
+    add_files,
+    decibels,
+    number,
+    path,
+    seconds,
+    setting,
+    whole,
+    window,
+)
 from rtradar.errors import InputError
-from rtradar.radar import PRESETS
-from rtradar.settings import RunSettings, setting_texts
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
@@ -43,26 +51,46 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
 _ONLY_RUN = (
     "fidelity", "clutter_removal", "body_material", "detector", "order", "keep_all", "save_if",
 )  # fmt: skip
-_DEFAULTS = {field.name: field.default for field in dataclasses.fields(RunSettings)}
 
 
 def add(commands: Subcommands) -> None:
     """Add both commands."""
-    run = commands.add_parser(
-        "run", help="one recording in; maps, clouds, pictures and a summary out"
+    add_command(
+        commands,
+        "run",
+        "simulate one recording, and write maps, clouds, pictures, a report and a summary",
+        _add_run,
+        (
+            "rtradar run synthetic:walk --duration 3 --out out/walk",
+            "rtradar run walk.amc --skeleton walk.asf --scene living-room --out out/room",
+            "rtradar run kick.bvh --radar paper-77ghz --fidelity analytic --out out/kick",
+        ),
     )
+    add_command(
+        commands,
+        "compare",
+        "simulate one recording by several models with the same noise, and show what differs",
+        _add_compare,
+        (
+            "rtradar compare synthetic:kick --out out/kick",
+            "rtradar compare walk.bvh --fidelities analytic,specular,fresnel --out out/levels",
+        ),
+    )
+
+
+def _add_run(run: OneLineParser) -> None:
     _add_capture(run)
     _add_settings(run, _ONLY_RUN)
     run.option(
         "--tolerance-db",
         "X",
-        "of auto: error of a frame's power that will do [dB] (default: 0.5)",
+        "largest error of a frame's power that the level auto accepts [dB] (default: 0.5)",
         type=number,
     )
     run.option(
         "--tolerance-complex",
         "X",
-        "of auto: rms error of the field that will do, over its rms",
+        "largest rms error of the field, over its rms, that the level auto accepts",
         type=number,
     )
     run.add_argument(
@@ -75,14 +103,13 @@ def add(commands: Subcommands) -> None:
     )
     run.set_defaults(command=_run)
 
-    compare = commands.add_parser(
-        "compare", help="one recording by several models, with the same noise, and what differs"
-    )
+
+def _add_compare(compare: OneLineParser) -> None:
     _add_capture(compare)
     compare.option(
         "--fidelities",
         "A,B,...",
-        "two or more, the last is the reference (default: %(default)s)",
+        "two levels or more, of which the last is the reference (default: %(default)s)",
         default="analytic-paper,analytic,specular",
     )
     compare.set_defaults(command=_compare)
@@ -90,20 +117,26 @@ def add(commands: Subcommands) -> None:
 
 def _add_capture(command: OneLineParser) -> None:
     """Add what every command that simulates a capture takes."""
+    from rtradar.system.registries import RADARS, scene_files
+
     command.option(
         "motion",
         "MOTION",
-        "an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack",
+        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch or :jumping_jack",
     )
-    command.option("--skeleton", "ASF", "the .asf of an .amc recording", type=path)
+    command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
     command.option(
         "--radar",
         "NAME|TOML",
-        f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: %(default)s)",
+        f"radar: {', '.join(RADARS)}, or a TOML file (default: %(default)s)",
         default="paper-12ghz",
     )
-    scene = command.add_argument("--scene", default="free-space", metavar="NAME|TOML")
-    command.help_later(scene, lambda: f"{_scenes()}, or a TOML file (default: %(default)s)")
+    command.option(
+        "--scene",
+        "NAME|TOML",
+        f"scene: {', '.join(scene_files())}, or a TOML file (default: %(default)s)",
+        default="free-space",
+    )
     _add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
     command.add_argument(
         "--no-spreading",
@@ -116,12 +149,20 @@ def _add_capture(command: OneLineParser) -> None:
 
 def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
     """Add the options of some settings."""
-    texts = setting_texts()
+    from rtradar.settings import RunSettings, setting_texts
+    from rtradar.system.registries import DETECTORS, MODELS
+
+    defaults, texts = RunSettings(), setting_texts()
+    named = {"fidelity": ("echo model", MODELS), "detector": ("detector", DETECTORS)}
     for name in names:
+        default = getattr(defaults, name)
         flag, how = _FLAGS[name]
         kind, text = texts.get(name, ("", ""))  # Python may have left docstrings out
-        options = {"default": _DEFAULTS[name], **how}
-        if _DEFAULTS[name] is False:
+        if name in named:
+            noun, registry = named[name]
+            text = f"{noun}: {', '.join(registry)}"
+        options = {"default": default, **how}
+        if default is False:
             options["action"] = "store_true"
         elif name == "duration_s":
             text += f" (default: to the end; synthetic: {_SYNTHETIC_S:g})"
@@ -129,25 +170,7 @@ def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
             text += " (default: %(default)s)"
         if kind.startswith("{"):
             options["choices"] = re.findall(r'"([^"]+)"', kind)
-        action = command.add_argument(flag, dest=name, help=text, **options)
-        # The models and the detectors are slow to import.
-        if name == "fidelity":
-            command.help_later(action, lambda: _registered("rtradar.scatter", "MODELS"))
-        elif name == "detector":
-            command.help_later(action, lambda: _registered("rtradar.process", "DETECTORS"))
-
-
-def _registered(module: str, registry: str) -> str:
-    from importlib import import_module
-
-    names = ", ".join(getattr(import_module(module), registry).built_in)
-    return f"{names}, or of a package (default: %(default)s)"
-
-
-def _scenes() -> str:
-    from rtradar.scene.scene import scene_files
-
-    return ", ".join(scene_files())
+        command.add_argument(flag, dest=name, help=text, **options)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -171,10 +194,14 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
+    from rtradar.settings import check_fidelities
+
+    fidelities = [name.strip() for name in options.fidelities.split(",")]
+    check_fidelities(fidelities)
     capture = _capture(options)
     from rtradar.pipeline import compare
 
-    found = compare(**capture, fidelities=[name.strip() for name in options.fidelities.split(",")])
+    found = compare(**capture, fidelities=fidelities)
     if options.json is not None:
         write_json(options.json, found.summary)
     print(found.table())
@@ -185,11 +212,18 @@ def _compare(options: argparse.Namespace) -> int:
 def _capture(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that `run` and `compare` share."""
     check_place(options.json)
-    from rtradar.motion import load_motion, synthetic_motion
+    from rtradar.settings import RunSettings
+
+    given = vars(options)
+    names = [field.name for field in dataclasses.fields(RunSettings) if field.name in given]
+    settings = {name: given[name] for name in names}
+    RunSettings(**settings)  # refuses what is wrong before anything slow is imported
     from rtradar.radar import Radar
     from rtradar.scene import Scene
 
     radar, scene = Radar.load(options.radar), Scene.load(options.scene)
+    from rtradar.motion import load_motion, synthetic_motion
+
     if options.motion.startswith(_SYNTHETIC):
         if options.skeleton is not None:
             raise InputError(
@@ -201,9 +235,10 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
         motion = synthetic_motion(activity, seed=options.seed, duration_s=end_s)
     else:
         motion = load_motion(options.motion, skeleton=options.skeleton)
-    given = vars(options)
-    return {name: given[name] for name in ("out", "overwrite", *_DEFAULTS) if name in given} | {
+    return settings | {
         "motion": motion,
         "radar": radar,
         "scene": scene,
+        "out": options.out,
+        "overwrite": options.overwrite,
     }

@@ -5,25 +5,45 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import path, seconds, whole
+from rtradar.cli.values import add_command, path, seconds, whole
 from rtradar.system.files import check_place
 
 if TYPE_CHECKING:
-    from rtradar.cli.values import Subcommands
+    from rtradar.cli.values import OneLineParser, Subcommands
 
 
 def add(commands: Subcommands) -> None:
     """Add the three commands."""
-    doctor = commands.add_parser(
-        "doctor", help="which ray-tracing backends work on this machine, and what to install"
+    add_command(
+        commands,
+        "doctor",
+        "say which ray-tracing backends work on this machine, and what to install",
+        _add_doctor,
+        ("rtradar doctor", "rtradar doctor --json doctor.json"),
     )
+    add_command(
+        commands,
+        "validate",
+        "hold every claim against its reference, with status 1 where one fails",
+        _add_validate,
+        ("rtradar validate --quick", "rtradar validate --only doppler --figure out/figures"),
+    )
+    add_command(
+        commands,
+        "bench",
+        "measure the time of every stage, beside other models, the paper's method and bounds",
+        _add_bench,
+        ("rtradar bench --quick", "rtradar bench --only kernels --json kernels.json"),
+    )
+
+
+def _add_doctor(doctor: OneLineParser) -> None:
     doctor.option("--json", "FILE", "write the findings there as JSON", type=path)
     doctor.set_defaults(command=_doctor)
 
-    validate = commands.add_parser(
-        "validate", help="hold every claim against its reference; 1 where one fails"
-    )
-    validate.flag("--quick", "fewer cases of each claim")
+
+def _add_validate(validate: OneLineParser) -> None:
+    validate.flag("--quick", "check fewer cases of each claim")
     validate.option(
         "--only", "NAME", "one claim by its key (sphere, path, doppler, ...), or one script"
     )
@@ -34,10 +54,8 @@ def add(commands: Subcommands) -> None:
     )
     validate.set_defaults(command=_validate)
 
-    bench = commands.add_parser(
-        "bench",
-        help="how long every stage takes, beside other models, the paper's method and floors",
-    )
+
+def _add_bench(bench: OneLineParser) -> None:
     bench.option(
         "--radar",
         "A,B,...",
@@ -58,7 +76,7 @@ def add(commands: Subcommands) -> None:
     bench.option(
         "--only", "PART", "models (with the paper's method and floors), growth, or kernels"
     )
-    bench.flag("--quick", "little of everything, in some minutes")
+    bench.flag("--quick", "measure little of everything, in some minutes")
     bench.option("--json", "FILE", "write all that is measured there as JSON", type=path)
     bench.option("--figure", "FILE", "draw it there, as PNG", type=path)
     bench.set_defaults(command=_bench)

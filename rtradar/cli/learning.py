@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rtradar.cli.values import (
     OVERWRITE_HELP,
     OneLineParser,
+    add_command,
     add_files,
     count,
     number,
@@ -24,27 +25,31 @@ if TYPE_CHECKING:
 
 def add(commands: Subcommands) -> None:
     """Add the three commands."""
-    _add_dataset(
-        commands.add_parser(
-            "dataset",
-            help="labelled point clouds of many recordings, radars, scenes and fidelities",
-        )
+    add_command(
+        commands,
+        "dataset",
+        "make labelled point clouds of many recordings, radars, scenes and fidelities",
+        _add_dataset,
+        ("rtradar dataset build set.toml --out out/clouds",),
     )
-    _add_train(
-        commands.add_parser(
-            "train",
-            help="learn to tell activities apart from a folder of clouds; started again it goes on",
-        )
+    add_command(
+        commands,
+        "train",
+        "learn to tell activities apart from a folder of clouds; started again it goes on",
+        _add_train,
+        ("rtradar train out/clouds --out out/trained --split subject",),
     )
-    _add_evaluate(
-        commands.add_parser("evaluate", help="how well trained classifiers do: tables and pictures")
+    add_command(
+        commands,
+        "evaluate",
+        "say how well trained classifiers do, in tables and pictures",
+        _add_evaluate,
+        ("rtradar evaluate out/trained --baselines",),
     )
 
 
 def _add_dataset(dataset: OneLineParser) -> None:
-    build = dataset.add_subparsers(
-        required=True, metavar="COMMAND", parser_class=OneLineParser
-    ).add_parser(
+    build = dataset.commands().add_parser(
         "build",
         help="make the samples of a collection that are missing or damaged; may be run again",
     )

@@ -7,19 +7,36 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import add_files, path, seconds
+from rtradar.cli.values import add_command, add_files, path, seconds
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
-    from rtradar.cli.values import Subcommands
+    from rtradar.cli.values import OneLineParser, Subcommands
 
 
 def add(commands: Subcommands) -> None:
     """Add both commands."""
-    view = commands.add_parser(
-        "view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser"
+    add_command(
+        commands,
+        "view",
+        "show body, room, paths, echoes, maps and cloud of a run over time, in the browser",
+        _add_view,
+        ("rtradar view out/walk", "rtradar view out/walk --still picture.png --time 1.2"),
     )
+    add_command(
+        commands,
+        "export",
+        "write IF samples for MATLAB, xarray or as int16, and clouds as PLY or PCD",
+        _add_export,
+        (
+            "rtradar export out/walk --out samples.mat       # of a run with --save-if",
+            "rtradar export out/walk/cloud_xyz.npz --out cloud.pcd",
+        ),
+    )
+
+
+def _add_view(view: OneLineParser) -> None:
     view.option("folder", "DIR", "folder of 'rtradar run --out DIR'", type=path)
     view.option(
         "--out",
@@ -41,9 +58,8 @@ def add(commands: Subcommands) -> None:
     add_files(view, json="write what was shown and written there")
     view.set_defaults(command=_view)
 
-    export = commands.add_parser(
-        "export", help="IF samples for MATLAB, xarray or as int16, clouds as PLY or PCD"
-    )
+
+def _add_export(export: OneLineParser) -> None:
     export.option(
         "source",
         "SOURCE",

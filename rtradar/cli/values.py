@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -16,11 +16,50 @@ if TYPE_CHECKING:
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Argument parser that reports an error in one line, and imports for a help text on demand."""
+    """Argument parser that reports an error in one line, and knows its options only once asked.
 
-    def __init__(self, **options: Any) -> None:
-        self._later: list[tuple[argparse.Action, Callable[[], str]]] = []
-        super().__init__(**options)
+    Parameters
+    ----------
+    fill : callable, optional
+        Function that adds the options to the parser, called before it parses or shows its help.
+        Only the command that is typed pays for its options.
+    examples : sequence of str
+        Command lines that the help shows at its end.
+    **options
+        What `argparse.ArgumentParser` takes.
+    """
+
+    def __init__(
+        self,
+        *,
+        fill: Callable[[OneLineParser], None] | None = None,
+        examples: Sequence[str] = (),
+        **options: Any,
+    ) -> None:
+        self._fill = fill
+        if examples:
+            options["epilog"] = "\n  ".join(["examples:", *examples])
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
+    def commands(self) -> Subcommands:
+        """Return what commands are added to; without a command, the help is shown."""
+
+        def show_help(_: argparse.Namespace) -> int:
+            self.print_help()
+            return 0
+
+        self.set_defaults(command=show_help)
+        return self.add_subparsers(metavar="COMMAND", parser_class=OneLineParser)
+
+    def _filled(self) -> None:
+        fill, self._fill = self._fill, None
+        if fill is not None:
+            fill(self)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse the arguments that are known."""
+        self._filled()
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
@@ -34,15 +73,22 @@ class OneLineParser(argparse.ArgumentParser):
         """Add an option without a value; ``text`` is its help."""
         self.add_argument(name, action="store_true", help=text)
 
-    def help_later(self, action: argparse.Action, text: Callable[[], str]) -> None:
-        """Set the help of an option to this text once the help is asked for."""
-        self._later.append((action, text))
-
     def format_help(self) -> str:
         """Return the help."""
-        for action, text in self._later:
-            action.help = text()
+        self._filled()
         return super().format_help()
+
+
+def add_command(
+    commands: Subcommands,
+    name: str,
+    text: str,
+    fill: Callable[[OneLineParser], None],
+    examples: Sequence[str],
+) -> None:
+    """Add a command: what it does in a phrase, its options, and examples of its use."""
+    described = f"{text[0].upper()}{text[1:]}."
+    commands.add_parser(name, help=text, description=described, fill=fill, examples=examples)
 
 
 def add_files(command: OneLineParser, *, out: str = "", json: str) -> None:

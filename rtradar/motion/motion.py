@@ -7,10 +7,10 @@ import math
 import threading
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
@@ -18,6 +18,9 @@ from rtradar.motion import display
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 Array = NDArray[np.float64]
 
@@ -218,6 +221,8 @@ class Motion:
 
     def _splines(self, block: int) -> tuple[PPoly, PPoly]:
         """Splines of the root and the rotations for one block of frames, which saves memory."""
+        from scipy.interpolate import CubicSpline, PchipInterpolator  # slow to import
+
         with _splines_lock:
             if block not in self._kept_splines:
                 first = max(0, block * _BLOCK_FRAMES - _BLOCK_MARGIN)

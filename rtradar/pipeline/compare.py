@@ -25,7 +25,7 @@ from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings
+from rtradar.settings import RunOptions, RunSettings, check_fidelities
 from rtradar.system.output_folder import atomic_folder
 
 _MEASURES = (
@@ -124,15 +124,7 @@ def compare(
         As in `run`.
     """
     names = list(fidelities)
-    for name in names:
-        if name not in MODELS:
-            raise InputError(
-                f"fidelity '{name}' is unknown; allowed: {', '.join(MODELS)} (--fidelities)"
-            )
-    if len(names) < 2 or len(set(names)) < len(names):
-        raise InputError(
-            f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)"
-        )
+    check_fidelities(names)
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     settings = RunSettings(**options)

@@ -9,7 +9,6 @@ from rtradar.process.angles import (
     range_elevation,
 )
 from rtradar.process.cfar import (
-    DETECTORS,
     Detector,
     build_detector,
     ca_cfar,
@@ -27,6 +26,7 @@ from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, r
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
 from rtradar.process.steering import measured_angles
 from rtradar.process.window_functions import WindowFunctions
+from rtradar.system.registries import DETECTORS
 
 __all__ = [
     "CLUTTER_REMOVALS",

@@ -24,20 +24,13 @@ from scipy.special import betainccinv, betaincinv, gammainc, gammaincc, gammaln
 
 from rtradar.errors import InputError
 from rtradar.kernels.cfar import os_cfar_rows
-from rtradar.system.registry import Registry
+from rtradar.system.registries import DETECTORS
 from rtradar.system.threads import thread_map
 
 _ROWS_A_THREAD = 64
 
 Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
 """Power (range, velocity) in, mask of the same shape out."""
-
-DETECTORS = Registry(
-    "rtradar.detectors",
-    "detector",
-    {"os-cfar": "rtradar.process.cfar:os_cfar", "ca-cfar": "rtradar.process.cfar:ca_cfar"},
-)
-"""Functions of power (range, velocity), ``pfa`` and ``looks``, the channels summed in the power."""
 
 register_detector = DETECTORS.register
 

@@ -24,16 +24,9 @@ from rtradar.errors import InputError
 from rtradar.radar import display
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.system.checks import check_keys, printable, read_toml
-from rtradar.system.registry import Registry
+from rtradar.system.registries import RADARS
 
-PRESETS = Registry(
-    "rtradar.radars",
-    "radar",
-    {
-        "paper-12ghz": "rtradar.radar.presets:paper_12ghz",
-        "paper-77ghz": "rtradar.radar.presets:paper_77ghz",
-    },
-)
+PRESETS = RADARS
 """Radars that have a name: each is made by a function without arguments."""
 
 register_radar = PRESETS.register

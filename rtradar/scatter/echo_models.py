@@ -18,23 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.antenna_gain import is_shaped, through_antennas
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scene import Scene
-from rtradar.system.registry import Registry
-
-MODELS = Registry(
-    "rtradar.models",
-    "fidelity",
-    {
-        "analytic-paper": "rtradar.scatter.models.analytic:AnalyticPaper",
-        "analytic": "rtradar.scatter.models.analytic:Analytic",
-        "specular": "rtradar.scatter.models.specular:Specular",
-        "fresnel": "rtradar.scatter.models.fresnel:Fresnel",
-        "physical-optics": "rtradar.scatter.models.physical_optics:PhysicalOptics",
-        "rays": "rtradar.scatter.models.rays:Rays",
-        "reference": "rtradar.scatter.models.reference:Reference",
-        "auto": "rtradar.scatter.models.auto:Auto",
-    },
-)
-"""Every model, cheapest first, the one that chooses among them, and those of other packages."""
+from rtradar.system.registries import MODELS
 
 register_model = MODELS.register
 

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter.echo_models import MODELS, models_that
+from rtradar.scatter.echo_models import models_that
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.target import target_geometry
 from rtradar.scatter.validity import warn_of_small_radii
+from rtradar.system.registries import MODELS
 
 if TYPE_CHECKING:
     import trimesh

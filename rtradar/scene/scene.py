@@ -32,7 +32,7 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
-from rtradar.system.files import shipped_folder
+from rtradar.system.registries import scene_files
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -239,11 +239,6 @@ class Scene:
                     "are needed"
                 )
         return placed
-
-
-def scene_files() -> dict[str, Path]:
-    """Find the scenes that come with rtradar, by name."""
-    return {file.stem: file for file in sorted(shipped_folder("scenes").glob("*.toml"))}
 
 
 def _named(name: str) -> Path:

@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import secrets
 import shutil
 import stat
 import sys
@@ -19,12 +18,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO, TypeVar, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO, TypeVar, cast
 
 from rtradar.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _MOST_JSON_BYTES = 100_000_000
 _TOKEN_BYTES = 6
@@ -65,7 +64,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
                 f"cannot write '{target}': what has that name is no file; give another path"
             )
     # Not by the process alone: on a shared disk another machine may write the same file.
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(_TOKEN_BYTES)}.part")
+    beside = target.with_name(f".{target.name}.{os.urandom(_TOKEN_BYTES).hex()}.part")
     with cleanup_on_exit(lambda: beside.unlink(missing_ok=True)):
         try:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
@@ -238,6 +237,8 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
     Raises OSError if it cannot be read, and ValueError if it is no such archive, is damaged, claims
     more than it holds, or is larger than ``most_bytes`` when unpacked.
     """
+    import numpy as np  # the command line refuses input before it takes that long
+
     found = {}
     with open_regular(path) as file:
         try:
@@ -261,6 +262,8 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
 
 def _check_claim(member: Any, size: int) -> None:
     """Raise if an array claims more memory than its file has: NumPy allocates before it reads."""
+    import numpy as np
+
     version = np.lib.format.read_magic(member)
     read_header = (
         np.lib.format.read_array_header_1_0
@@ -274,6 +277,8 @@ def _check_claim(member: Any, size: int) -> None:
 
 def _check_text(array: NDArray[Any]) -> None:
     """Raise if a text holds a number that is no character, which Python cannot show."""
+    import numpy as np
+
     if array.dtype.kind == "U" and array.dtype.itemsize:
         letters = (
             np.ascontiguousarray(array.astype(array.dtype.newbyteorder("=")))

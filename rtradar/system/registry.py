@@ -86,11 +86,15 @@ class Registry(Mapping[str, Callable[..., Any]]):
         ExtensionError
             Where it cannot be loaded, or two packages have one of that name.
         """
+        self.check(name, instead=instead)
+        return self[name]
+
+    def check(self, name: str, *, instead: str = "") -> None:
+        """Raise InputError, as `find` does, if there is none of that name; load nothing."""
         if name not in self:
             raise InputError(
                 f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}"
             )
-        return self[name]
 
     def __getitem__(self, name: str) -> Any:
         installed = self._installed.get(name, [])

@@ -29,7 +29,7 @@ def test_the_help_of_run_names_every_model(capsys: pytest.CaptureFixture[str]) -
     with pytest.raises(SystemExit):
         parser.parse_args(["run", "--help"])
     words = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
-    listed = words.partition("--fidelity NAME ")[2].partition(", or of a package")[0]
+    listed = words.partition("--fidelity NAME echo model: ")[2].partition(" (default")[0]
     assert listed.split(", ") == list(MODELS.built_in)
     own = inspect.signature(MODELS["auto"]).parameters["tolerance_db"].default
-    assert f"that will do [dB] (default: {own:g})" in words
+    assert f"that the level auto accepts [dB] (default: {own:g})" in words

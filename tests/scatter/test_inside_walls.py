@@ -16,7 +16,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.inside_walls import Inside
 from rtradar.scatter.link_budget import link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene import scene_files
+from rtradar.system.registries import scene_files
 
 RADAR = rt.Radar(
     name="small",

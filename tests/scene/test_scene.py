@@ -14,7 +14,7 @@ import rtradar
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene import scene_files
+from rtradar.system.registries import scene_files
 
 
 def refusal(source: str | Path) -> str:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.scene import Scene
-from rtradar.scene.scene import scene_files
+from rtradar.system.registries import scene_files
 
 ROOM = """
 [room]

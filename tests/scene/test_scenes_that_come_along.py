@@ -8,7 +8,7 @@ import pytest
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.scene.objects import ROOM_SIDES
-from rtradar.scene.scene import scene_files
+from rtradar.system.registries import scene_files
 
 NAMES = list(scene_files())
 ROOMS = [name for name in NAMES if Scene.load(name).walls]

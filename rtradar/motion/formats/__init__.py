@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 import inspect
+import os
 from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.system.files import special_kind
-from rtradar.system.registry import Registry
-
-READERS = Registry(
-    "rtradar.readers",
-    "motion reader",
-    {
-        "amc": "rtradar.motion.formats.acclaim:load_amc",
-        "bvh": "rtradar.motion.formats.bvh:load_bvh",
-        "c3d": "rtradar.motion.formats.c3d:load_c3d",
-    },
-)
-"""Readers of motion files, by the ending of the file without the dot."""
+from rtradar.system.registries import READERS
 
 register_reader = READERS.register
 
@@ -63,6 +53,10 @@ def load_motion(
     # Readers of other packages may take folders, and names of what is no file; none may wait.
     if kind := special_kind(file):
         raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
+    # Before the reader is loaded, which takes longer.
+    for needed in (file, skeleton) if name in READERS.built_in else ():
+        if needed is not None and not os.path.lexists(needed):
+            raise InputError(f"{needed}: there is no such file; check the path")
     read = READERS[name]
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters

@@ -17,13 +17,15 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from rtradar.motion.skeleton import NODES
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -139,6 +141,8 @@ def about(**angles: Array | float) -> Rotation:
 
     Angles (n,) give n rotations.
     """
+    from scipy.spatial.transform import Rotation  # slow to import
+
     rotations = (Rotation.from_euler(axis, np.asarray(a)[..., None]) for axis, a in angles.items())
     return reduce(operator.mul, rotations)
 
@@ -182,6 +186,8 @@ def bend(
 
 def _hanging(direction: Array, hinge: Array) -> Rotation:
     """Rotation of a bone that at rest hangs down with its hinge to the left."""
+    from scipy.spatial.transform import Rotation  # slow to import
+
     return Rotation.from_matrix(np.stack([np.cross(hinge, -direction), hinge, -direction], axis=2))
 
 
@@ -232,6 +238,8 @@ def lowering(pose: Pose, height_m: float) -> float:
 
 def rotations(pose: Pose, height_m: float) -> Array:
     """Rotations (n, node, 4) of all bones of a pose."""
+    from scipy.spatial.transform import Rotation  # slow to import
+
     bones = offsets(height_m)
     bent = (pose.pelvis.inv() * pose.thorax).as_rotvec()
     nod = (pose.thorax.inv() * pose.head).as_rotvec()

@@ -9,7 +9,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rtradar.motion.synthetic.figure import (
     ANKLE,
@@ -124,6 +123,8 @@ def _foot(own: list[Step], subject: Subject) -> Callable[[Array], tuple[Array, A
 
 def walk(duration_s: float, subject: Subject) -> PosesAt:
     """A walk, facing and starting along +x."""
+    from scipy.interpolate import CubicSpline  # slow to import
+
     steps = footprints(subject, duration_s)
     over = np.array([step.time + MIDSTANCE * subject.cycle_s for step in steps])
     middles = np.array([step.middle for step in steps])

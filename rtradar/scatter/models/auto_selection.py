@@ -32,10 +32,10 @@ from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.common.interpolation import array_nodes
 from rtradar.scatter.common.poses import ChirpPoses
-from rtradar.scatter.echo_models import MODELS
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.system.registries import MODELS
 from rtradar.trace.body_tracer import BodyTracer
 
 CANDIDATES = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
