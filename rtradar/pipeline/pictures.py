@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.processing import Clouds
-from rtradar.report.figures import maps as figures
 from rtradar.report.figures import rooms
+from rtradar.report.figures.canvas import save_figure
+from rtradar.report.figures.plots import Plots
+from rtradar.report.figures.plots import thinned as average
 from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.system.figure_style import new_figure
 
-_COLUMNS = 600
-"""Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""
-
-_SPATIAL_DOTS = 20_000
 _TRACK_POINTS = 400
 
 
@@ -30,51 +31,30 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
     Returns the PNG files by their titles, in the order in which they are best looked at.
     """
     drawn: dict[str, Path] = {}
-    radar, title, spreading = capture.radar, capture.title, capture.settings.spreading
-    options: Any = {"spreading": spreading, "window_functions": capture.processing.window_functions}
-
-    def to(name: str, file: str) -> Path:
-        drawn[name] = folder / file
-        return drawn[name]
-
-    with h5py.File(folder / "maps.h5") as maps:
-        power, times = thinned(maps, "range_time", "slow_time")
-        heading = title + removed(maps["range_time"])
-        file = to("Range over time", "range_time.png")
-        figures.draw_range_time(file, power, times, radar, heading, spreading=spreading)
-        if len(maps["spectrogram_time"]):
-            power, times = thinned(maps, "spectrogram", "spectrogram_time")
-            velocity = maps["spectrogram_velocity"][:]
-            heading = title + removed(maps["spectrogram"])
-            file = to("Spectrogram", "spectrogram.png")
-            figures.draw_spectrogram(file, power, times, velocity, radar, heading, **options)
-        frame = busiest_frame(maps)
-        cleaned = removed(maps["range_doppler"])
-        heading = f"{title}, window at {float(maps['time'][frame]):.2f} s{cleaned}"
-        power, mask = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
-        file = to("Range-Doppler map and detections", "range_doppler.png")
-        figures.draw_range_doppler(file, power, mask, radar, heading, spreading=spreading)
-        angles = {
-            angle: (maps[f"range_{angle}"][frame], maps[angle][:])
-            for angle in ("azimuth", "elevation")
-            if angle in maps
+    parameters = {"parameters": capture.settings.parameters()}
+    with open_maps(folder / "maps.h5") as maps:
+        found = maps, clouds.rdt.points, clouds.spatial, capture.radar, parameters
+        plots = Plots(*found, new_figure=new_figure)
+        angles = [name for name in ("azimuth", "elevation") if name in maps]
+        pictures: dict[str, tuple[str, Callable[[], Axes]]] = {
+            "Range over time": ("range_time.png", plots.range_time)
         }
+        if len(maps["spectrogram_time"]):
+            pictures["Spectrogram"] = "spectrogram.png", plots.spectrogram
+        name = "Range-Doppler map and detections"
+        pictures[name] = "range_doppler.png", plots.range_doppler
         if angles:
-            panels = " and ".join(f"range-{angle}" for angle in angles).capitalize()
-            file = to(panels, "range_angle.png")
-            figures.draw_range_angle(file, angles, radar, heading, **options)
-        heading = title + cleaned
-        figures.draw_rdt_cloud(
-            to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, heading
-        )
+            name = " and ".join(f"range-{angle}" for angle in angles).capitalize()
+            pictures[name] = "range_angle.png", plots.range_angle
+        pictures["Range-Doppler-time cloud"] = "cloud_rdt.png", plots.rdt
         if angles:
-            strongest = clouds.spatial.strongest()
-            every = math.ceil(max(len(strongest.points), 1) / _SPATIAL_DOTS)
-            points, velocity = strongest.points[::every], strongest.velocity[::every]
-            file = to("Spatial cloud", "cloud_xyz.png")
-            figures.draw_spatial_cloud(file, points, velocity, radar, heading)
+            pictures["Spatial cloud"] = "cloud_xyz.png", plots.spatial
+        for name, (file, draw) in pictures.items():
+            drawn[name] = folder / file
+            save_figure(draw().get_figure(root=True), drawn[name])
         if capture.inside:
-            drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
+            with h5py.File(folder / "maps.h5") as file:
+                drawn |= _draw_room(folder, capture, capture.inside, file, plots.frame()[0])
     return drawn
 
 
@@ -141,7 +121,4 @@ def busiest_frame(maps: Any) -> int:
 
 def thinned(maps: Any, name: str, axis: str) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
     """Return a map (time, ...) and its times [s], averaged to a few hundred steps."""
-    every = math.ceil(len(maps[axis]) / _COLUMNS)
-    starts = range(0, len(maps[axis]), every)
-    times = np.array([maps[axis][first : first + every].mean() for first in starts])
-    return np.stack([maps[name][first : first + every].mean(axis=0) for first in starts]), times
+    return average(maps[name], maps[axis][:])

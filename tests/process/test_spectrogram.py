@@ -4,13 +4,11 @@ blocks."""
 from __future__ import annotations
 
 import tracemalloc
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from matplotlib.image import imread
 from numpy.typing import NDArray
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
@@ -19,7 +17,6 @@ from rtradar.errors import InputError
 from rtradar.process import WindowFunctions, clutter_removal, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, spectrogram
 from rtradar.radar import Radar
-from rtradar.report.figures.maps import draw_spectrogram
 
 pytestmark = pytest.mark.drawn
 
@@ -254,19 +251,3 @@ def test_there_is_no_such_channel(channel: int) -> None:
 def test_a_block_of_another_radar_is_refused() -> None:
     with pytest.raises(InputError, match="needs"):
         SlidingSpectrogram(LOW).push(np.zeros((12, 8, 255), np.complex64))
-
-
-def test_the_picture_shows_the_echo_where_it_is(tmp_path: Path) -> None:
-    found = spectrogram(turning(LOW, 4.0, 600), LOW)
-    draw_spectrogram(
-        tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s"
-    )
-    shown = imread(tmp_path / "s.png")[:, :, :3]
-    # The brightest yellow of the colours, left of the colour bar, is in the upper half:
-    # velocity rises upward.
-    rows, columns = np.nonzero(np.abs(shown - [0.993, 0.906, 0.144]).max(axis=2) < 0.02)
-    line = rows[columns < 0.8 * shown.shape[1]]
-    assert len(line) > 100
-    # 4 of +-7.14 m/s is 22 % from the top of the axes, which fill the picture but for title and
-    # labels.
-    assert 0.2 < line.mean() / shown.shape[0] < 0.35

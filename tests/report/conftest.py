@@ -13,14 +13,20 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import matplotlib.image
 import numpy as np
 import pytest
+import xarray as xr
 from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.clouds import SpatialCloud
+from rtradar.report.figures.plots import Plots
+from rtradar.system.figure_style import new_figure
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -225,3 +231,52 @@ def browser(chromium: Browser) -> Iterator[Browser]:
     yield chromium
     with contextlib.suppress(AssertionError, OSError):  # after a failure it may not answer
         chromium.call("Page.navigate", url="about:blank")
+
+
+Drawer = Callable[..., Plots]
+
+
+@pytest.fixture
+def plots_of() -> Drawer:
+    """Make the pictures of small maps, given or random, on figures that are no window."""
+
+    def made(radar: rt.Radar, *, title: str = "run", **given: Any) -> Plots:
+        rng = np.random.default_rng(0)
+        n_range, n_velocity = radar.samples_per_chirp, given.pop("n_velocity", 8)
+        parameters = given.pop("parameters", {})
+        points = given.pop("points", rng.uniform([0, 0.3, -1], [1, 0.6, 1], (10, 3)))
+        spatial = given.pop(
+            "spatial", SpatialCloud(points, points[:, 2], points[:, 0] + 1, points[:, 0])
+        )
+        power = given.pop("power", rng.exponential(size=(n_range, n_velocity)))
+        angles = np.linspace(-1, 1, 8)
+        values: dict[str, tuple[tuple[str, ...], Any]] = {
+            "range_doppler": (("time", "range", "velocity"), power[None]),
+            "detections": (("time", "range", "velocity"), given.pop("mask", power > 2)[None]),
+            "range_time": (("slow_time", "range"), np.ones((8, n_range))),
+            "spectrogram": (
+                ("spectrogram_time", "spectrogram_velocity"),
+                np.ones((16, n_velocity)),
+            ),
+            "range_azimuth": (("time", "range", "azimuth"), np.ones((1, n_range, 8))),
+        }
+        axes = {
+            "time": [0.5],
+            "range": radar.range_m,
+            "velocity": radar.velocity_mps(n_velocity),
+            "slow_time": np.arange(8.0),
+            "spectrogram_time": np.arange(16.0),
+            "spectrogram_velocity": radar.velocity_mps(n_velocity),
+            "azimuth": angles,
+        }
+        for name, value in given.items():
+            if name in axes:
+                axes[name] = value
+            else:
+                values[name] = (values[name][0], value)
+        maps = xr.Dataset(values, axes, {"title": title})
+        return Plots(
+            maps, points, spatial, radar, {"parameters": parameters}, new_figure=new_figure
+        )
+
+    return made

@@ -34,7 +34,7 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar import Radar
-from rtradar.system.figure_style import dress, theme_of
+from rtradar.system.figure_style import STYLE, dress, fit, theme_of
 
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
@@ -96,7 +96,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), dpi=130, layout="constrained")
 
 
-def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
+def save_figure(figure: Any, file: Path | BinaryIO) -> None:
     """Save in the format of the path's suffix, or as PNG to an open file, and clear the figure.
 
     Figure and axes refer to each other. Without clearing, the memory of one picture could
@@ -182,6 +182,10 @@ def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any)
     """Put a colour bar beside axes that are dressed, with this label."""
     figure: Any = axes[0].get_figure(root=True)
     extend = "min" if isinstance(image, AxesImage) else "neither"
+    bounds = [one.get_position() for one in axes]
+    height = max(one.y1 for one in bounds) - min(one.y0 for one in bounds)
+    height_pt = 72 * height * figure.get_size_inches()[1]
+    label = fit(label, height_pt, STYLE["axes.labelsize"])
     bar = figure.colorbar(image, ax=list(axes), label=label, extend=extend, **options)
     dress(bar.ax, grid=False)
     bar.outline.set_edgecolor(theme_of(axes[0]).faint)

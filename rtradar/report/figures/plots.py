@@ -99,7 +99,7 @@ class Plots:
         Axes
             Axes of the map.
         """
-        frame, when = self._frame(time_s)
+        frame, when = self.frame(time_s)
         map_, mask = self.maps["range_doppler"][frame], self.maps["detections"][frame].values > 0
         unit = self._unit(range_m=self.radar.range_m[:, None])
         level = unit.level(map_.values / self.radar.n_channels)
@@ -115,15 +115,16 @@ class Plots:
         image, colours = draw_view(left, level, velocity, distance, view, unit=unit)
         left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
         note = f"{colours} {self._masking_note(map_.values, mask)}"
-        title = self._title(f"Range-Doppler map, {when}", map_)
+        what = "Range-Doppler map"
+        what += f" and {np.count_nonzero(mask)} detections" if right is not None else ""
+        title = self._title(f"{what},\n{when}", map_)
         axes = [left]
         if right is not None:
             rows, columns = np.nonzero(mask)
             colour = theme_of(right).detection
             right.scatter(velocity[columns], distance[rows], s=3, color=colour, linewidths=0)
             right.set_xlabel(_TWO_LINES)
-            dress(right, title=f"{len(rows)} detections")
-            title += "\nMap"
+            dress(right)
             axes.append(right)
         dress(left, title=title, note=note, grid=False, across=len(axes))
         add_colour_bar(image, axes, unit.label("mean of channels"))
@@ -144,7 +145,7 @@ class Plots:
         """
         axes = self._axes(ax)
         data = self.maps["range_time"]
-        power, times = thinned(data, "slow_time")
+        power, times = thinned(data, self.maps["slow_time"].values)
         unit = self._unit(range_m=self.radar.range_m)
         view = None, self._range_limits
         level = unit.level(power).T
@@ -178,7 +179,7 @@ class Plots:
                 "spectrogram: the capture is shorter than one window; simulate a longer one"
             )
         axes = self._axes(ax)
-        power, times = thinned(data, "spectrogram_time")
+        power, times = thinned(data, self.maps["spectrogram_time"].values)
         velocity = self.maps["spectrogram_velocity"].values
         # One echo is spread over as many range bins.
         power = power / noise_bandwidth_bins(
@@ -299,6 +300,7 @@ class Plots:
         dots = rdt_points(axes, points[shown], "", fastest=max(abs(slow), abs(fast)), s=4)
         axes.set(ylim=(low, high), zlim=(slow, fast), zlabel="Velocity [m/s]")
         axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
+        axes.xaxis.labelpad = axes.yaxis.labelpad = 10
         title = f"Range-Doppler-time cloud, {_drawn(len(points), int(shown.sum()))}"
         dress(axes, title=self._title(title, self.maps["range_doppler"]))
         add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
@@ -343,7 +345,7 @@ class Plots:
         }
         heading = f"Spatial cloud, {_drawn(len(self.spatial_cloud.points), len(points))}"
         note = "Drawn: the points at most 40 dB below the strongest"
-        note += f", each {every}th of them." if every > 1 else "."
+        note += f", one in {every} of them." if every > 1 else "."
         place = self.radar.position_m
         limits = [_of_values(points[:, axis], place[axis]) for axis in range(3)]
         width = limits[0][1] - limits[0][0]
@@ -352,6 +354,7 @@ class Plots:
         else:
             # As high as equal scales make the panels, with their titles, labels and notes.
             high = [4.3 * (limits[up][1] - limits[up][0]) / width for up in ups]
+            high = [height * min(1, 7 / sum(high)) for height in high]
             figure = self.new_figure(sum(high) + 0.7 * len(ups) + 0.9)
             panels = list(figure.subplots(len(ups), 1, squeeze=False, height_ratios=high)[:, 0])
         for axes, up in zip(panels, ups, strict=True):
@@ -368,6 +371,39 @@ class Plots:
             dress(axes, title=title, note=note if axes is panels[-1] else "")
         add_colour_bar(dots, panels, VELOCITY_LABEL)
         return panels[0]
+
+    def frame(self, time_s: float | None = None) -> tuple[int, str]:
+        """Return the index of a frame, and the words for it in a title.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time [s], to which the nearest frame is taken. If left out, it is the frame in which the
+            detected cells of what moves have most power; without any, those of what stands still.
+
+        Returns
+        -------
+        index : int
+            Index of the frame.
+        words : str
+            Words such as ``window at 1.20 s``.
+
+        Raises
+        ------
+        InputError
+            If the time is not within the capture.
+        """
+        times = self.maps["time"].values
+        if time_s is None:
+            frame = int(self._found.moving.argmax())
+            return frame, f"window of most energy, at {times[frame]:.2f} s"
+        half = self.radar.frame_duration_s / 2
+        if not times[0] - half <= time_s <= times[-1] + half:
+            raise InputError(
+                f"time_s = {time_s}; the frames are from {times[0]:.3f} to {times[-1]:.3f} s"
+            )
+        frame = int(np.abs(times - time_s).argmin())
+        return frame, f"window at {times[frame]:.2f} s"
 
     # -- what the pictures share -------------------------------------------------------------------
 
@@ -409,39 +445,25 @@ class Plots:
         masks, maps = self.maps["detections"], self.maps["range_doppler"]
         n_frames, n_range, n_velocity = maps.shape
         by_range, by_velocity = np.zeros(n_range), np.zeros(n_velocity)
-        moving = np.zeros(n_frames)
+        moving, still = np.zeros(n_frames), np.zeros(n_frames)
         # Not static clutter, which fills the main lobe of the window function at velocity 0.
-        still = 2.5 * self.radar.velocity_bin_mps
-        walks = np.abs(self.maps["velocity"].values) > still
+        moves = np.abs(self.maps["velocity"].values) > 2.5 * self.radar.velocity_bin_mps
         for first in range(0, n_frames, _FRAMES_AT_ONCE):
             some = slice(first, first + _FRAMES_AT_ONCE)
             mask = masks[some].values > 0
             by_range += mask.sum(axis=(0, 2))
             by_velocity += mask.sum(axis=(0, 1))
             power = np.where(mask, maps[some].values, 0)
-            moving[some] = power[..., walks].sum(axis=(1, 2))
-            if not moving[some].any():
-                moving[some] = 1e-30 * power.sum(axis=(1, 2))
-        return _Found(by_range, by_velocity, moving)
-
-    def _frame(self, time_s: float | None) -> tuple[int, str]:
-        """Index of the frame, and its words for a title."""
-        times = self.maps["time"].values
-        if time_s is None:
-            frame = int(self._found.moving.argmax())
-            return frame, f"window of most energy, {times[frame]:.2f} s"
-        if not times[0] - 0.5 <= time_s <= times[-1] + 0.5:
-            raise InputError(
-                f"time_s = {time_s}; the frames are from {times[0]:.3f} to {times[-1]:.3f} s"
-            )
-        frame = int(np.abs(times - time_s).argmin())
-        return frame, f"window at {times[frame]:.2f} s"
+            moving[some] = power[..., moves].sum(axis=(1, 2))
+            still[some] = power.sum(axis=(1, 2))
+        return _Found(by_range, by_velocity, moving if moving.any() else still)
 
     @cached_property
     def _range_limits(self) -> tuple[float, float]:
         counts = self._found.by_range
         if not counts.any():
-            counts = above_floor(thinned(self.maps["range_time"], "slow_time")[0]).sum(axis=0)
+            times = self.maps["slow_time"].values
+            counts = above_floor(thinned(self.maps["range_time"], times)[0]).sum(axis=0)
         return fitted_limits(counts, self.radar.range_m)
 
     @cached_property
@@ -468,7 +490,7 @@ class Plots:
                 f"range_{name}: radar '{self.radar.name}' does not measure {name}; "
                 f"it measures {' and '.join(measured_angles(self.radar)) or 'no angle'}"
             )
-        frame, when = self._frame(time_s)
+        frame, when = self.frame(time_s)
         axes = self._axes(ax)
         data, angles = self.maps[f"range_{name}"][frame], np.degrees(self.maps[name].values)
         # One echo is spread over as many velocities.
@@ -506,25 +528,26 @@ def _of_values(values: NDArray[np.float64], own: float) -> tuple[float, float]:
     return fitted_limits(counts, (edges[1:] + edges[:-1]) / 2, include=own)
 
 
-def thinned(data: xr.DataArray, axis: str) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+def thinned(
+    data: Any, times: NDArray[np.float64]
+) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
     """Return a map (time, ...) and its times [s], averaged to a few hundred steps.
 
     Parameters
     ----------
-    data : xarray.DataArray
-        Map whose first dimension is that of time.
-    axis : str
-        Name of this dimension.
+    data : (time, ...) xarray.DataArray or h5py.Dataset
+        Map, of which one step at a time is read.
+    times : (time,) float64
+        Times of the map [s].
 
     Returns
     -------
     power : (step, ...) float
         Mean of the map in each step.
     times : (step,) float64
-        Middle of each step [s].
+        Mean time of each step [s].
     """
     every = max(1, math.ceil(len(data) / _COLUMNS))
-    times = data[axis].values
     steps = [slice(first, first + every) for first in range(0, len(data), every)]
-    power = np.stack([data[step].values.mean(axis=0) for step in steps])
+    power = np.stack([np.asarray(data[step]).mean(axis=0) for step in steps])
     return power, np.array([times[step].mean() for step in steps])
