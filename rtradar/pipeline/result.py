@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
+from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.map_store import open_maps
+from rtradar.pipeline.snapshots import snapshots
 from rtradar.radar import Radar
+from rtradar.report.pages.inline import InlinePage
 from rtradar.scatter.link_budget import LinkBudget
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from rtradar.report.figures.plots import Plots
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,26 +73,101 @@ class Result:
         assert self.out is not None
         return open_maps(self.out / "maps.h5")
 
-    def __repr__(self) -> str:
-        return "\n".join(self._lines())
+    @cached_property
+    def plot(self) -> Plots:
+        """Pictures of the maps and clouds, such as ``plot.range_doppler(time_s=1.2)``.
 
-    def _lines(self) -> Iterator[str]:
-        summary, parameters = self.summary, self.summary["parameters"]
-        named = [f"{key} {parameters[key]}" for key in ("fidelity", "scene") if key in parameters]
-        title = parameters.get("motion", "IF samples")
-        yield f"Result of {', '.join([title, f'radar {self.radar.name}', *named])}"
-        yield (
-            f"  {summary['capture_s']:.2f} s of radar in {summary['windows']} frames, "
-            f"{summary['detections']} detections"
-        )
+        Each method returns Matplotlib axes, in the units of the field.
+        """
+        from rtradar.report.figures.plots import Plots  # Matplotlib is slow to import
+
+        return Plots(self.maps, self.points, self.spatial, self.radar, self.summary)
+
+    def view(self, *, height_px: int = 900) -> InlinePage:
+        """Show body, paths and maps, linked and over time, as a page in the notebook.
+
+        Parameters
+        ----------
+        height_px : int
+            Height of the page in the notebook [pixel].
+
+        Returns
+        -------
+        InlinePage
+            Page that a notebook shows, and that its method ``save`` writes into a file.
+
+        Raises
+        ------
+        InputError
+            If the results are those of IF samples, where there is no body to show, or if files of
+            the folder are missing or damaged.
+        """
+        from rtradar.pipeline.view import assembled, load_run_view
+        from rtradar.report.view.run_view import write_view
+
+        if self._capture is not None:
+            capture = self._capture
+            maps = {str(name): values.values for name, values in self.maps.variables.items()}
+            found = maps, snapshots(capture), self.points, self.spatial, self.radar, self.summary
+            run_view = assembled(*found, capture.processing.window_functions)
+        elif self.out is not None and self.link_budget is not None:
+            run_view = load_run_view(self.out)
+        else:
+            raise InputError(
+                "view: IF samples have no body to show; look at the maps with result.plot"
+            )
+        with TemporaryDirectory() as folder:
+            write_view(Path(folder) / "view.html", run_view)
+            page = (Path(folder) / "view.html").read_text(encoding="utf-8")
+        return InlinePage(page, height_px)
+
+    @property
+    def _title(self) -> str:
+        return str(self.summary["parameters"].get("motion", "IF samples"))
+
+    def _rows(self) -> dict[str, str]:
+        """Return what the radar saw, by labels."""
+        summary, rows = self.summary, {}
         if len(self.points):
-            (_, nearest, slowest), (_, farthest, fastest) = (
-                limit(self.points, axis=0) for limit in (np.min, np.max)
-            )
-            yield (
-                f"  range {nearest:.2f} to {farthest:.2f} m, "
-                f"velocity {slowest:.2f} to {fastest:.2f} m/s"
-            )
-        yield f"  points {self.points.shape}: time [s], range [m], velocity [m/s]"
-        yield f"  spatial {self.spatial.points.shape}: x, y, z [m]; velocity, power, time"
-        yield f"  maps {'in memory' if self.out is None else f'in {str(self.out)!r}'}"
+            low, high = self.points.min(axis=0), self.points.max(axis=0)
+            rows["range"] = f"{low[1]:.2f} to {high[1]:.2f} m"
+            rows["velocity"] = f"{low[2]:.2f} to {high[2]:.2f} m/s, positive receding"
+        if "noise_power_m2" in summary:
+            echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
+            snr = f"{10 * np.log10(echo / noise):.1f} dB" if echo and noise else "no noise"
+            rows["SNR"] = snr if echo else "nobody is visible"
+        frames = f"in {summary['windows']} frames of {summary['capture_s']:.2f} s of radar"
+        rows["detections"] = f"{summary['detections']} {frames}"
+        rows["points"] = f"{len(self.points)} (time, range, velocity)"
+        rows["spatial"] = f"{len(self.spatial.points)} points (x, y, z)"
+        return rows
+
+    def _made(self) -> dict[str, str]:
+        """Return how and where it was made, by labels."""
+        parameters = self.summary["parameters"]
+        names = [f"{key} {parameters[key]}" for key in ("fidelity", "scene") if key in parameters]
+        return {
+            "made by": ", ".join([f"radar {self.radar.name}", *names]),
+            "computed in": f"{self.summary['wall_s']:.1f} s",
+            "maps": "in memory" if self.out is None else str(self.out),
+        }
+
+    def __repr__(self) -> str:
+        return text_card("Result", self._title, self._rows() | self._made())
+
+    def _repr_html_(self) -> str:
+        from rtradar.report.figures.canvas import save_figure
+        from rtradar.report.figures.plots import Plots
+        from rtradar.system.figure_style import new_figure
+
+        picture = BytesIO()
+        with suppress(InputError):  # the folder may be gone
+            found = self.maps, self.points, self.spatial, self.radar, self.summary
+            axes = Plots(*found, new_figure=new_figure).range_doppler()
+            figure = axes.get_figure(root=True)
+            assert figure is not None
+            save_figure(figure, picture)
+        note = "result.plot draws, result.view() moves, result.maps has the maps."
+        tables = {"": self._rows() | self._made()}
+        shown = picture.getvalue() or None
+        return html_card("Result", self._title, tables, picture=shown, note=note)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -104,23 +104,32 @@ def load_run_view(folder: Path) -> RunView:
             f"'{folder}' holds no run (there is no summary.json); give the folder that "
             "'rtradar run --out' named"
         )
-    summary, radar, windows = _summary(folder / "summary.json")
-    parameters = summary["parameters"]
-    spreading = parameters.get("spreading", True) is not False
+    return run_view_of(folder, *_summary(folder / "summary.json"))
+
+
+def run_view_of(
+    folder: Path, summary: Mapping[str, Any], radar: Radar, windows: WindowFunctions
+) -> RunView:
+    """Read ``view.npz``, ``maps.h5`` and both clouds of a run with this summary and radar.
+
+    InputError as in `load_run_view`.
+    """
     snapshots = load_snapshots(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
     columns = ("points", "velocity", "power", "time")
     spatial = _archive(folder / "cloud_xyz.npz", columns, may_be_nan=("points",))
+    try:
+        cloud = SpatialCloud(**spatial)
+    except (InputError, TypeError) as error:
+        raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
     path = folder / "maps.h5"
     try:
         with open_regular(path) as raw, h5py.File(raw) as file:
             maps = _maps(file)
             if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
-            range_doppler = _range_doppler(maps, snapshots, radar, spreading)
-            spectrogram = _spectrogram(maps, radar, spreading, windows)
             points = rdt["points"].reshape(-1, 3)
-            rdt_power_db = _at_points(maps, points, radar, spreading)
+            return assembled(maps, snapshots, points, cloud, radar, summary, windows)
     except InputError:
         raise
     except _DAMAGE as error:
@@ -128,10 +137,20 @@ def load_run_view(folder: Path) -> RunView:
         if isinstance(error, FileNotFoundError):
             why = error.strerror
         raise InputError(f"'{path}': {why}; {_MEND}") from None
-    try:
-        cloud = SpatialCloud(**spatial)
-    except (InputError, TypeError) as error:
-        raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
+
+
+def assembled(
+    maps: Mapping[str, Any],
+    snapshots: Snapshots,
+    points: NDArray[np.float64],
+    spatial: SpatialCloud,
+    radar: Radar,
+    summary: Mapping[str, Any],
+    windows: WindowFunctions,
+) -> RunView:
+    """Return the view of a run from its maps and their axes, snapshots, clouds and summary."""
+    parameters = summary["parameters"]
+    spreading = parameters.get("spreading", True) is not False
     fidelity = _line(summary.get("fidelity", ""))
     scene = _line(parameters.get("scene", "free-space"))
     removal = _line(parameters.get("clutter_removal", "none"))
@@ -141,11 +160,11 @@ def load_run_view(folder: Path) -> RunView:
         subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]) + cleaned,
         snapshots=snapshots,
         radar=radar,
-        range_doppler=range_doppler,
-        spectrogram=spectrogram,
+        range_doppler=_range_doppler(maps, snapshots, radar, spreading),
+        spectrogram=_spectrogram(maps, radar, spreading, windows),
         rdt_points=points,
-        rdt_power_db=rdt_power_db,
-        spatial=cloud,
+        rdt_power_db=_at_points(maps, points, radar, spreading),
+        spatial=spatial,
         spreading=spreading,
     )
 

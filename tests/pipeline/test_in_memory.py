@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -66,8 +68,37 @@ def test_maps_have_named_dimensions_units_and_meanings(in_memory: rt.Result) -> 
 def test_a_result_says_what_it_is_in_a_few_lines(in_memory: rt.Result) -> None:
     lines = repr(in_memory).splitlines()
     assert len(lines) <= 10
-    assert lines[0].startswith("Result of synthetic:kick, radar small, fidelity analytic")
-    assert max(map(len, lines)) < 100
+    assert lines[0] == "Result synthetic:kick"
+    assert max(map(len, lines)) <= 100
+    assert "  made by      radar small, fidelity analytic, scene free-space" in lines
+
+
+def test_a_notebook_shows_a_card_of_one_screen_with_a_picture(in_memory: rt.Result) -> None:
+    card = in_memory._repr_html_()
+    assert "20.0 dB" in card
+    assert f"{in_memory.summary['detections']} in 11 frames" in card
+    assert "data:image/png;base64," in card
+    assert len(card) < 300_000
+
+
+def test_results_draw_themselves(in_memory: rt.Result) -> None:
+    axes = in_memory.plot.range_doppler(time_s=0.2)
+    assert "0.20 s" in axes.get_title("left")
+    plt.close("all")
+
+
+def test_the_view_is_the_same_in_memory_and_of_a_folder(
+    in_memory: rt.Result, tmp_path: Path
+) -> None:
+    options = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
+    written = rt.run(MOTION, RADAR, out=tmp_path / "out", **options)  # type: ignore[arg-type]
+    page, other = in_memory.view(height_px=700), written.view()
+    assert page.html == other.html
+    frame = page._repr_html_()
+    assert "height: 700px" in frame
+    assert html.unescape(frame.split('"')[1]) == page.html
+    page.save(tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text() == page.html
 
 
 def test_maps_of_a_folder_that_is_gone_are_refused_in_one_line(

@@ -54,7 +54,10 @@ def test_samples_of_a_simulation_give_the_maps_of_a_run(multiplexing: str) -> No
     assert {"windows", "chirps", "detections", "capture_s"} <= known
     for name in ("windows", "chirps", "detections", "capture_s"):
         assert processed.summary[name] == ran.summary[name]
-    assert repr(processed).startswith("Result of IF samples, radar small\n")
+    assert repr(processed).startswith("Result IF samples\n")
+    with pytest.raises(InputError, match="view: IF samples have no body"):
+        processed.view()
+    assert "data:image/png" in processed._repr_html_()
 
 
 def reused(samples: xr.DataArray) -> Iterator[np.ndarray[Any, Any]]:

@@ -1,0 +1,41 @@
+"""A page in one file that a notebook shows where it was made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+
+@dataclass(frozen=True, repr=False)
+class InlinePage:
+    """A page that makes no request; a notebook shows it in a frame of its own.
+
+    Parameters
+    ----------
+    html : str
+        The whole page.
+    height_px : int
+        Height of the frame [pixel].
+    """
+
+    html: str
+    height_px: int = 900
+
+    def save(self, path: str | Path) -> None:
+        """Write the page into a file, which any browser opens.
+
+        Parameters
+        ----------
+        path : path
+            File that is written.
+        """
+        Path(path).write_text(self.html, encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"InlinePage of {len(self.html) / 1e6:.1f} MB; save(path) writes it"
+
+    def _repr_html_(self) -> str:
+        # A frame keeps styles and scripts of page and notebook apart.
+        style = f"width: 100%; height: {self.height_px}px; border: 0"
+        return f'<iframe srcdoc="{escape(self.html)}" style="{style}" title="rtradar"></iframe>'
