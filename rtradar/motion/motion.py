@@ -20,6 +20,7 @@ from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from scipy.interpolate import PPoly
 
 Array = NDArray[np.float64]
@@ -156,6 +157,30 @@ class Motion:
         return file_backed(
             self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations)
         )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the skeleton at some instants, from the side and from above.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes of Matplotlib for the view from the side alone; by default both views are drawn in
+            a new figure.
+
+        Returns
+        -------
+        Axes
+            Axes of the view from the side, across x or y, in metres.
+
+        Examples
+        --------
+        >>> axes = rt.synthetic_motion("walk", seed=0).plot()
+        >>> axes.get_ylabel()
+        'z [m]'
+        """
+        from rtradar.motion.picture import plot_motion
+
+        return plot_motion(self, ax)
 
     # -- at any time -------------------------------------------------------------------------------
 

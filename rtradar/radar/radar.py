@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ from rtradar.radar import display
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.system.checks import check_keys, printable, read_toml
 from rtradar.system.registries import RADARS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PRESETS = RADARS
 """Radars that have a name: each is made by a function without arguments."""
@@ -180,6 +183,31 @@ class Radar:
             return cls(**{"name": printable(path.stem), **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the array, and beside it the ranges and velocities that it can measure.
+
+        Parameters
+        ----------
+        ax : Axes, optional
+            Axes of Matplotlib to draw the array on, without the limits beside it; by default both
+            are drawn in a new figure.
+
+        Returns
+        -------
+        Axes
+            Axes of the array: Tx, Rx and virtual elements about their centre [mm], seen from behind
+            the radar.
+
+        Examples
+        --------
+        >>> axes = rt.Radar.preset("paper-12ghz").plot()
+        >>> axes.get_xlabel()
+        'y [mm]'
+        """
+        from rtradar.radar.picture import plot_radar
+
+        return plot_radar(self, ax)
 
     # -- waveform and range (derived) --------------------------------------------------------------
 

@@ -1,0 +1,77 @@
+"""The picture of a motion: its skeleton at some instants, from the side and from above."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+
+from rtradar.motion.display import poses
+from rtradar.motion.motion import Motion
+from rtradar.system.figure_style import LIGHT, STYLE, WIDTH_IN, dress, figure_for, fit, theme_of
+
+_POSES, _PATH_POSES = 6, 400
+"""Numbers of skeletons, and of points of the root's path."""
+
+
+def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
+    """Draw a motion from the side, and from above unless axes are given, as `Motion.plot` does."""
+    _, path = poses(motion, _PATH_POSES)
+    joints = path.reshape(-1, 3)
+    span = np.ptp(joints, axis=0)
+    across = int(span[1] > span[0])  # the body is seen where it is wider
+    if ax is not None:
+        handles = _draw(ax, motion, (across, 2), motion.name)
+        ax.legend(handles=handles, loc="best")
+        dress(ax, title=motion.name)
+        return ax
+    wide, *tall = (float(span[axis]) + 0.4 for axis in (across, 2, 1 - across))
+    scale = min(5.2 / wide, *(3.0 / height for height in tall))  # [inch/m], the same in both views
+    heights = [max(scale * height, 0.9) for height in tall]
+    figure = figure_for(sum(heights) + 2.0)
+    side, above = figure.subplots(2, 1, height_ratios=heights)
+    title = "As the radar sees it" if across else "From the side"
+    handles = _draw(side, motion, (across, 2), title)
+    _draw(above, motion, (across, 1 - across), "From above")
+    theme = theme_of(side)
+    style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
+    size = STYLE["axes.titlesize"]
+    name = fit(f"Motion {motion.name}", 0.95 * 72 * WIDTH_IN, size)
+    figure.suptitle(name, fontsize=size, color=theme.text, parse_math=False)
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=_POSES, labelcolor=theme.text, **style
+    )
+    return side
+
+
+def _draw(axes: Axes, motion: Motion, seen: tuple[int, int], title: str) -> list[Line2D]:
+    """Draw skeletons and the path of the root in two coordinates; return a line for each time."""
+    theme, view = theme_of(axes), list(seen)
+    times, joints = poses(motion, _POSES)
+    path = poses(motion, _PATH_POSES)[1][:, 0, view]
+    children = [joint for joint, parent in enumerate(motion.parents) if parent >= 0]
+    parents = [motion.parents[joint] for joint in children]
+    bones = np.stack([joints[:, parents], joints[:, children]], axis=2)[..., view]
+    # The bright end of the colours is hard to see on white, the dark end on black.
+    ends = (0.0, 0.82) if theme is LIGHT else (0.25, 1.0)
+    colours = colormaps["viridis"](np.linspace(*ends, len(times)))
+    if seen[1] == 2:
+        axes.axhline(0.0, color=theme.wall, linewidth=1)
+    axes.plot(*path.T, color=theme.faint, linewidth=1.2, linestyle="--")
+    for lines, colour in zip(bones, colours, strict=True):
+        axes.add_collection(LineCollection(list(lines), colors=[colour], linewidths=1.8))
+    axes.autoscale_view()
+    axes.margins(0.05)
+    axes.set(xlabel=f"{'xyz'[seen[0]]} [m]", ylabel=f"{'xyz'[seen[1]]} [m]")
+    if seen[0] == 1:  # y is at the left of the radar
+        axes.invert_xaxis()
+    axes.set_aspect("equal", adjustable="datalim")
+    dress(axes, title=title)
+    return [
+        Line2D([], [], color=colour, label=f"{time:.2f} s")
+        for time, colour in zip(times, colours, strict=True)
+    ]
