@@ -20,6 +20,7 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.timing import forget_peak_memory
+from rtradar.pipeline.view import run_view_of
 from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_array, write_clouds
 from rtradar.radar import Radar
 from rtradar.report import write_report
@@ -140,6 +141,9 @@ def run_into(
                 pictures=pictures,
                 rdt_points=points,
                 spatial=clouds.spatial,
+                run_view=run_view_of(
+                    folder, summary, capture.radar, capture.processing.window_functions
+                ),
             )
         summary |= {"files": RUN_FILES.list_of(folder)}
         text, summary = _finished(summary, capture, started)

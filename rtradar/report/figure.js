@@ -51,11 +51,6 @@ const antennas = (places, name, colourName, symbol, size) => ({
   hovertemplate: `${name} %{pointNumber}<br>(%{x:.3f}, %{y:.3f}, %{z:.3f}) m<extra></extra>`,
 });
 
-// In three dimensions only where all three have been measured.
-const spatial = data.spatial && data.spatial.count > 0 && data.spatial.measured.every(Boolean) && {
-  points: floats(data.spatial.points), velocity: floats(data.spatial.velocity), time: floats(data.spatial.time),
-};
-
 /** The points of the spatial cloud within one radar frame about a time. */
 function pointsAt(time) {
   const chosen = [];

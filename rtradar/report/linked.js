@@ -1,4 +1,4 @@
-// The page of `rtradar view`: body, room, paths and echoes, the range-Doppler map, the spectrogram and the range-Doppler-time
+// The linked views of a run, on its report and in `rtradar view`: body, room, paths and echoes, the range-Doppler map, the spectrogram and the range-Doppler-time
 // cloud, all at the moment that the slider chooses, and in the colours of part, power or velocity.
 
 const { echoes, room } = data;
@@ -111,25 +111,6 @@ function roomTraces() {
 
 // -- maps ----------------------------------------------------------------------------------------------------------------
 
-async function unpacked(text) {
-  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-/** Rows [dB] of one map; `levels` holds maps one after the other. */
-function mapRows(map, levels, step) {
-  const [rows, columns] = map.shape;
-  return Array.from({ length: rows }, (_, row) => {
-    const at = (step * rows + row) * columns;
-    return Float32Array.from(levels.subarray(at, at + columns), (level) => map.low_db + level * map.step_db);
-  });
-}
-
-const heat = (map, z, more) => ({
-  type: "heatmap", z, x0: map.x[0], dx: map.x[1], y0: map.y[0], dy: map.y[1], zmin: map.low_db, zmax: map.high_db, ...more,
-});
-
 /** Where an echo shows on the velocity axis: beyond the unambiguous velocity at another. */
 const folded = (rate) => rate - 2 * data.max_velocity_mps * Math.floor((rate + data.max_velocity_mps) / (2 * data.max_velocity_mps));
 
@@ -220,7 +201,8 @@ async function save(title) {
   URL.revokeObjectURL(link.href);
 }
 
-async function main() {
+/** Draws all views and ties them to the player. */
+async function drawLinked() {
   const [mapLevels, spectrogramLevels] = await Promise.all([unpacked(data.map.levels), unpacked(data.spectrogram.levels)]);
   const first = chosen("colour");
   const [x, y, z] = figure.ranges;
@@ -258,7 +240,7 @@ async function main() {
   const edge = (map, name, length) => [map[name][0] - map[name][1] / 2, map[name][0] + map[name][1] * (length - 0.5)];
   const map = await drawFlat("scene-map", [
     heat(data.map, mapRows(data.map, mapLevels, 0), {
-      colorscale: greys(), colorbar: scaleBar("power"), hovertemplate: "%{x:.2f} m/s, %{y:.2f} m<br>%{z:.1f} dB<extra></extra>",
+      colorscale: greys(), colorbar: scaleBar("power"), hovertemplate: `%{x:.2f} m/s, %{y:.2f} m<br>%{z:.1f} ${unitOf(data.map)}<extra></extra>`,
     }),
     marks(true), marks(false),
   ], {
@@ -270,7 +252,7 @@ async function main() {
   const cursor = (time) => ({ type: "line", x0: time, x1: time, y0: 0, y1: 1, yref: "paper", line: { color: now, width: 2 } });
   const spectrogram = await drawFlat("scene-spectrogram", [heat(data.spectrogram, mapRows(data.spectrogram, spectrogramLevels, 0), {
     colorscale: "Viridis", colorbar: { ...scaleBar("power"), title: { text: data.spectrogram.label, side: "right" } },
-    hovertemplate: "%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} dB<extra></extra>",
+    hovertemplate: `%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} ${unitOf(data.spectrogram)}<extra></extra>`,
   })], {
     xaxis: { text: "Time [s]", range: edge(data.spectrogram, "x", data.spectrogram.shape[1]) },
     yaxis: { text: velocityLabel, range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
@@ -346,7 +328,4 @@ async function main() {
     `${document.querySelector("h1").textContent}, ${document.querySelector(".sub").textContent}: ${document.getElementById("clock").textContent}`,
   ));
   if (spectrogram) spectrogram.on("plotly_click", (event) => play.goTo(event.points[0].x));
-  document.documentElement.dataset.ready = "true";
 }
-
-main();

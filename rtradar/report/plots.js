@@ -1,4 +1,4 @@
-// What both pages draw with. Needs Plotly and the JSON in #report-data.
+// What all pages draw with. Needs Plotly and the JSON in #report-data.
 
 const data = JSON.parse(document.getElementById("report-data").textContent);
 // These buttons and no others: by default Plotly also offers to share the data on its own site.
@@ -19,6 +19,11 @@ function floats(text) {
 
 /** Every third number from the k-th on. */
 const component = (triples, k) => Float32Array.from({ length: triples.length / 3 }, (_, i) => triples[3 * i + k]);
+
+// In three dimensions only where all three have been measured.
+const spatial = data.spatial && data.spatial.count > 0 && data.spatial.measured.every(Boolean) && {
+  points: floats(data.spatial.points), velocity: floats(data.spatial.velocity), time: floats(data.spatial.time),
+};
 
 /** Parts of the layout that follow the page's light or dark colours. */
 function theme() {
@@ -106,3 +111,27 @@ async function drawFlat(id, traces, layout, restyleTheme) {
   node.dataset.drawn = "true";
   return node;
 }
+
+// -- maps --------------------------------------------------------------------------------------------------------------------
+
+async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Rows [dB] of one map; `levels` holds maps one after the other. */
+function mapRows(map, levels, step) {
+  const [rows, columns] = map.shape;
+  return Array.from({ length: rows }, (_, row) => {
+    const at = (step * rows + row) * columns;
+    return Float32Array.from(levels.subarray(at, at + columns), (level) => map.low_db + level * map.step_db);
+  });
+}
+
+const heat = (map, z, more) => ({
+  type: "heatmap", z, x0: map.x[0], dx: map.x[1], y0: map.y[0], dy: map.y[1], zmin: map.low_db, zmax: map.high_db, ...more,
+});
+
+/** The unit at the end of the label of a map, such as dBsm. */
+const unitOf = (map) => /\[(.*)\]$/.exec(map.label)?.[1] ?? "dB";

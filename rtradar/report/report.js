@@ -1,9 +1,4 @@
-// The page of a run: the moving figure and the clouds, each by itself.
-
-/** Each part in the colour of its mean power, where it is known. */
-const paint = figure.power_db
-  ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar(figure.power_label) }
-  : { color: "#4c8fd6" };
+// The page of a run: the linked views, or the moving figure alone where the maps are not given, and the clouds by themselves.
 
 /** The cloud of an array on one line: x and the coordinate along the line, which are all that it measures. */
 async function plan() {
@@ -19,7 +14,11 @@ async function plan() {
   });
 }
 
-async function main() {
+/** The moving figure, each part in the colour of its mean power where it is known. */
+async function figureAlone() {
+  const paint = figure.power_db
+    ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar(figure.power_label) }
+    : { color: "#4c8fd6" };
   const [x, y, z] = figure.ranges;
   const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? `<br>%{intensity:.1f} ${figure.power_unit}` : ""), ...pointsTraces()], {
     aspectmode: "data", domain,
@@ -28,8 +27,12 @@ async function main() {
   }, 1.9, themeFigure);
   const points = node.data.length - 1;
   await player(node, (frame) => move(node, placesAt(frame, points))).ready;
+}
 
-  if (data.rdt.count) {
+async function main() {
+  if (data.echoes) await drawLinked();
+  else if (data.figure) await figureAlone();
+  if (data.rdt.count && !data.echoes) {
     const points = floats(data.rdt.points);
     const [time, range, velocity] = [0, 1, 2].map((k) => component(points, k));
     await draw("scene-rdt", [{

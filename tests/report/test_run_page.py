@@ -20,7 +20,8 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.pages.html import limits_table, quantity
+from rtradar.report.pages.html import grade, limits_table
+from rtradar.report.pages.labels import quantity
 from rtradar.report.pages.run_page import write_report
 from rtradar.report.view.three_d import (
     MOST_FRAMES,
@@ -120,7 +121,10 @@ def test_refers_to_nothing_outside(tmp_path: Path, body: Body) -> None:
     matplotlib.image.imsave(image, np.zeros((3, 5)))
     page = write(tmp_path / "r.html", body, pictures={"A map": image})
     for tag, attributes in page.elements:
-        assert tag not in ("link", "iframe", "object", "embed", "base", "a")
+        assert tag not in ("link", "iframe", "object", "embed", "base")
+        if tag == "a":  # the list of contents
+            assert (attributes["href"] or "").startswith("#")
+            continue
         for name in ("src", "href", "srcset", "action", "data"):
             assert (attributes.get(name) or "data:").startswith("data:")
     shown = next(attributes for tag, attributes in page.elements if tag == "img")
@@ -153,9 +157,9 @@ def test_shows_the_numbers_that_it_was_given(tmp_path: Path, body: Body) -> None
     text = re.sub(r"\s+", " ", page.text)
     for shown in (
         "12.5% of the echo power from",
-        "beyond_range",
-        "447 MB",
-        "7 416",
+        "Peak memory446.6 MB",
+        "Signal-to-noise ratio of one IF sample20 dB",
+        "7416",
         "62.5 µs",
         "12 GHz",
         "75%",
@@ -252,18 +256,18 @@ def test_refuses_what_is_no_png(tmp_path: Path, body: Body) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "shown"),
     [
-        ("start_frequency_hz", 12e9, ("start frequency", "12 GHz")),
-        ("chirp_duration_s", 62.5e-6, ("chirp duration", "62.5 µs")),
-        ("start_s", 0.0, ("start", "0 s")),
-        ("snr_db", "inf", ("SNR", "inf dB")),
-        ("heading_deg", -90.0, ("heading", "-90°")),
-        ("position_m", [-4.0, 1.0, 1.0], ("position", "(-4, 1, 1) m")),
-        ("echo_power_m2", 2.10867e-3, ("echo power", "0.0021087 m²")),
-        ("pfa", 1e-6, ("Pfa", "1e-06")),
-        ("chirps", 15996000, ("chirps", "15996000")),
-        ("spreading", True, ("spreading", "yes")),
-        ("tx_y", 6, ("Tx y", "6")),
-        ("duration_s", None, ("duration", "-")),
+        ("start_frequency_hz", 12e9, ("Frequency at the start of the sweep", "12 GHz")),
+        ("chirp_duration_s", 62.5e-6, ("Duration of a chirp", "62.5 µs")),
+        ("start_s", 0.0, ("Start in the recording", "0 s")),
+        ("snr_db", "inf", ("Signal-to-noise ratio of one IF sample", "inf dB")),
+        ("heading_deg", -90.0, ("Heading of the person", "-90°")),
+        ("position_m", [-4.0, 1.0, 1.0], ("Position of the array (x, y, z)", "(-4, 1, 1) m")),
+        ("pfa", 1e-6, ("False alarms, probability in one cell", "1e-06")),
+        ("chirps", 15996000, ("Chirps", "15\u202f996\u202f000")),
+        ("spreading", True, ("Spreading loss over the path", "yes")),
+        ("duration_s", None, ("Duration", "-")),
+        # A key that nobody has named yet.
+        ("if_gain_db", 3.0, ("IF gain", "3 dB")),
     ],
 )
 def test_quantities_read_as_people_write_them(
@@ -289,3 +293,53 @@ def test_limits_are_those_of_the_sweep_centre() -> None:
         "12 × 8 = 96",
     ):
         assert f"<td>{value}</td>" in html, value
+
+
+@pytest.mark.parametrize(
+    ("share", "kind"), [(0.008, "note"), (0.05, "note"), (0.051, "warning"), (0.0, "warning")]
+)
+def test_a_limit_is_a_warning_where_it_matters(share: float, kind: str) -> None:
+    # A fraction of 5 % is 0.2 dB. None at all is nobody visible.
+    assert grade({"name": "beyond_range", "share": share, "message": "m"}) == kind
+
+
+def test_sections_come_in_order_and_are_linked(tmp_path: Path, body: Body) -> None:
+    image = tmp_path / "map.png"
+    matplotlib.image.imsave(image, np.zeros((3, 5)))
+    ghost = {"path": "body > left", "range_m": 5.25, "velocity_mps": -1.5, "azimuth_deg": 20.0}
+    room = {
+        "paths": [
+            {"path": "body", "order": 0, "kept": ["head"], "dropped": [], "why": ""},
+            {"path": "body > left", "order": 1, "kept": [], "dropped": ["head"], "why": "weak"},
+        ],
+        "clutter": {
+            "signal_to_clutter_db": -26.9,
+            "after_removal_db": 12.3,
+            "kept": [{"name": "left", "kind": "mirror", "power_m2": 1.0}],
+            "dropped": [],
+        },
+        "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
+    }
+    page = write(
+        tmp_path / "r.html", body, summary=summary() | {"room": room}, pictures={"A map": image}
+    )
+    names = ["figure", "rdt", "maps", "room", "limits", "parameters", "cost"]
+    assert [a["id"] for tag, a in page.elements if tag == "section"] == names
+    assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
+    # R^4 times the power is 1 m^2.
+    shown = ("-26.9 dB", "12.3 dB or more", "0.0 dBsm5.25 m-1.50 m/s+20.0°", "1 of 1 partsweak")
+    for text in shown:
+        assert text in page.text, text
+    # Keys are in words.
+    assert not re.search(r"[a-z]_(db|m2|s|hz|mb)\b", page.text)
+
+
+def test_measured_samples_have_no_body(tmp_path: Path) -> None:
+    path = tmp_path / "r.html"
+    points = np.array([[0.1, 4.0, -1.0], [0.2, 4.5, 1.0]])
+    write_report(path, radar=RADAR, summary={}, pictures={}, rdt_points=points)
+    page = Elements(path.read_text(encoding="utf-8"))
+    assert [a["id"] for tag, a in page.elements if tag == "section"] == [
+        *("rdt", "limits", "parameters")
+    ]
+    assert "4.0 to 4.5 m" in page.text

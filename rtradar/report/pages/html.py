@@ -17,10 +17,10 @@ from pathlib import Path
 from string import Template
 from typing import Any, NamedTuple
 
-from matplotlib.ticker import EngFormatter
-
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.report.pages.labels import quantity, stage_label, with_unit
+from rtradar.scatter.validity import WARN_FRACTION
 from rtradar.system.files import atomic_file, open_regular
 
 _HEAD = Template("""<!doctype html>
@@ -47,12 +47,6 @@ _NO_SCRIPT = """
 <noscript><p class="box warn">The views that move need JavaScript; all else on this page does
 without.</p></noscript>
 """
-_UNITS = {
-    "hz": "Hz", "s": "s", "m": "m", "m2": "m²", "mps": "m/s", "db": "dB", "deg": "°", "mb": "MB",
-    "wavelengths": "wavelengths at the start of the sweep",
-}  # fmt: skip
-_ACRONYMS = {"pfa": "Pfa", "rdt": "RDT", "rx": "Rx", "snr": "SNR", "tx": "Tx"}
-_PREFIXED = {"Hz", "s"}  # shown as 12 GHz or 62.5 µs
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -138,38 +132,6 @@ def _policy(scripts: Iterable[bytes]) -> str:
     return f"default-src {none}; {sources}; base-uri {none}; form-action {none}"
 
 
-def quantity(name: str, value: object) -> tuple[str, str]:
-    """Format a name with a unit suffix and its value, such as ("chirp duration", "62.5 µs").
-
-    The value is a number, a text, a Boolean, a sequence of them, or None. Nothing is escaped yet.
-    """
-    words = name.split("_")
-    unit = _UNITS.get(words[-1], "") if len(words) > 1 else ""
-    if unit:
-        words = words[:-1]
-    return " ".join(_ACRONYMS.get(word, word) for word in words), _text(value, unit)
-
-
-def _text(value: object, unit: str) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, list | tuple):
-        return f"({', '.join(_text(item, '') for item in value)}){' ' if unit else ''}{unit}"
-    if isinstance(value, int) and not unit:
-        return str(value)
-    if isinstance(value, int | float):
-        if unit in _PREFIXED and value:
-            return EngFormatter(unit=unit, places=None)(value)
-        shown = f"{value:.5g}"
-    else:
-        shown = str(value)
-        if not shown.lstrip("-").isalnum() or not unit:
-            unit = ""
-    return shown + ("" if unit in ("", "°") else " ") + unit
-
-
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
     """Make an HTML table of plain texts; the first column names the row."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
@@ -194,7 +156,7 @@ def mapping_table(values: Mapping[str, Any]) -> str:
 def limits_table(radar: Radar) -> str:
     """Make the paper's Table 2, the measurement limits, for this radar at its centre frequency."""
     bin_cm, bin_mps = f"{100 * radar.range_bin_m:.3f} cm", f"{radar.velocity_bin_mps:.4f} m/s"
-    turn, beam = _text(radar.cycle_duration_s, "s"), f"{radar.angle_resolution_deg:.2f}°"
+    turn, beam = with_unit(radar.cycle_duration_s, "s"), f"{radar.angle_resolution_deg:.2f}°"
     channels = f"{radar.n_tx} × {radar.n_rx} = {radar.n_channels}"
     rows = (
         ("r_max", "Maximum detectable range", f"{radar.max_range_m:.3f} m"),
@@ -216,26 +178,42 @@ def stages_table(seconds: Mapping[str, float]) -> str:
     longest = max(seconds.values(), default=0.0) or 1.0
     total = sum(seconds.values()) or 1.0
     rows = "".join(
-        f'<tr><th scope="row">{escape(name)}</th><td>{value:.3f} s</td><td>{value / total:.0%}</td>'
+        f'<tr><th scope="row">{escape(stage_label(name))}</th><td>{value:.3f} s</td>'
+        f"<td>{value / total:.0%}</td>"
         f'<td class="bar"><span style="width:{100 * value / longest:.1f}%"></span></td></tr>'
         for name, value in seconds.items()
     )
     return f'<table class="stages"><tbody>{rows}</tbody></table>'
 
 
-def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
-    """Make a box that lists where a model came near the end of its validity, or that none did."""
+def grade(limit: Mapping[str, Any]) -> str:
+    """Return "warning" for a limit that may change what a reader concludes, or else "note".
+
+    A limit that concerns at most 5 % of the echo power changes it by at most 0.2 dB: a note. One
+    without a fraction, as where nobody is visible, concerns everything.
+    """
+    share = float(limit.get("share", 0.0))
+    return "note" if 0 < share <= WARN_FRACTION else "warning"
+
+
+def limits_list(limits: Sequence[Mapping[str, Any]]) -> str:
+    """Make a list of where a model came near the end of its validity, warnings first."""
     if not limits:
-        text = "Nothing came near the end of a model's validity."
-        return f'<aside class="box fine"><p>{text}</p></aside>'
+        return '<p class="note">Nothing came near the end of a model\'s validity.</p>'
     items = []
-    for limit in limits:
-        fraction, message = float(limit.get("share", 0.0)), str(limit["message"])
-        if fraction > 0:
-            message = f"{fraction:.1%} of the {message}"
-        items.append(f"<li>{escape(message)} <code>{escape(str(limit['name']))}</code></li>")
-    title = "<h2>Limits of this result</h2>"
-    return f'<aside class="box warn">{title}<ul>{"".join(items)}</ul></aside>'
+    for limit in sorted(limits, key=lambda limit: -"note warning".index(grade(limit))):
+        share, message = float(limit.get("share", 0.0)), str(limit["message"])
+        if share > 0:
+            message = f"{share:.1%} of the {message}"
+        kind = grade(limit)
+        items.append(f'<li class="{kind}"><b>{kind.capitalize()}</b> {escape(message)}.</li>')
+    return f'<ul class="limits">{"".join(items)}</ul>'
+
+
+def contents(links: Mapping[str, str]) -> str:
+    """Make the list of contents of a page from the titles of its sections by their identifiers."""
+    items = "".join(f'<li><a href="#{name}">{escape(t)}</a></li>' for name, t in links.items())
+    return f'<nav aria-label="Contents"><ul>{items}</ul></nav>'
 
 
 def tiles(values: Iterable[tuple[str, str]]) -> str:

@@ -3,39 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from html import escape
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.pages import html
 from rtradar.report.pages.html import mapping_table, picture, table, write_page
+from rtradar.report.pages.labels import grouped, with_unit
+from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
+from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
 
-_FIGURE = f"""<section id="figure"><h2>The recording before the radar</h2>
-<div class="scene tall" id="scene-figure"></div>
+MOST_STEPS = 100
+"""Largest number of moments that the linked views of the page show."""
+
+_STEPS_HZ = 20.0
+_CENTRAL_PERCENT = 98
+
+_FIGURE_ALONE = f"""<div class="scene tall" id="scene-figure"></div>
 {html.player()}
 <p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone.
 Drag to turn, scroll to come nearer. World axes: x from the radar to the person, y to the left seen
-from the radar, z up.</p></section>
+from the radar, z up.</p>
 """
+_MORE_VIEWS = """<p class="note">The same for every frame, on a page of its own:
+<code>rtradar view DIR</code>, where DIR is the folder of this page.</p>"""
 
 
 def write_report(
     path: str | Path,
     *,
-    body: Body,
     radar: Radar,
     summary: Mapping[str, Any],
     pictures: Mapping[str, Path],
     rdt_points: ArrayLike,
+    body: Body | None = None,
     spatial: SpatialCloud | None = None,
+    run_view: RunView | None = None,
 ) -> None:
-    """Write a run as a page with a moving figure, rotatable clouds, pictures and tables.
+    """Write a run as a page: what was seen, body and maps that move together, pictures and tables.
 
     The file includes plotly.js (about 5 MB), and its content security policy forbids any request.
 
@@ -43,20 +56,22 @@ def write_report(
     ----------
     path : path
         HTML file.
-    body : Body
-        Body at its position before the radar.
     radar : Radar
         Radar of the run, whose limits and settings are listed.
     summary : mapping
-        Values of ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``,
-        ``versions`` and ``part_power_m2`` have sections of their own; other numbers and texts are
-        listed under their names.
+        Values of ``summary.json``, any of which may be missing. Those that have no place of their
+        own on the page are listed in words.
     pictures : mapping of title to path
         PNG files in the order of the page.
     rdt_points : (point, 3)
         Time [s], range [m] and velocity [m/s] of each point.
+    body : Body, optional
+        Body at its position before the radar, shown alone where there is no ``run_view``. Without
+        both, as for measured samples, the page has no moving figure.
     spatial : SpatialCloud, optional
-        Spatial cloud, shown as a whole and frame by frame around the moving figure.
+        Spatial cloud, shown as a whole.
+    run_view : RunView, optional
+        Data of the views that one slider moves, which the page shows at up to `MOST_STEPS` moments.
 
     Raises
     ------
@@ -65,94 +80,175 @@ def write_report(
         that are not finite.
     """
     parameters = summary.get("parameters", {})
-    spreading = bool(parameters.get("spreading", True))
-    figure = figure_data(body, radar, summary.get("part_power_m2"), spreading=spreading)
-    data = {"figure": figure, "rdt": rdt_data(rdt_points)}
+    data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
     if spatial is not None:
         data["spatial"] = spatial_data(spatial)
-    fidelity = str(summary.get("fidelity", ""))
-    subtitle = ", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}")))
+    scripts = ["plots.js"]
+    if run_view is not None:
+        run_view = run_view.thinned(MOST_STEPS, _STEPS_HZ)
+        data |= view_data(run_view) | {"name": Path(path).stem}
+        scripts += ["figure.js", "linked.js"]
+    elif body is not None:
+        spreading = bool(parameters.get("spreading", True))
+        power = summary.get("part_power_m2")
+        data["figure"] = figure_data(body, radar, power, spreading=spreading)
+        scripts.append("figure.js")
+    sections = _sections(summary, radar, data, pictures, run_view)
+    links = {name: title for name, title, _ in sections}
+    fidelity, scene = (str(summary.get("fidelity", "")), str(parameters.get("scene", "")))
+    told = (f"radar {radar.name}", fidelity and f"fidelity {fidelity}", scene)
     write_page(
         path,
-        html.Titles("rtradar report", str(parameters.get("motion", "Recording")), subtitle),
-        html.limits_box(summary.get("limits", ())) + "\n" + html.tiles(_headline(summary)),
-        chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
+        html.Titles(
+            "rtradar report",
+            str(parameters.get("motion", "Recording")),
+            ", ".join(filter(None, told)),
+        ),
+        html.tiles(_headline(summary, np.asarray(rdt_points, dtype=np.float64)))
+        + html.contents(links),
+        chain.from_iterable(
+            chain((f'<section id="{name}"><h2>{escape(title)}</h2>',), text, ("</section>\n",))
+            for name, title, text in sections
+        ),
         data=data,
-        scripts=("plots.js", "figure.js", "report.js"),
+        scripts=(*scripts, "report.js"),
     )
 
 
-def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
-    for name, form, caption in (
-        ("capture_s", "{:.2f} s", "of radar"),
-        ("wall_s", "{:.1f} s", "to compute"),
-        ("real_time_factor", "{:.2g} s", "for each second of radar"),
-        ("peak_memory_mb", "{:.0f} MB", "peak memory"),
-        ("detections", "{:,}", "detections"),
-    ):
-        if name in summary:
-            yield form.format(summary[name]).replace(",", "\u202f"), caption
-
-
-def _clouds(data: Mapping[str, Any]) -> str:
-    note = "The surface about the detections of all windows, sampled."
-    views = [("rdt", "Range-Doppler-time cloud", note)]
+def _sections(
+    summary: Mapping[str, Any],
+    radar: Radar,
+    data: Mapping[str, Any],
+    pictures: Mapping[str, Path],
+    run_view: RunView | None,
+) -> list[tuple[str, str, Iterable[str]]]:
+    """Return identifier, title and HTML of the sections, in their order."""
+    room = summary.get("room")
+    of_room = {title: path for title, path in pictures.items() if Path(path).name in ROOM_PICTURES}
+    others = {title: path for title, path in pictures.items() if not (room and title in of_room)}
+    sections: list[tuple[str, str, Iterable[str]]] = []
+    if run_view is not None:
+        text = linked_views(run_view) + _MORE_VIEWS
+        sections.append(("figure", "The moving body, its echoes and its maps", (text,)))
+    elif "figure" in data:
+        sections.append(("figure", "The recording before the radar", (_FIGURE_ALONE,)))
+    if run_view is None:
+        sections.append(("rdt", "Range-Doppler-time cloud", (_rdt(data),)))
     if "spatial" in data:
-        note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
-        measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
-        if not all(measured.values()):
-            angle = "azimuth" if measured["z"] else "elevation"
-            note += (
-                f" An array on one line does not measure {angle}: "
-                "x is the distance from that line, added to the radar's x."
-            )
-        views.append(("spatial", "Spatial cloud", note))
-    parts = []
-    for name, title, note in views:
-        cloud = data[name]
-        shown, count = cloud["shown"], cloud["count"]
-        thinned = "" if shown == count else f" {shown} of {count} points are shown."
-        scene = f'<div class="scene" id="scene-{name}"></div>'
-        if not count:
-            scene = '<p class="empty">Nothing was detected.</p>'
-        parts.append(
-            f'<section id="{name}"><h2>{title}</h2>{scene}'
-            f'<p class="note">{note}{thinned}</p></section>\n'
+        sections.append(("spatial", "Spatial cloud", (_spatial(data["spatial"]),)))
+    if others:
+        sections.append(("maps", "Maps", _pictures(others)))
+    if room:
+        text = room_section(room, radar, of_room)
+        sections.append(("room", "The room", (text,)))
+    limits = html.limits_list(summary.get("limits", ()))
+    sections.append(("limits", "Limits of this result", (limits,)))
+    sections.append(("parameters", "Radar and settings", (_parameters(summary, radar),)))
+    cost = _cost(summary)
+    if cost:
+        sections.append(("cost", "Cost", (cost,)))
+    return sections
+
+
+def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:
+    """Yield what the radar saw, as figures with captions."""
+    if len(points):
+        half = (100 - _CENTRAL_PERCENT) / 2
+        low, high = np.percentile(points[:, 1:], (half, 100 - half), axis=0)
+        yield f"{low[0]:.1f} to {high[0]:.1f} m", "range of what was detected"
+        yield (
+            f"{low[1]:+.1f} to {high[1]:+.1f} m/s".replace("-", "\N{MINUS SIGN}"),
+            "velocity of what was detected, positive: receding",
         )
-    return f'<div class="clouds">{"".join(parts)}</div>\n'
+    parameters = summary.get("parameters", {})
+    if "snr_db" in parameters:
+        level = str(parameters["snr_db"])
+        without = level in ("inf", "None")
+        shown = "no noise" if without else with_unit(parameters["snr_db"], "dB")
+        yield shown, "signal to noise" if without else "signal to noise, of one IF sample"
+    if "detections" in summary:
+        frames = f" in {summary['windows']} frames" if "windows" in summary else ""
+        yield grouped(summary["detections"]), f"detections{frames}"
+    yield grouped(len(points)), "points of the range-Doppler-time cloud"
+    if "capture_s" in summary:
+        yield f"{summary['capture_s']:.2f} s", "of radar"
+
+
+def _rdt(data: Mapping[str, Any]) -> str:
+    return _scene("rdt", data["rdt"], "The surface about the detections of all frames, sampled.")
+
+
+def _spatial(cloud: Mapping[str, Any]) -> str:
+    note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
+    measured = dict(zip("xyz", cloud["measured"], strict=True))
+    if not all(measured.values()):
+        angle = "azimuth" if measured["z"] else "elevation"
+        note += (
+            f" An array on one line does not measure {angle}: "
+            "x is the distance from that line, added to the radar's x."
+        )
+    return _scene("spatial", cloud, note)
+
+
+def _scene(name: str, cloud: Mapping[str, Any], note: str) -> str:
+    if not cloud["count"]:
+        return '<p class="empty">Nothing was detected.</p>'
+    if cloud["shown"] != cloud["count"]:
+        note += f" {cloud['shown']} of {cloud['count']} points are shown."
+    return f'<div class="scene" id="scene-{name}"></div><p class="note">{note}</p>'
 
 
 def _pictures(pictures: Mapping[str, Path]) -> Iterator[str]:
-    if pictures:
-        yield '<section id="maps"><h2>Maps</h2><div class="pictures">'
-        for title, path in pictures.items():
-            yield picture(title, Path(path)) + "\n"
-        yield "</div></section>\n"
+    yield '<div class="pictures">'
+    for title, path in pictures.items():
+        yield picture(title, Path(path)) + "\n"
+    yield "</div>"
 
 
-def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
+def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
     parameters = dict(summary.get("parameters", {}))
     settings = parameters.pop("radar", {})
-    own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled")
+    own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled", "room")
+    listed = (*own, *_COSTS, "fidelity", "seed", "files")
+    others = {key: value for key, value in summary.items() if key not in listed}
     modelled = summary.get("modelled", {})
     models = {**modelled.get("ways", {}), **modelled.get("why", {})}
     power = summary.get("part_power_m2", {})
     total = sum(power.values()) or 1.0
-    powers = ((name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items())
-    versions = ((name, str(value)) for name, value in summary.get("versions", {}).items())
-    others = {key: value for key, value in summary.items() if key not in own}
+    powers = (
+        (name.capitalize(), f"{value:.3g} m²", f"{value / total:.1%}")
+        for name, value in power.items()
+    )
     fractions = ((name, f"{value:.1%}") for name, value in models.items())
-    sections = (
-        ("Derived limits of the radar", html.limits_table(radar)),
-        ("Time of each stage", html.stages_table(summary.get("stages", {}))),
-        ("How parts were modelled, of all parts and time", table(fractions)),
-        ("Parameters", mapping_table(parameters)),
+    if "seed" in summary:
+        parameters["seed"] = summary["seed"]
+    return _tables(
+        ("What the radar can measure", html.limits_table(radar)),
+        ("Settings of the run", mapping_table(parameters)),
         ("Radar", mapping_table(settings)),
-        ("Capture", mapping_table(others)),
-        ("Echo power by part", table(powers)),
+        ("What was found", mapping_table(others)),
+        ("How parts were modelled, of all parts and time", table(fractions)),
+        ("Echo power by part", table(powers, ("", "Mean, with spreading loss", "Of all"))),
+    )
+
+
+_COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
+
+
+def _cost(summary: Mapping[str, Any]) -> str:
+    costs = {name: summary[name] for name in _COSTS if name in summary}
+    versions = ((name, str(value)) for name, value in summary.get("versions", {}).items())
+    return _tables(
+        ("Time and memory", mapping_table(costs)),
+        ("Time of each stage", html.stages_table(summary.get("stages", {}))),
         ("Versions", table(versions)),
     )
-    shown = (
-        f"<section><h2>{title}</h2>{text}</section>\n" for title, text in sections if "<tr>" in text
+
+
+def _tables(*found: tuple[str, str]) -> str:
+    shown = "".join(
+        f'<div class="wide"><h3>{title}</h3>{text}</div>\n'
+        for title, text in found
+        if "<tbody></tbody>" not in text
     )
-    return f'<div class="tables">{"".join(shown)}</div>\n'
+    return f'<div class="tables">{shown}</div>\n' if shown else ""

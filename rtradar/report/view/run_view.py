@@ -6,10 +6,12 @@ The page has body, room, paths and echoes beside the maps and the cloud of the s
 from __future__ import annotations
 
 import base64
+import math
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
@@ -31,7 +33,7 @@ VELOCITY_COLOURS = (
 )  # fmt: skip
 """Colour scale from approaching to receding, in which slow motion differs clearly from rest."""
 
-_BODY = """<div class="linked">
+_LINKED = """<div class="linked $style">
 <section><h2>Body and paths</h2><div class="scene" id="scene-figure"></div></section>
 <section><h2>Range-Doppler map of this window, and where echoes are</h2>
 <div class="scene" id="scene-map"></div></section>
@@ -42,7 +44,8 @@ _BODY = """<div class="linked">
 the array to the specular point of the part, and back; dots on the map are the same echoes,
 diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are occluded from
 the radar; grey points of the cloud are far from any echo. A click on the spectrogram goes to its
-time.</p>
+time; the pointer shows range, velocity and level of what is below it. World axes: x from the radar
+to the person, y to the left seen from the radar, z up.</p>
 """
 
 GROUPS = {
@@ -164,6 +167,14 @@ class RunView:
         rates = np.append(self.snapshots.velocity_mps[self.seen], self.rdt_points[:, 2])
         return float(np.abs(rates).max(initial=0.1))
 
+    def thinned(self, most_steps: int, rate_hz: float) -> RunView:
+        """Return a copy of at most so many snapshots, at no more than this rate [Hz]."""
+        times = self.snapshots.times
+        rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
+        every = max(math.ceil(len(times) / most_steps), math.ceil(rate / rate_hz - 1e-6), 1)
+        levels = replace(self.range_doppler, level=self.range_doppler.level[::every])
+        return replace(self, snapshots=self.snapshots.every(every), range_doppler=levels)
+
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
         snapshots, levels = self.snapshots, self.range_doppler
@@ -221,13 +232,11 @@ def _controls(colour: str) -> str:
     )
 
 
-def write_view(
-    path: str | Path, run_view: RunView, *, name: str = "view", colour: str = "part"
-) -> None:
-    """Write the view page as one file that opens without a network.
+def linked_views(run_view: RunView, colour: str = "part", style: str = "") -> str:
+    """Return the HTML of the linked views with their controls, for a page with ``linked.js``.
 
-    Pictures that the page saves are called ``name``. When it opens, colours show ``colour``, one of
-    `COLOURS`. InputError if the file cannot be written.
+    Colours show ``colour``, one of `COLOURS`, until the reader chooses another; ``style`` is
+    another class of the element for the page's style sheet.
     """
     cloud, spectrogram = (
         f'<div class="scene" id="scene-{view}"></div>' for view in ("rdt", "spectrogram")
@@ -236,13 +245,25 @@ def write_view(
         cloud = '<p class="empty">Nothing was detected.</p>'
     if not run_view.spectrogram.level.size:
         spectrogram = '<p class="empty">The capture is too short for one.</p>'
+    parts = {"cloud": cloud, "spectrogram": spectrogram, "style": style}
+    return _controls(colour) + Template(_LINKED).substitute(parts)
+
+
+def write_view(
+    path: str | Path, run_view: RunView, *, name: str = "view", colour: str = "part"
+) -> None:
+    """Write the view page as one file that opens without a network.
+
+    Pictures that the page saves are called ``name``. When it opens, colours show ``colour``, one of
+    `COLOURS`. InputError if the file cannot be written.
+    """
     write_page(
         path,
         Titles("rtradar view", run_view.heading, run_view.subtitle),
-        _controls(colour),
-        (_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),),
+        "",
+        (linked_views(run_view, colour, style="whole"),),
         data=view_data(run_view) | {"name": name},
-        scripts=("plots.js", "figure.js", "linked.js"),
+        scripts=("plots.js", "figure.js", "linked.js", "view.js"),
     )
 
 

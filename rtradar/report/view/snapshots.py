@@ -3,7 +3,7 @@
 # ruff: noqa: RUF009 - the calls in the dataclass make its fields
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +93,11 @@ class Snapshots:
     def direct(self) -> NDArray[np.bool_]:
         """Whether each echo has a single reflection, that on the body, (echo,)."""
         return self.echo_bounces == 1
+
+    def every(self, number: int) -> Snapshots:
+        """Return a copy with every ``number``-th snapshot, from the first on."""
+        stepped = (one.name for one in fields(self) if one.metadata["axes"][0] == "step")
+        return replace(self, **{name: getattr(self, name)[::number] for name in stepped})
 
     def nearest(self, time_s: float) -> int:
         """Return the index of the snapshot nearest to this time [s]."""
