@@ -49,7 +49,18 @@ def add(commands: Subcommands) -> None:
 
 
 def _add_dataset(dataset: OneLineParser) -> None:
-    build = dataset.commands().add_parser(
+    commands = dataset.commands()
+    init = commands.add_parser("init", help="write a file that says what a collection shall hold")
+    init.add_argument(
+        "spec",
+        metavar="FILE",
+        nargs="?",
+        type=path,
+        default="dataset.toml",
+        help="new file, with comments on all keys (default: %(default)s)",
+    )
+    init.set_defaults(command=_dataset_init)
+    build = commands.add_parser(
         "build",
         help="make the samples of a collection that are missing or damaged; may be run again",
     )
@@ -71,6 +82,12 @@ def _add_dataset(dataset: OneLineParser) -> None:
         command=_dataset_build,
         stopped="the same command goes on with the samples that '{out}' has not yet",
     )
+    export = commands.add_parser(
+        "export", help="copy a whole collection into one Zarr group, with a data card"
+    )
+    export.option("data", "DIR", "folders of one collection or several", type=path, nargs="+")
+    export.option("--out", "X.zarr", "new group; nothing is replaced", type=path, required=True)
+    export.set_defaults(command=_dataset_export)
 
 
 def _add_train(train: OneLineParser) -> None:
@@ -155,6 +172,22 @@ def _add_evaluate(evaluate: OneLineParser) -> None:
     evaluate.flag("--overwrite", OVERWRITE_HELP)
     add_files(evaluate, json="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
+
+
+def _dataset_init(options: argparse.Namespace) -> int:
+    from rtradar.campaign import write_template
+
+    write_template(options.spec)
+    print(f"see {options.spec}; build it with: rtradar dataset build {options.spec} --out DIR")
+    return 0
+
+
+def _dataset_export(options: argparse.Namespace) -> int:
+    from rtradar.campaign import export_dataset
+
+    print(f"{export_dataset(options.data, options.out)} samples, described in its README.md")
+    print(f"see {options.out}")
+    return 0
 
 
 def _dataset_build(options: argparse.Namespace) -> int:

@@ -574,7 +574,7 @@ class Collection:
                 f'{", ".join(self.kinds)}; build it anew with keep = ["{kind}"]'
             )
         clouds = kind in ("clouds", "spatial")
-        shapes = set() if clouds else {read_shape(path, KINDS[kind]) for path in self._paths}
+        shapes = set() if clouds else set(self.shapes(KINDS[kind]))
         if len(shapes) > 1:
             raise InputError(
                 f"{kind} of collection {self._name} have {len(shapes)} sizes, such as "
@@ -584,6 +584,61 @@ class Collection:
         return SampleDataset(
             self._paths, self.labels.tolist(), KINDS[kind], points if clouds else None
         )
+
+    def provenance(self, index: int) -> Mapping[str, Any]:
+        """Return the provenance of a sample, without reading its cloud.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        mapping
+        """
+        provenance: Mapping[str, Any] = self._about[index]["provenance"]
+        return provenance
+
+    def array(self, index: int, name: str) -> NDArray[Any]:
+        """Read an array of a sample by its name in the file.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+        name : str
+            Name of the array, such as ``points`` or ``spectrogram``.
+
+        Returns
+        -------
+        ndarray
+
+        Raises
+        ------
+        InputError
+            If its file is damaged, or lacks the array.
+        """
+        return np.asarray(read_sample(self._paths[index], name))
+
+    def shapes(self, name: str) -> list[tuple[int, ...]]:
+        """Return the shape of an array of every sample, without reading the values.
+
+        Parameters
+        ----------
+        name : str
+            Name of the array, such as ``points`` or ``spectrogram``.
+
+        Returns
+        -------
+        list of tuple of int
+
+        Raises
+        ------
+        InputError
+            If a file is damaged, or lacks the array.
+        """
+        return [read_shape(path, name) for path in self._paths]
 
     def points(self, index: int) -> NDArray[np.float64]:
         """Read the RDT cloud of a sample.
@@ -598,7 +653,7 @@ class Collection:
         (n, 3) float64
             Time [s], range [m] and velocity [m/s] of each point.
         """
-        return np.asarray(read_sample(self._paths[index], "points"))
+        return self.array(index, "points")
 
     def spatial(self, index: int) -> NDArray[np.float64]:
         """Read the spatial cloud of the same capture.
@@ -619,4 +674,4 @@ class Collection:
         InputError
             If its file is damaged.
         """
-        return np.asarray(read_sample(self._paths[index], "spatial"))
+        return self.array(index, "spatial")

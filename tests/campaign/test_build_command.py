@@ -102,7 +102,7 @@ def test_units_change_where_two_of_the_next_are_full(
 @pytest.mark.parametrize(
     ("text", "options", "named"),
     [
-        ("colour = 1", [], "colour"),
+        ("colour = 1" + SPEC, [], "colour"),
         (SPEC, ["--workers", "0"], "--workers"),
         (SPEC, ["--workers", "2", "--scheduler", "tcp://host:1"], "--scheduler"),
         (SPEC, ["--json", "/none/told.json"], "--json"),
@@ -130,6 +130,20 @@ def test_bad_input_gets_one_clear_line_and_leaves_nothing(
     assert said.out == ""
     assert said.err.count("\n") == 1
     assert named in said.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_several_complaints_are_a_line_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "set.toml").write_text("colour = 1\nsize = 2" + SPEC.replace("walk", "dance"))
+    words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
+    assert main(words) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 3
+    for line, named in zip(lines, ("'colour'", "'size'", "'dance'"), strict=True):
+        assert line.startswith("rtradar: data set file '")
+        assert named in line
     assert not (tmp_path / "out").exists()
 
 

@@ -1,0 +1,214 @@
+"""Export of a data set as one Zarr group that explains itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+import shutil
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from rtradar.campaign.card import data_card
+from rtradar.clouds.dataset_store import ARRAYS, KINDS, Collection, attributes
+from rtradar.errors import InputError
+from rtradar.system.checks import brief
+from rtradar.system.files import check_place, cleanup_on_exit, uninterruptible
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
+_CHUNK_BYTES = 4_000_000  # about what is read at a time
+_MOST_A_CHUNK = 256
+_COUNTS = {"points": "n_points", "spatial": "n_spatial"}
+_COORDINATES = {"coordinate": ["time", "range", "velocity"], "axis": ["x", "y", "z"]}
+_UNITS = re.compile(r"_(s|m|deg|db)$")
+
+
+def export_dataset(folders: Sequence[Path], out: Path) -> int:
+    """Copy a data set into a Zarr group with a data card, for `xarray.open_zarr` and ``zarr``.
+
+    Arrays have ``sample`` as first dimension and are filled up with NaN where samples differ in
+    size. Memory stays constant, whatever the number of samples.
+
+    Parameters
+    ----------
+    folders : sequence of path
+        Folders made by ``rtradar dataset build``.
+    out : path
+        New group, which appears when it is complete.
+
+    Returns
+    -------
+    int
+        Number of samples.
+
+    Raises
+    ------
+    InputError
+        If the folders hold no whole data set, ``out`` exists already or cannot be written.
+    """
+    if os.path.lexists(out):
+        raise InputError(f"'{out}' is there already; give another name, or move it away (--out)")
+    check_place(out, "--out")
+    collection = Collection(*folders)
+    if not len(collection):
+        raise InputError(f"'{folders[0]}' holds no sample; build a data set that has some")
+    import zarr
+
+    with _new_folder(out) as work, warnings.catch_warnings():
+        # Both are in use everywhere, though no part of the specification of Zarr 3 yet.
+        warnings.filterwarnings("ignore", message=".*(specification|Consolidated metadata).*")
+        group = zarr.create_group(work)
+        _write_columns(group, collection)
+        _write_arrays(group, collection)
+        group.attrs.update(_summary(collection))
+        text = data_card(collection, dict(group.arrays()))
+        group.attrs["description"] = text
+        zarr.consolidate_metadata(work)
+        (work / "README.md").write_text(text, encoding="utf-8")
+    return len(collection)
+
+
+@contextmanager
+def _new_folder(out: Path) -> Iterator[Path]:
+    """Make a folder beside ``out``, which gets that name at the end, or is removed."""
+    work = out.with_name(f".{out.name}.{secrets.token_hex(6)}.part")
+
+    def remove() -> None:
+        shutil.rmtree(work, ignore_errors=True)
+
+    with cleanup_on_exit(remove):
+        try:
+            work.mkdir()
+            yield work
+            with uninterruptible():
+                if os.path.lexists(out):
+                    raise InputError(f"'{out}' was made meanwhile; give another name (--out)")
+                work.rename(out)
+        except OSError as error:
+            raise InputError(
+                f"cannot write '{out}': {error.strerror}; make room, or give another name (--out)"
+            ) from None
+        finally:
+            remove()
+
+
+def _put(group: Any, name: str, values: Any, dims: Sequence[str], **attrs: Any) -> None:
+    """Write a small array at once."""
+    array = np.asarray(values)
+    text = array.dtype.kind in "UO"
+    made = group.create_array(
+        name,
+        shape=array.shape,
+        chunks=tuple(max(1, size) for size in array.shape),
+        dtype="string" if text else array.dtype,
+        dimension_names=dims,
+    )
+    made[...] = array.astype(object) if text else array
+    made.attrs.update(attrs)
+
+
+def _write_columns(group: Any, collection: Collection) -> None:
+    """Write the ids, the labels and every entry of the provenance, one value for each sample."""
+    table = collection.to_pandas().drop(columns="folder")  # a place on this machine alone
+    _put(group, "sample", table.index.to_numpy(), ["sample"], long_name="id of the sample")
+    for name in table.columns:
+        if not _NAME.fullmatch(str(name)) or name in (*ARRAYS, *_COUNTS.values(), "sample"):
+            raise InputError(f"provenance holds {brief(name)}, which can name no array")
+        values = [None if value is None or value != value else value for value in table[name]]
+        attrs: dict[str, Any] = {}
+        if unit := _UNITS.search(name):
+            attrs["units"] = {"db": "dB"}.get(unit[1], unit[1])
+        if name == "label":
+            attrs |= {"classes": list(collection.classes), "long_name": "number of the class"}
+        _put(group, name, _column(values), ["sample"], **attrs)
+
+
+def _column(values: list[Any]) -> Any:
+    """Return values as whole numbers, as numbers with NaN, or as text, JSON but for strings."""
+    given = [value for value in values if value is not None]
+    if given and all(type(value) is int and abs(value) < 2**63 for value in values):
+        return np.array(values, dtype=np.int64)
+    if given and all(type(value) in (int, float) for value in given):
+        return np.array([np.nan if value is None else float(value) for value in values])
+    text = ["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values]
+    return np.array(text, dtype=object)
+
+
+def _write_arrays(group: Any, collection: Collection) -> None:
+    """Write clouds, maps, joints and their axes; only one chunk at a time is in memory."""
+    names = [KINDS[kind] for kind in collection.kinds]
+    axes = sorted({axis for name in names for axis in ARRAYS[name].dims if axis in ARRAYS})
+    for name in names:
+        shapes = np.array(collection.shapes(name))
+        shape = tuple(shapes.max(axis=0).tolist())
+        if name in _COUNTS:
+            said = f"number of points of {name}, which the others follow as NaN"
+            _put(group, _COUNTS[name], shapes[:, 0], ["sample"], long_name=said)
+        _stream(group, name, shape, ("sample", *ARRAYS[name].dims), collection)
+    for name in axes:
+        first = collection.array(0, name)
+        if all(np.array_equal(collection.array(i, name), first) for i in range(len(collection))):
+            _put(group, name, first, [name], **attributes(name))
+        else:
+            size = max(shape[0] for shape in collection.shapes(name))
+            _stream(group, name, (size,), ("sample", name), collection, f"{name}_of_sample")
+    dims = {dim for name in names for dim in ARRAYS[name].dims}
+    known = _COORDINATES | (
+        {"joint": collection[0].provenance["joint_names"]} if "joint" in dims else {}
+    )
+    for name, values in known.items():
+        _put(group, name, np.array(values, dtype=object), [name])
+
+
+def _stream(
+    group: Any,
+    name: str,
+    shape: tuple[int, ...],
+    dims: Sequence[str],
+    collection: Collection,
+    own_name: str | None = None,
+) -> None:
+    kind = np.dtype(ARRAYS[name].dtype)
+    each_bytes = max(1, int(np.prod(shape)) * kind.itemsize)
+    step = min(max(1, _CHUNK_BYTES // each_bytes), _MOST_A_CHUNK, len(collection))
+    array = group.create_array(
+        own_name or name,
+        shape=(len(collection), *shape),
+        chunks=(step, *(max(1, size) for size in shape)),
+        dtype=kind,
+        dimension_names=dims,
+        fill_value=np.nan,
+    )
+    array.attrs.update(attributes(name))
+    bar: dict[str, Any] = {"desc": name, "unit": "chunk", "disable": None, "leave": False}
+    for begin in tqdm(range(0, len(collection), step), **bar):
+        block = np.full((min(step, len(collection) - begin), *shape), np.nan, kind)
+        for row, index in enumerate(range(begin, begin + len(block))):
+            values = collection.array(index, name)
+            block[row][tuple(map(slice, values.shape))] = values
+        array[begin : begin + len(block)] = block
+
+
+def _summary(collection: Collection) -> dict[str, Any]:
+    """Return the attributes of the group."""
+    table = collection.to_pandas()
+    radars = {}
+    for provenance in (collection.provenance(index) for index in range(len(collection))):
+        radars[str(provenance.get("radar"))] = provenance.get("radar_parameters")
+    return {
+        "title": f"Radar point clouds of {len(collection)} motions, simulated by rtradar",
+        "classes": list(collection.classes),
+        "counts": dict(sorted(Counter(collection.labels.tolist()).items())),
+        "licences": dict(Counter(map(str, table.get("licence", ["unknown"] * len(table))))),
+        "radars": radars,
+        # Not "coordinates", a name that has a meaning of its own in these files.
+        "world_axes": "x from the radar to the person, y left, z up [m]",
+    }
