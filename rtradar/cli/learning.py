@@ -30,7 +30,11 @@ def add(commands: Subcommands) -> None:
         "dataset",
         "make labelled point clouds of many recordings, radars, scenes and fidelities",
         _add_dataset,
-        ("rtradar dataset build set.toml --out out/clouds",),
+        (
+            "rtradar dataset init set.toml",
+            "rtradar dataset build set.toml --out out/clouds",
+            "rtradar dataset export out/clouds --out clouds.zarr",
+        ),
     )
     add_command(
         commands,
