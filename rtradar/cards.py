@@ -33,7 +33,7 @@ var(--color-foreground-primary, var(--rtradar-ink))));
   vertical-align: top; max-width: none; white-space: normal; font-weight: 400;
   border-bottom: 1px solid var(--jp-border-color2, \
 var(--color-background-border, var(--rtradar-line))); }
-.rtradar-card th { padding-right: 14px; width: 9em; }
+.rtradar-card th { padding-right: 14px; width: 10.5em; }
 .rtradar-card img { flex: 1 1 300px; min-width: 0; max-width: min(100%, 520px); height: auto; }
 .rtradar-card p { margin: 2px 0; }
 """

@@ -59,4 +59,5 @@ def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.fl
 
 
 def _span(least: float, most: float) -> str:
-    return f"{least:.2f}" if most - least < 0.005 else f"{least:.2f} to {most:.2f}"
+    low, high = (f"{round(value, 2) + 0.0:.2f}" for value in (least, most))  # never -0.00
+    return low if low == high else f"{low} to {high}"

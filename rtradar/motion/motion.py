@@ -73,6 +73,18 @@ class Motion:
     ------
     InputError
         Where shapes do not fit each other, a value is not finite, or the tree is not one.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> rt.synthetic_motion("walk", seed=0)
+    Motion synthetic:walk
+      duration  3 s
+      frames    361 at 120 Hz
+      joints    22, from root to r_hand
+      height    1.7 m from the lowest to the highest joint
+      place     root at x -1.79 to 1.79, y -0.02 to 0.02, z 0.95 to 0.99 m
+      path      3.59 m over the floor
     """
 
     name: str
@@ -132,7 +144,10 @@ class Motion:
         return text_card("Motion", self.name, lines)
 
     def _repr_html_(self) -> str:
-        return html_card("Motion", self.name, {"": display.rows(self)})
+        from rtradar.motion.picture import picture_from_the_side
+
+        picture = picture_from_the_side(self)
+        return html_card("Motion", self.name, {"": display.rows(self)}, picture=picture)
 
     def _refusal(self, why: str) -> InputError:
         return InputError(f"Motion {self.name}: {why}")
@@ -174,6 +189,7 @@ class Motion:
 
         Examples
         --------
+        >>> import rtradar as rt
         >>> axes = rt.synthetic_motion("walk", seed=0).plot()
         >>> axes.get_ylabel()
         'z [m]'

@@ -12,7 +12,17 @@ from matplotlib.lines import Line2D
 
 from rtradar.motion.display import poses
 from rtradar.motion.motion import Motion
-from rtradar.system.figure_style import LIGHT, STYLE, WIDTH_IN, dress, figure_for, fit, theme_of
+from rtradar.system.figure_style import (
+    LIGHT,
+    STYLE,
+    WIDTH_IN,
+    dress,
+    figure_for,
+    fit,
+    new_figure,
+    png_of,
+    theme_of,
+)
 
 _POSES, _PATH_POSES = 6, 400
 """Numbers of skeletons, and of points of the root's path."""
@@ -26,7 +36,7 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     across = int(span[1] > span[0])  # the body is seen where it is wider
     if ax is not None:
         handles = _draw(ax, motion, (across, 2), motion.name)
-        ax.legend(handles=handles, loc="best")
+        ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
         dress(ax, title=motion.name)
         return ax
     wide, *tall = (float(span[axis]) + 0.4 for axis in (across, 2, 1 - across))
@@ -46,6 +56,13 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
         handles=handles, loc="outside lower center", ncols=_POSES, labelcolor=theme.text, **style
     )
     return side
+
+
+def picture_from_the_side(motion: Motion) -> bytes:
+    """Draw the view from the side as a PNG file, for a card."""
+    figure = new_figure(3.2)
+    plot_motion(motion, figure.add_subplot())
+    return png_of(figure)
 
 
 def _draw(axes: Axes, motion: Motion, seen: tuple[int, int], title: str) -> list[Line2D]:

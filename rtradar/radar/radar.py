@@ -92,6 +92,23 @@ class Radar:
     ------
     InputError
         Where a value has no physical meaning.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> radar = rt.Radar(name="24 GHz", start_frequency_hz=24e9, bandwidth_hz=1e9)
+    >>> radar
+    Radar 24 GHz
+      sweep     24 GHz to 25 GHz, vertical polarisation
+      chirp     62.5 µs, 256 samples at 4.096 MHz
+      channels  12 Tx × 8 Rx = 96 (each line by itself)
+      frame     100 ms every 25 ms: 133 cycles of 750 µs
+      position  (-4, 1, 1) m, boresight +x
+      range     38.37 m, resolution 14.99 cm
+      velocity  ±4.079 m/s, resolution 0.0613 m/s
+      angle     ±78.4° in azimuth and elevation, resolution 2.07° at boresight
+    >>> print(f"{radar.max_velocity_mps:.2f} m/s")
+    4.08 m/s
     """
 
     name: str = "custom"
@@ -147,6 +164,12 @@ class Radar:
         Returns
         -------
         Radar
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> rt.Radar.preset("paper-77ghz").start_frequency_hz
+        77000000000.0
         """
         make = PRESETS.find(name, instead=", or the path of a TOML file")
         with PRESETS.guarded(name):
@@ -201,6 +224,7 @@ class Radar:
 
         Examples
         --------
+        >>> import rtradar as rt
         >>> axes = rt.Radar.preset("paper-12ghz").plot()
         >>> axes.get_xlabel()
         'y [mm]'

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.radar import Radar
 from rtradar.scene.objects import Wall
 from rtradar.scene.scene import Scene
+from rtradar.system.checks import printable
 from rtradar.system.figure_labels import Label, around, place_labels
-from rtradar.system.figure_style import STYLE, axes_for, dress, theme_of
+from rtradar.system.figure_style import STYLE, axes_for, dress, new_figure, png_of, theme_of
 
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
@@ -48,16 +49,15 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
 
 def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
-    own = Radar().position_m if radar is None else radar.position_m
-    x, y = (own if scene.radar_position_m is None else scene.radar_position_m)[:2]
+    (x, y), limits = _place_and_limits(scene, radar)
     person = scene.person_position_m
-    limits = plan_limits(scene, [(x, y), (x + _ARROW_M, y), person])
     axes = axes_for(ax, height_of_plan(limits))
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
     draw_radar(axes, (x, y))
     axes.plot(*person, "o", color=theme.person, markersize=7)
-    dress(axes, title=f"{scene.name}: {scene.description}", note=plan_note(scene))
+    title = printable(f"{scene.name}: {scene.description}")
+    dress(axes, title=title, note=plan_note(scene))
     others = [
         Label("radar", around((x, y), 12.0), theme.radar),
         Label("person", around(person, 12.0), theme.person),
@@ -66,6 +66,22 @@ def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     avoided = [_square((x + fraction * _ARROW_M, y)) for fraction in np.linspace(0, 1, 12)]
     name_parts(axes, scene, others, [*avoided, _square(person)])
     return axes
+
+
+def picture_of_plan(scene: Scene) -> bytes:
+    """Draw the plan of a scene as a PNG file, for a card."""
+    figure = new_figure(height_of_plan(_place_and_limits(scene, None)[1]))
+    plot_scene(scene, None, figure.add_subplot())
+    return png_of(figure)
+
+
+def _place_and_limits(
+    scene: Scene, radar: Radar | None
+) -> tuple[tuple[float, float], NDArray[np.float64]]:
+    """Return the radar's place in a plan (2,) and the limits of the plan (2, 2) [m]."""
+    own = Radar().position_m if radar is None else radar.position_m
+    x, y = (own if scene.radar_position_m is None else scene.radar_position_m)[:2]
+    return (x, y), plan_limits(scene, [(x, y), (x + _ARROW_M, y), scene.person_position_m])
 
 
 def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:

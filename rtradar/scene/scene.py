@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -126,7 +126,13 @@ class Scene:
         return text_card("Scene", self.name, display.brief_rows(self))
 
     def _repr_html_(self) -> str:
-        return html_card("Scene", self.name, display.tables(self))
+        from rtradar.scene.plan import picture_of_plan
+
+        picture = None
+        if self._parts:
+            with suppress(InputError):  # the file of a mesh may be gone
+                picture = picture_of_plan(self)
+        return html_card("Scene", self.name, display.tables(self), picture=picture)
 
     @classmethod
     def load(cls, source: str | Path) -> Scene:
@@ -146,6 +152,19 @@ class Scene:
         InputError
             Where there is no such scene, the file is not TOML, or anything in it has no meaning;
             the message names the file, the table and key, the value, and what is allowed.
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> rt.Scene.load("bedroom")
+        Scene bedroom
+          description  6.4 by 4.4 by 2.5 m, plasterboard, a bed, a wardrobe, a desk
+          room         6.4 × 4.4 × 2.5 m
+          radar        at (-4, 1, 1) m
+          person       at (0, 0) m
+          walls        6: near, far, right, left, floor, ceiling
+          furniture    6: bed, wardrobe, desk, desk chair, radiator, door
+          materials    plasterboard, wood, chipboard, metal
         """
         path = Path(source) if Path(source).suffix == ".toml" else _named(str(source))
         table = read_toml(path, "scene", "give a TOML file or the name of a scene")
@@ -174,6 +193,7 @@ class Scene:
 
         Examples
         --------
+        >>> import rtradar as rt
         >>> axes = rt.Scene.load("living-room").plot()
         >>> axes.get_xlabel()
         'x [m]'

@@ -114,6 +114,26 @@ def new_figure(height_in: float, theme: str = "light", width_in: float = WIDTH_I
     return Figure(figsize=size, dpi=STYLE["figure.dpi"], facecolor=colour, layout="constrained")
 
 
+def png_of(figure: Figure) -> bytes:
+    """Return the PNG file of a figure of `new_figure`.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure that is drawn.
+
+    Returns
+    -------
+    bytes
+        Content of the file.
+    """
+    from io import BytesIO
+
+    file = BytesIO()
+    figure.savefig(file, format="png")
+    return file.getvalue()
+
+
 def figure_for(height_in: float) -> Figure:
     """Make a figure of pyplot, which a notebook shows and ``pyplot.show()`` opens.
 
