@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
@@ -342,27 +343,51 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert re.fullmatch(r"rtradar \d+\.\d+\.\d+\n", capsys.readouterr().out)
 
 
+HEAVY = {
+    *("numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh"),
+    *("torch", "dask", "sklearn", "xarray", "pandas", "zarr"),
+}
+
+
+def imported(code: str) -> list[str]:
+    """Heavy packages that a process has imported after this code."""
+    code += f"\nimport sys; print(sorted({HEAVY | {'numpy'}} & set(sys.modules)))"
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    return list(ast.literal_eval(done.stdout.splitlines()[-1]))
+
+
 def test_import_is_quick_and_light() -> None:
-    heavy = [
-        "numba",
-        "mitsuba",
-        "drjit",
-        "scipy",
-        "matplotlib",
-        "h5py",
-        "skimage",
-        "trimesh",
-        "torch",
-        "dask",
-        "sklearn",
-    ]
-    code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
-    assert (
-        subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        ).stdout.strip()
-        == "[]"
+    assert not set(imported("import rtradar")) - {"numpy"}
+
+
+@pytest.mark.parametrize("words", [[], ["--help"], ["--version"], ["run", "--fidelty", "x"]])
+def test_help_and_unknown_options_need_no_numpy(words: list[str]) -> None:
+    assert "numpy" in imported("import numpy")
+    assert not set(imported(f"from rtradar.cli import main; main({words})")) - (
+        {"numpy"} if "run" in words else set()
     )
+
+
+def test_wrong_input_is_refused_before_anything_slow_is_imported(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("bandwidth_hz : 4e9\n")
+    bad, walk = str(tmp_path / "bad.toml"), ["run", "synthetic:walk", "--out", "o"]
+    refused = [
+        *([*walk, *words.split()] for words in ("--radar x", "--scene x", "--fidelity x")),
+        *([*walk, *words.split()] for words in ("--pfa 3", "--seed x", "--detector x")),
+        *([*walk, option, bad] for option in ("--radar", "--scene")),
+        ["run", "synthetic:fly", "--out", "o"],
+        ["run", "none.bvh", "--out", "o"],
+        ["run", "none.amc", "--skeleton", "none.asf", "--out", "o"],
+        ["compare", "none.bvh", "--out", "o"],
+        ["compare", "synthetic:walk", "--fidelities", "analytic,x", "--out", "o"],
+        ["view", "none"],
+        ["export", "none", "--out", "o.mat"],
+    ]
+    code = f"from rtradar.cli import main\nassert [main(words) for words in {refused}] == " + str(
+        [2] * len(refused)
+    )
+    assert not set(imported(code)) - {"numpy"}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import add_command, add_files, path, seconds
+from rtradar.cli.values import add_command, add_files, path, seconds, there
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
@@ -37,7 +37,7 @@ def add(commands: Subcommands) -> None:
 
 
 def _add_view(view: OneLineParser) -> None:
-    view.option("folder", "DIR", "folder of 'rtradar run --out DIR'", type=path)
+    view.option("folder", "DIR", "folder that 'rtradar run --out DIR' made", type=there)
     view.option(
         "--out",
         "FILE.html",
@@ -63,8 +63,8 @@ def _add_export(export: OneLineParser) -> None:
     export.option(
         "source",
         "SOURCE",
-        "folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd",
-        type=path,
+        "folder that rtradar run --save-if made, or a cloud: .npz, .ply or .pcd",
+        type=there,
     )
     export.option(
         "--out",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -187,6 +188,13 @@ def path(text: str) -> Path:
     """Read a path; an empty one is refused, for it would be the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("it is empty; give the name of a file or folder")
+    return Path(text)
+
+
+def there(text: str) -> Path:
+    """Read the path of a file or folder that exists."""
+    if not os.path.lexists(path(text)):
+        raise argparse.ArgumentTypeError(f"there is no '{text}'; check the path")
     return Path(text)
 
 

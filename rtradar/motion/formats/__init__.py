@@ -56,7 +56,11 @@ def load_motion(
     # Before the reader is loaded, which takes longer.
     for needed in (file, skeleton) if name in READERS.built_in else ():
         if needed is not None and not os.path.lexists(needed):
-            raise InputError(f"{needed}: there is no such file; check the path")
+            kind = Path(needed).suffix.upper().removeprefix(".")
+            raise InputError(
+                f"{needed}: cannot read this {kind} file (No such file or directory); check the "
+                "path"
+            )
     read = READERS[name]
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters
