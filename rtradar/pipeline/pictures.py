@@ -15,11 +15,13 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.processing import Clouds
+from rtradar.radar import Radar
 from rtradar.report.figures import rooms
 from rtradar.report.figures.canvas import save_figure
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.plots import thinned as average
 from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure
 
 _TRACK_POINTS = 400
@@ -30,11 +32,21 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
 
     Returns the PNG files by their titles, in the order in which they are best looked at.
     """
+    drawn, frame = draw_found(folder, clouds, capture.radar, capture.settings)
+    if capture.inside:
+        with h5py.File(folder / "maps.h5") as maps:
+            drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
+    return drawn
+
+
+def draw_found(
+    folder: Path, clouds: Clouds, radar: Radar, settings: RunSettings
+) -> tuple[dict[str, Path], int]:
+    """Draw ``maps.h5`` of this folder and the clouds; also return the frame that was chosen."""
     drawn: dict[str, Path] = {}
-    parameters = {"parameters": capture.settings.parameters()}
     with open_maps(folder / "maps.h5") as maps:
-        found = maps, clouds.rdt.points, clouds.spatial, capture.radar, parameters
-        plots = Plots(*found, new_figure=new_figure)
+        found = maps, clouds.rdt.points, clouds.spatial, radar
+        plots = Plots(*found, {"parameters": settings.parameters()}, new_figure=new_figure)
         angles = [name for name in ("azimuth", "elevation") if name in maps]
         pictures: dict[str, tuple[str, Callable[[], Axes]]] = {
             "Range over time": ("range_time.png", plots.range_time)
@@ -52,10 +64,7 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
         for name, (file, draw) in pictures.items():
             drawn[name] = folder / file
             save_figure(draw().get_figure(root=True), drawn[name])
-        if capture.inside:
-            with h5py.File(folder / "maps.h5") as file:
-                drawn |= _draw_room(folder, capture, capture.inside, file, plots.frame()[0])
-    return drawn
+        return drawn, plots.frame()[0]
 
 
 def _draw_room(

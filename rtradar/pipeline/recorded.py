@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, Unpack
@@ -17,6 +16,7 @@ from tqdm import tqdm
 from rtradar.errors import InputError
 from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.memory import IN_A_FOLDER, bytes_of_maps, refuse_large
+from rtradar.pipeline.pictures import draw_found
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.summary import plain, summary_of_samples
@@ -82,29 +82,28 @@ def process_samples(
     started = time.perf_counter()
     blocks = _Blocks(samples, radar, in_memory=out is None)
     processing = Processing.of(radar, settings)
-    folder_of_files = (
-        nullcontext() if out is None else atomic_folder(Path(out), RUN_FILES, overwrite=overwrite)
-    )
-    with folder_of_files as folder:
-        file: Path | BinaryIO = BytesIO() if folder is None else folder / "maps.h5"
+    maps = None
+    if out is None:
+        file = BytesIO()
         clouds = _stream(blocks, processing, settings, file)
-        maps = None
-        with processing.stages.time("write"):
-            if folder is not None:
-                write_clouds(folder, clouds)
-            else:
-                with open_maps(file) as maps:
-                    maps.load()
+        with processing.stages.time("write"), open_maps(file) as maps:
+            maps.load()
         summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-        if folder is not None:
+    else:
+        with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
+            clouds = _stream(blocks, processing, settings, folder / "maps.h5")
+            with processing.stages.time("write"):
+                write_clouds(folder, clouds)
+            with processing.stages.time("pictures"):
+                draw_found(folder, clouds, radar, settings)
+            summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
             summary["files"] = RUN_FILES.list_of(folder)
-        text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
-        if folder is not None:
+            text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
             (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
-        summary=json.loads(text),
+        summary=json.loads(json.dumps(summary, allow_nan=False, default=plain)),
         radar=radar,
         out=None if out is None else Path(out),
         _in_memory=maps,

@@ -84,10 +84,14 @@ def test_other_shapes_and_blocks_give_the_same(samples: xr.DataArray) -> None:
         assert_same(rt.process_samples(same, RADAR), expected)
 
 
-def test_a_folder_holds_the_maps_and_clouds(samples: xr.DataArray, tmp_path: Path) -> None:
+@pytest.mark.drawn
+def test_a_folder_holds_maps_clouds_and_pictures(samples: xr.DataArray, tmp_path: Path) -> None:
     written = rt.process_samples(samples, RADAR, tmp_path / "out")
     assert_same(written, rt.process_samples(samples, RADAR))
-    assert set(written.summary["files"]) >= {"maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"}
+    assert set(written.summary["files"]) >= {
+        *("maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"),
+        *("range_doppler.png", "spectrogram.png", "range_angle.png", "cloud_xyz.png"),
+    }
     again = rt.process_samples(samples, RADAR, out=tmp_path / "out", pfa=1e-4)
     assert again.summary["parameters"]["pfa"] == 1e-4
 
