@@ -23,6 +23,7 @@ from rtradar.pipeline.summary import plain, summary_of_samples
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, write_clouds
 from rtradar.radar import Radar
+from rtradar.report import write_report
 from rtradar.settings import ProcessingOptions, RunSettings
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.output_folder import atomic_folder
@@ -95,8 +96,16 @@ def process_samples(
             with processing.stages.time("write"):
                 write_clouds(folder, clouds)
             with processing.stages.time("pictures"):
-                draw_found(folder, clouds, radar, settings)
+                pictures, _ = draw_found(folder, clouds, radar, settings)
             summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
+            write_report(
+                folder / "report.html",
+                radar=radar,
+                summary=summary,
+                pictures=pictures,
+                rdt_points=clouds.rdt.points,
+                spatial=clouds.spatial,
+            )
             summary["files"] = RUN_FILES.list_of(folder)
             text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
             (folder / "summary.json").write_text(text + "\n", encoding="utf-8")

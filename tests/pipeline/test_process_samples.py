@@ -90,7 +90,13 @@ def test_a_folder_holds_maps_clouds_and_pictures(samples: xr.DataArray, tmp_path
     assert_same(written, rt.process_samples(samples, RADAR))
     assert set(written.summary["files"]) >= {
         *("maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"),
-        *("range_doppler.png", "spectrogram.png", "range_angle.png", "cloud_xyz.png"),
+        *(
+            "range_doppler.png",
+            "spectrogram.png",
+            "range_angle.png",
+            "cloud_xyz.png",
+            "report.html",
+        ),
     }
     again = rt.process_samples(samples, RADAR, out=tmp_path / "out", pfa=1e-4)
     assert again.summary["parameters"]["pfa"] == 1e-4
