@@ -21,8 +21,9 @@ import drawings  # noqa: E402
 import rtradar  # noqa: E402
 
 project, author, release = "rtradar", "rtradar developers", rtradar.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
-exclude_patterns = ["gallery"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
+# The gallery's pages are its .rst files; their notebooks are for download.
+exclude_patterns = ["gallery", "auto_gallery/*.ipynb"]
 default_role = "py:obj"
 html_theme = "furo"
 html_title = f"rtradar {release}"
@@ -33,6 +34,11 @@ html_show_sourcelink = False
 numpydoc_show_class_members = False
 autodoc_typehints = "none"  # the docstrings say more: shapes, units
 autodoc_member_order = "bysource"
+
+# The notebook is stored without what it prints and draws, and is executed for its page.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
 
 sphinx_gallery_conf = {
     "examples_dirs": "gallery",
