@@ -3,7 +3,7 @@
 Each module here adds commands to the parser; the packages that do the work are imported on use.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that tells what is wrong,
-where, what is allowed and how to mend it.
+where, what is allowed and how to mend it. 130: stopped by Ctrl-C.
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ def _flushed(status: int) -> int:
 
 def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     # After the first moments, in which a signal would still show a traceback.
+    from rtradar.cli.ending import INTERRUPTED
     from rtradar.cli.values import fail
     from rtradar.system.files import DISK_ERRORS
 
@@ -82,7 +83,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     except (BackendError, CampaignError, ExtensionError) as error:
         return fail(1, error)
     except KeyboardInterrupt:
-        return fail(1, f"stopped by the user; {options.stopped.format(**vars(options))}")
+        return fail(INTERRUPTED, f"stopped by the user; {options.stopped.format(**vars(options))}")
     except MemoryError as error:
         return fail(1, f"out of memory ({str(error) or 'no more to be had'}); {_WHOLE}")
     except BrokenPipeError:

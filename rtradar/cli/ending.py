@@ -25,6 +25,8 @@ _SIGNALS = {
     "SIGHUP": "its terminal was closed",
 }
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+INTERRUPTED = 128 + signal.SIGINT
+"""Exit status after Ctrl-C, as shells have it."""
 _PATIENCE_S = 0.5  # until killed children are gone
 _ended = threading.Event()
 
@@ -77,7 +79,7 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     flushed.join(0.2)
     with contextlib.suppress(OSError):
         os.write(stderr, (terminal + line).encode(errors="replace"))
-    os._exit(1)
+    os._exit(INTERRUPTED if number == signal.SIGINT else 1)
 
 
 def _nothing() -> None:

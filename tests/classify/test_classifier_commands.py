@@ -169,7 +169,7 @@ def test_an_interrupted_command_says_how_to_go_on(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(study.training, "train_network", interrupted)
-    assert rtradar("train", collection, "--out", tmp_path, *TINY) == 1
+    assert rtradar("train", collection, "--out", tmp_path, *TINY) == 130
     said = capsys.readouterr().err
     assert said.splitlines()[-1].startswith(
         "rtradar: stopped by the user; the same command goes on"
