@@ -20,7 +20,7 @@ from rtradar.report.figures import rooms
 from rtradar.report.figures.canvas import save_figure
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.plots import thinned as average
-from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.scatter.multipath.ghosts import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure
 
@@ -89,28 +89,42 @@ def _draw_room(
     if suffix:
         after = removed(maps["range_doppler"]).strip().capitalize()
         panels[after] = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
-    found = ghosts(inside.model, radar, time_s)
+    found = [
+        ghost for ghost in ghosts(inside.model, radar, time_s) if ghost.range_m < radar.max_range_m
+    ]
+    # Out and back over the same walls is as long as the reverse: both have one number.
+    key = dict(enumerate(dict.fromkeys(_walls(one.path) for one in sorted(found, key=_range)), 1))
+    numbers = {walls: number for number, walls in key.items()}
+    numbered = {numbers[_walls(ghost.path)]: ghost for ghost in found}
+    marked = [
+        rooms.GhostMark(number, ghost.range_m, ghost.velocity_mps)
+        for number, ghost in numbered.items()
+    ]
     heading = f"{capture.title}, window at {time_s:.2f} s"
-    # Out and back over the same walls is as long as the reverse: one mark, with their names.
-    by_walls = {_walls(ghost.path): ghost for ghost in found}
-    marked = [(walls, ghost.range_m, ghost.velocity_mps) for walls, ghost in by_walls.items()]
     name = f"Range-Doppler{' before and after' if suffix else ''}, and ghosts"
     drawn = {name: folder / "clutter_removal.png"}
-    rooms.draw_before_after(drawn[name], panels, marked, radar, heading)
+    rooms.draw_before_after(drawn[name], panels, marked, key, radar, heading)
     if "azimuth" in maps and "range_azimuth" + suffix in maps:
         name = "Range-azimuth with walls and ghosts"
         drawn[name] = folder / "range_azimuth_walls.png"
-        places = [(ghost.path, ghost.range_m, ghost.azimuth_rad) for ghost in found]
+        places = [
+            rooms.GhostMark(numbers[_walls(ghost.path)], ghost.range_m, ghost.azimuth_rad)
+            for ghost in found
+        ]
         power, azimuth = received("range_azimuth"), maps["azimuth"][:]
         windows = capture.processing.window_functions
         axes = power, azimuth, scene, radar
-        rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, heading, windows)
+        rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, key, heading, windows)
     track = body.motion.at(np.linspace(0, body.duration_s, _TRACK_POINTS))[0][:, 0, :2]
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
-    paths = {ghost.path: inside.model.course(ghost.path, middle) for ghost in found}
+    paths = {number: inside.model.course(ghost.path, middle) for number, ghost in numbered.items()}
     drawn["Plan of the room, with paths"] = folder / "plan.png"
-    rooms.draw_plan(folder / "plan.png", scene, radar, track, paths, heading)
+    rooms.draw_room_plan(folder / "plan.png", scene, radar, track, paths, key, heading)
     return drawn
+
+
+def _range(ghost: Ghost) -> float:
+    return ghost.range_m
 
 
 def _walls(path: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rtradar.radar import Radar
-from rtradar.report.figures import rooms as room_figures
+from rtradar.report.figures.rooms import draw_room_plan
 from rtradar.scene import Furniture, Scene, material, plan
 
 pytestmark = pytest.mark.drawn
@@ -32,8 +32,8 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
         position_m=(2.0, 0.0, 0.0),
         yaw_deg=30.0,
     )
-    room_figures.draw_plan(
-        tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, "title"
+    draw_room_plan(
+        tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, {}, "title"
     )
     every = chair.triangles().corners[..., :2]
     (corners,) = drawn

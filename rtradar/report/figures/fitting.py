@@ -1,4 +1,4 @@
-"""Limits of axes, fitted to where there is something to be seen."""
+"""What pictures show of a map: fitted limits of its axes, and what was not detected."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 HANDFUL = 3
 """Detections that may lie beyond each end of an axis, as false alarms do."""
 
+_STRONGEST = 20
 _FRACTION = 1e-3
 _FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
 _MARGIN, _LEAST_BINS = 0.15, 8
@@ -69,3 +70,28 @@ def above_floor(power: NDArray[np.floating]) -> NDArray[np.bool_]:
     """
     level = max(_FLOOR * float(np.median(power)), _BELOW_PEAK * float(power.max(initial=0)))
     return np.asarray(power > level)
+
+
+def masking_note(power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
+    """Return how many of the strongest cells are not detected, in a sentence with the reason.
+
+    Parameters
+    ----------
+    power : (range, velocity) float
+        Power of one frame, in linear units.
+    mask : (range, velocity) bool
+        Detections.
+
+    Returns
+    -------
+    str
+        Sentence, which is empty if all are detected, or nothing at all is.
+    """
+    strongest = np.argsort(power, axis=None)[-_STRONGEST:]
+    missed = int(np.count_nonzero(~mask.ravel()[strongest]))
+    if not missed or not mask.any():
+        return ""
+    return (
+        f"{missed} of the {_STRONGEST} strongest cells are not detected: strong cells about "
+        "them raise the threshold there (self-masking of CFAR)."
+    )

@@ -25,7 +25,7 @@ from rtradar.report.figures.canvas import (
     draw_view,
     field_unit,
 )
-from rtradar.report.figures.fitting import above_floor, fitted_limits
+from rtradar.report.figures.fitting import above_floor, fitted_limits, masking_note
 from rtradar.report.figures.maps import angle_label, rdt_points
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
@@ -37,9 +37,7 @@ _COLUMNS = 600
 
 _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
-_STRONGEST = 20
-"""Strongest cells of a frame, of which a picture says how many were not detected."""
-
+_HIGHEST_IN = 6.5
 _ANGLE_DB = 20.0  # below the peak: sidelobes of a line of eight are 13 dB or more below
 _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
 
@@ -114,7 +112,7 @@ class Plots:
             left, right = ax, None
         image, colours = draw_view(left, level, velocity, distance, view, unit=unit)
         left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
-        note = f"{colours} {self._masking_note(map_.values, mask)}"
+        note = f"{colours} {masking_note(map_.values, mask)}"
         what = "Range-Doppler map"
         what += f" and {np.count_nonzero(mask)} detections" if right is not None else ""
         title = self._title(f"{what},\n{when}", map_)
@@ -353,22 +351,31 @@ class Plots:
             panels, ups = [ax], ups[:1]
         else:
             # As high as equal scales make the panels, with their titles, labels and notes.
-            high = [4.3 * (limits[up][1] - limits[up][0]) / width for up in ups]
-            high = [height * min(1, 7 / sum(high)) for height in high]
-            figure = self.new_figure(sum(high) + 0.7 * len(ups) + 0.9)
-            panels = list(figure.subplots(len(ups), 1, squeeze=False, height_ratios=high)[:, 0])
+            ratios = [(limits[up][1] - limits[up][0]) / width for up in ups]
+            options: dict[str, Any] = {"squeeze": False}
+            if 4.3 * sum(ratios) > _HIGHEST_IN:  # beside each other
+                high = 4.3 / len(ups) * max(ratios)
+                options |= {"ncols": len(ups)}
+            else:
+                high = 4.3 * sum(ratios) + 0.7 * (len(ups) - 1)
+                options |= {"nrows": len(ups), "height_ratios": ratios}
+            figure = self.new_figure(min(high, 10.0) + 1.6)
+            panels = list(figure.subplots(**options).flat)
         for axes, up in zip(panels, ups, strict=True):
             dots = axes.scatter(points[:, 0], points[:, up], s=2.5, linewidths=0, **colours)
             own: dict[str, Any] = {"color": theme_of(axes).radar, "label": "radar"}
             own |= {"markersize": 8, "clip_on": False}
             axes.plot(place[0], place[up], "^", **own)
-            axes.set(xlabel=self._x_label, ylabel=f"{'xyz'[up]} [m]")
+            view = "from above" if up == 1 else "from the side"
+            axes.set(xlabel=f"{self._x_label}\n{view}", ylabel=f"{'xyz'[up]} [m]")
             axes.set(xlim=limits[0], ylim=limits[up], aspect="equal")
-            axes.legend(loc="best")
-            title = "From above" if up == 1 else "From the side"
-            if axes is panels[0]:
-                title = f"{self._title(heading, self.maps['range_doppler'])}\n{title}"
-            dress(axes, title=title, note=note if axes is panels[-1] else "")
+        beside = len(panels) if panels[0].get_position().y0 == panels[-1].get_position().y0 else 1
+        panels[0].legend(loc="best")
+        title = self._title(heading, self.maps["range_doppler"])
+        for axes in panels[1:]:
+            dress(axes, note="" if beside > 1 else note)
+        own_note = note if beside > 1 or len(panels) == 1 else ""
+        dress(panels[0], title=title, note=own_note, across=beside)
         add_colour_bar(dots, panels, VELOCITY_LABEL)
         return panels[0]
 
@@ -470,17 +477,6 @@ class Plots:
     def _velocity_limits(self) -> tuple[float, float]:
         counts, velocity = self._found.by_velocity, self.maps["velocity"].values
         return fitted_limits(counts, velocity, include=0.0)
-
-    def _masking_note(self, power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
-        """Say how many of the strongest cells are not detected, if some are."""
-        strongest = np.argsort(power, axis=None)[-_STRONGEST:]
-        missed = int(np.count_nonzero(~mask.ravel()[strongest]))
-        if not missed or not mask.any():
-            return ""
-        return (
-            f"{missed} of the {_STRONGEST} strongest cells are not detected: strong cells about "
-            "them raise the threshold there (self-masking of CFAR)."
-        )
 
     def _range_angle(
         self, name: str, time_s: float | None, ax: Axes | None, heading: bool = True

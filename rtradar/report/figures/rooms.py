@@ -1,120 +1,152 @@
-"""Pictures of a room: its plan with echo paths, and maps before and after clutter removal."""
+"""Pictures of a room: its plan with echo paths, and maps before and after clutter removal.
+
+Ghosts have numbers, the same in all pictures of a room, with a key below; their names would cover
+each other.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
 
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures import canvas
-from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, draw_view, field_unit
+from rtradar.report.figures.fitting import fitted_limits, masking_note
 from rtradar.report.figures.maps import angle_label
-from rtradar.scene import Scene, plan
-from rtradar.system.figure_labels import Label, around
-from rtradar.system.figure_style import STYLE, dress, new_figure, theme_of
+from rtradar.scene import Furniture, Scene
+from rtradar.scene.plan import (
+    draw_plan,
+    draw_radar,
+    feet_of_walls,
+    height_of_plan,
+    name_parts,
+    plan_limits,
+    plan_note,
+)
+from rtradar.system.figure_labels import Label, around, place_labels
+from rtradar.system.figure_style import DARK, dress, new_figure, theme_of
 
-_LEGEND: dict[str, Any] = {"fontsize": 8, "facecolor": "dimgrey", "labelcolor": "white"}
-_BOX = {"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1}
-_ARROW = {"arrowstyle": "-", "color": "red", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
-_GHOST: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": "red", "markersize": 9}
+_STRONG_DB = 30.0
+_HALF_TURN = 180.0
 
 
-def draw_plan(
+class GhostMark(NamedTuple):
+    """Place of a ghost in a picture: its number, range [m], and coordinate across the picture."""
+
+    number: int
+    range_m: float
+    across: float
+
+
+def draw_room_plan(
     path: Path,
     scene: Scene,
     radar: Radar,
     track: NDArray[np.float64],
-    paths: Mapping[str, NDArray[np.float64]],
+    paths: Mapping[int, NDArray[np.float64]],
+    key: Mapping[int, str],
     title: str,
 ) -> None:
     """Draw the room from above: walls, furniture, radar, the person's track and paths of echoes.
 
     ``track`` (time, 2) are positions of the person's root [m], ``paths`` the corners (point, 3) of
-    each path from Tx to Rx [m] by its name.
+    the path of each ghost [m] by its number, ``key`` the walls of each.
     """
     place = radar.position_m[:2]
-    limits = plan.plan_limits(scene, [place, *track])
-    figure = new_figure(plan.height_of_plan(limits) + 0.2 * math.ceil((len(paths) + 1) / 2))
-    axes = figure.add_subplot()
-    plan.draw_plan(axes, scene, limits)
-    # There may be more than ten paths.
-    axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])
-    for name, corners in paths.items():
-        axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
+    limits = plan_limits(
+        scene, [place, *track, *(xy for way in paths.values() for xy in way[:, :2])]
+    )
+    axes = new_figure(height_of_plan(limits) + 0.5).add_subplot()
     theme = theme_of(axes)
-    axes.plot(track[:, 0], track[:, 1], color=theme.person, linewidth=2.5, label="person")
-    plan.draw_radar(axes, place)
-    words = figure.legend(loc="outside lower center", ncols=2, fontsize=STYLE["legend.fontsize"])
-    for text in words.get_texts():
-        text.set_parse_math(False)
-    dress(axes, title=title, note=plan.plan_note(scene))
-    plan.name_parts(axes, scene, [Label("radar", around(place, 12.0), theme.radar)])
-    canvas.save_figure(figure, path)
+    draw_plan(axes, scene, limits)
+    # Paths over floor and ceiling are the same seen from above.
+    seen: dict[bytes, list[int]] = {}
+    for number, corners in paths.items():
+        seen.setdefault(np.round(corners[:, :2], 2)[[1, -2]].tobytes(), []).append(number)
+    labels = []
+    for turn, numbers in enumerate(seen.values()):
+        corners, colour = paths[numbers[0]][:, :2], theme.cycle[turn % len(theme.cycle)]
+        axes.plot(*corners.T, color=colour, linewidth=1.2)
+        first, last = max(pairwise(corners), key=lambda leg: float(np.ptp(leg, axis=0).sum()))
+        places = [((1 - at) * first + at * last).tolist() for at in (0.5, 0.35, 0.65, 0.2, 0.8)]
+        words = ", ".join(map(str, numbers))
+        labels.append(Label(words, [((x, y), (0.0, 0.0)) for x, y in places], colour))
+    axes.plot(*track.T, color=theme.person, linewidth=2.5)
+    draw_radar(axes, place)
+    middle = track[len(track) // 2].tolist()
+    labels += [
+        Label("radar", around((place[0], place[1]), 12.0), theme.radar),
+        Label("person", around((middle[0], middle[1]), 12.0), theme.person),
+    ]
+    square = np.array([[-0.03], [0.03]])
+    avoided = [point + square for point in track[:: len(track) // 20 + 1]]
+    notes = [_key("Paths of echoes over", key), plan_note(scene)]
+    dress(axes, title=f"Plan of the room\n{title}", note="\n".join(filter(None, notes)))
+    name_parts(axes, scene, labels, avoided)
+    canvas.save_figure(axes.get_figure(root=True), path)
 
 
 def draw_before_after(
     path: Path,
     maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.bool_]]],
-    ghosts: Sequence[tuple[str, float, float]],
+    ghosts: Sequence[GhostMark],
+    key: Mapping[int, str],
     radar: Radar,
     title: str,
 ) -> None:
-    """Draw range-Doppler maps with their detections, and ghosts where they are predicted.
+    """Draw range-Doppler maps, their detections beside them, and ghosts where they are predicted.
 
-    ``maps`` are, by the title of the panel, power summed over all channels [m^2] and detections,
-    (range, velocity); ``ghosts`` path over walls, range [m] and velocity [m/s] of each ghost.
+    ``maps`` are, by what was done with them, power summed over all channels [m^2] and detections,
+    (range, velocity); ``ghosts`` are marked over velocity [m/s].
     """
-    figure = canvas.new_figure(1 + 5.5 * len(maps), 5)
-    panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
+    figure = new_figure(1.2 + 3.2 * len(maps))
+    panels = figure.subplots(len(maps), 2, sharex=True, sharey=True, squeeze=False)
     unit = field_unit(radar, range_m=radar.range_m[:, None])
-    levels = [unit.level(power / radar.n_channels) for power, _ in maps.values()]
-    low, high = zip(*map(canvas.colour_limits, levels), strict=True)
-    for axes, (name, (_, mask)), level in zip(panels, maps.items(), levels, strict=True):
-        velocity = radar.velocity_mps(level.shape[1])
-        image = draw_levels(axes, level, velocity, radar.range_m, (min(low), max(high)))
+    found = np.sum([mask for _, mask in maps.values()], axis=0)
+    velocity, distance = radar.velocity_mps(found.shape[1]), radar.range_m
+    view = (
+        fitted_limits(found.sum(axis=0), velocity, include=[0.0, *(one.across for one in ghosts)]),
+        fitted_limits(found.sum(axis=1), distance, include=[one.range_m for one in ghosts]),
+    )
+    colours: tuple[float, float] | None = None
+    for (left, right), (name, (power, mask)) in zip(panels, maps.items(), strict=True):
+        level = unit.level(power / radar.n_channels)
+        if colours is None:
+            image, words = draw_view(left, level, velocity, distance, view, unit=unit)
+            colours = image.get_clim()
+        else:
+            draw_levels(left, level, velocity, distance, colours, interpolation="nearest")
         rows, columns = np.nonzero(mask)
-        style = {"s": 1, "color": "white", "alpha": 0.5, "label": "detected"}
-        axes.scatter(velocity[columns], radar.range_m[rows], **style)
-        axes.set(xlabel=VELOCITY_LABEL, title=f"{name}\n{len(rows)} detections")
-        axes.set(xlim=canvas.bin_edges(velocity), ylim=canvas.bin_edges(radar.range_m))
-        _mark(axes, ghosts, radar)
-    panels[0].set_ylabel("Range [m]")
-    panels[0].legend(loc="upper right", **_LEGEND)
-    figure.colorbar(image, ax=list(panels), label=unit.label("mean of channels"))
-    figure.suptitle(title, wrap=True)
+        style: dict[str, Any] = {"s": 2, "linewidths": 0, "color": theme_of(right).detection}
+        right.scatter(velocity[columns], distance[rows], **style)
+        labels = [_circle(axes, ghosts) for axes in (left, right)]
+        left.set_ylabel("Range [m]")
+        first, last = left is panels[0, 0], left is panels[-1, 0]
+        heading = f"{name}: {len(rows)} detections"
+        if first:
+            heading = f"Range-Doppler map and detections\n{title}\n{heading}"
+        notes = [masking_note(power, mask)]
+        if last:
+            notes = [words, _key("Circles are ghosts, predicted over", key), *notes]
+            for axes in (left, right):
+                axes.set_xlabel(VELOCITY_LABEL.replace(" (", "\n("))
+        dress(left, title=heading, note="\n".join(filter(None, notes)), grid=False, across=2)
+        dress(right)
+    canvas.add_colour_bar(image, list(panels.flat), unit.label("mean of channels"))
+    for left in panels[:, 0]:
+        left.set(xlim=view[0], ylim=view[1])
+        place_labels(left, labels[0])
     canvas.save_figure(figure, path)
-
-
-def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
-    """Draw circles at (name, range [m], horizontal coordinate) within the radar's range.
-
-    Names stand beside them toward the middle of the axes, far enough apart to be read.
-    """
-    label = "ghost over a wall, predicted"
-    inside = (ghost for ghost in ghosts if ghost[1] < radar.max_range_m)
-    (left, right), gap = axes.get_xlim(), 0.035 * radar.max_range_m
-    placed: list[tuple[float, float]] = []
-    for name, distance, across in sorted(inside, key=lambda ghost: ghost[1]):
-        axes.plot(across, distance, "o", label=label, **_GHOST)
-        label = ""
-        toward = 1 if across < (left + right) / 2 else -1
-        beside, place = across + 0.08 * toward * (right - left), distance
-        for other, taken in placed:
-            if abs(other - beside) < 0.25 * (right - left):
-                place = max(place, taken + gap)
-        placed.append((beside, place))
-        style: dict[str, Any] = {"fontsize": 7, "color": "white", "bbox": _BOX, "va": "center"}
-        style |= {"ha": "left" if toward > 0 else "right", "arrowprops": _ARROW}
-        axes.annotate(name, (across, distance), (beside, place), **style)
 
 
 def draw_range_azimuth_with_walls(
@@ -123,38 +155,89 @@ def draw_range_azimuth_with_walls(
     azimuth: NDArray[np.float64],
     scene: Scene,
     radar: Radar,
-    ghosts: Sequence[tuple[str, float, float]],
+    ghosts: Sequence[GhostMark],
+    key: Mapping[int, str],
     title: str,
     window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> None:
-    """Draw power over azimuth and range, with upright walls where they are.
+    """Draw power over azimuth and range, with upright walls and furniture where they are.
 
     ``power`` (range, azimuth) is summed over detected cells [m^2], ``azimuth`` are the angles of
-    its columns [rad], and ``ghosts`` path over walls, range [m] and azimuth [rad] of each ghost.
-    The ``window_functions`` are those of the transforms that gave the power.
+    its columns [rad], over which ``ghosts`` are marked. The ``window_functions`` are those of the
+    transforms that gave the power.
     """
-    figure = canvas.new_figure(8, 5.5)
-    axes = figure.subplots()
+    axes = new_figure(5.6).add_subplot()
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
-    values = unit.level(power / velocities)  # one echo is spread over as many velocities
-    limits = canvas.colour_limits(values, 50)  # cells that were not detected have no decibels
-    left, right = canvas.bin_edges(np.degrees(azimuth))
-    image = draw_levels(axes, values, np.degrees(azimuth), radar.range_m, limits)
+    level = unit.level(power / velocities)  # one echo is spread over as many velocities
+    strong, angles = level > level.max() - _STRONG_DB, np.degrees(azimuth)
+    view = (
+        fitted_limits(strong.sum(axis=0), angles, include=[np.degrees(g.across) for g in ghosts]),
+        fitted_limits(strong.sum(axis=1), radar.range_m, include=[g.range_m for g in ghosts]),
+    )
+    image, words = draw_view(axes, level, angles, radar.range_m, view, unit=unit, below_peak_db=40)
     place = np.asarray(radar.position_m)[:2]
-    for first, last, wall in plan.feet_of_walls(scene):
+    marked = [one._replace(across=float(np.degrees(one.across))) for one in ghosts]
+    labels = _circle(axes, marked)
+    for first, last, wall in feet_of_walls(scene):
         along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
-        angle, distance = np.degrees(np.arctan2(along[:, 1], along[:, 0])), np.hypot(*along.T)
-        axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
-        shown = (angle > left) & (angle < right) & (distance < radar.max_range_m)
-        inside = np.flatnonzero(shown)
-        if len(inside):
-            near = inside[len(inside) // 6]  # beside the middle, where names of ghosts stand
-            axes.annotate(wall.name, (angle[near], distance[near]), fontsize=8, color="white")
-    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title)
-    axes.set(xlim=(left, right), ylim=canvas.bin_edges(radar.range_m))
-    _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper right", **_LEGEND)
-    figure.colorbar(image, label=unit.label("detected cells"))
-    canvas.save_figure(figure, path)
+        labels += _line(axes, along, wall.name, "wall", linestyle="--")
+    for piece in scene.furniture:
+        kind = "furniture" if piece.triangles().closed else "reflector"
+        labels += _line(axes, _outline(piece) - place, piece.name, kind)
+    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]")
+    notes = [words, _key("Circles are ghosts, predicted over", key)]
+    notes += ["Dashed: walls. Outlined: furniture and reflectors."] if labels else []
+    note = "\n".join(filter(None, notes))
+    dress(axes, title=f"Range-azimuth map and room\n{title}", note=note, grid=False)
+    canvas.add_colour_bar(image, [axes], unit.label("detected cells"))
+    place_labels(axes, labels)
+    canvas.save_figure(axes.get_figure(root=True), path)
+
+
+def _line(axes: Axes, xy: NDArray[np.float64], name: str, kind: str, **style: Any) -> list[Label]:
+    """Draw points (point, 2) [m] from the radar over azimuth and range; return their name."""
+    angle, distance = np.degrees(np.arctan2(xy[:, 1], xy[:, 0])), np.hypot(*xy.T)
+    # A line behind the radar would cross the whole picture.
+    gaps = np.abs(np.diff(angle, prepend=angle[0])) > _HALF_TURN
+    # Maps are dark on every page.
+    axes.plot(
+        np.where(gaps, np.nan, angle), distance, color=getattr(DARK, kind), linewidth=1.2, **style
+    )
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    shown = (angle > left) & (angle < right) & (distance > low) & (distance < high)
+    points = np.column_stack([angle, distance])[shown]
+    if not len(points):
+        return []
+    chosen = points[(np.array([0.5, 0.3, 0.7, 0.1, 0.9]) * len(points)).astype(int)].tolist()
+    places = [place for x, y in chosen for place in around((x, y))[:17]]
+    return [Label(name, places, getattr(theme_of(axes), kind))]
+
+
+def _outline(piece: Furniture) -> NDArray[np.float64]:
+    """Return the outline of a piece seen from above, (point, 2) [m]."""
+    points = piece.triangles().vertices[:, :2]
+    try:
+        corners = points[ConvexHull(points).vertices]
+    except QhullError:  # an upright plate is a line
+        corners = points[np.lexsort(points.T)][[0, -1]]
+    steps = np.linspace(0, 1, 20)[:, None]
+    sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return np.concatenate([first + steps * (last - first) for first, last in sides])
+
+
+def _circle(axes: Axes, ghosts: Sequence[GhostMark]) -> list[Label]:
+    """Draw a circle about each ghost, and return the numbers to be written beside them."""
+    theme = theme_of(axes)
+    style: dict[str, Any] = {"markerfacecolor": "none", "markersize": 8}
+    for one in ghosts:
+        axes.plot(one.across, one.range_m, "o", markeredgecolor=theme.ghost, **style)
+    return [
+        Label(str(one.number), around((one.across, one.range_m), 9.0), theme.ghost)
+        for one in ghosts
+    ]
+
+
+def _key(words: str, key: Mapping[int, str]) -> str:
+    listed = ", ".join(f"{number} {walls}" for number, walls in key.items())
+    return f"{words}: {listed}." if key else ""
