@@ -119,7 +119,7 @@ def _show_warning(
 
 def _parser() -> argparse.ArgumentParser:
     from rtradar import __version__
-    from rtradar.cli import captures, checks, learning, results
+    from rtradar.cli import captures, checks, learning, listing, results
     from rtradar.cli.values import OneLineParser
 
     parser = OneLineParser(
@@ -136,6 +136,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rtradar {__version__}")
     commands = parser.commands()
-    for module in (captures, results, learning, checks):
+    for module in (captures, listing, results, learning, checks):
         module.add(commands)
     return parser

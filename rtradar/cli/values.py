@@ -42,7 +42,7 @@ class OneLineParser(argparse.ArgumentParser):
             options["epilog"] = "\n  ".join(["examples:", *examples])
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
-    def commands(self) -> Subcommands:
+    def commands(self, metavar: str = "COMMAND") -> Subcommands:
         """Return what commands are added to; without a command, the help is shown."""
 
         def show_help(_: argparse.Namespace) -> int:
@@ -50,7 +50,7 @@ class OneLineParser(argparse.ArgumentParser):
             return 0
 
         self.set_defaults(command=show_help)
-        return self.add_subparsers(metavar="COMMAND", parser_class=OneLineParser)
+        return self.add_subparsers(metavar=metavar, parser_class=OneLineParser)
 
     def _filled(self) -> None:
         fill, self._fill = self._fill, None
