@@ -53,8 +53,8 @@ def _list(options: argparse.Namespace) -> int:
     width = max(map(len, found)) + 2
     columns = max(shutil.get_terminal_size().columns, width + 40)
     for name, text in found.items():
-        indent = {"initial_indent": name.ljust(width), "subsequent_indent": " " * width}
-        print(textwrap.fill(text, columns, break_on_hyphens=False, **indent))
+        lines = textwrap.wrap(text, columns - width, break_on_hyphens=False) or [""]
+        print(name.ljust(width) + f"\n{' ' * width}".join(lines))
     return 0
 
 
