@@ -21,6 +21,7 @@ import drawings  # noqa: E402
 import rtradar  # noqa: E402
 
 project, author, release = "rtradar", "rtradar developers", rtradar.__version__
+project_copyright = author
 extensions = ["myst_nb", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
 # The gallery's pages are its .rst files; their notebooks are for download.
 exclude_patterns = ["gallery", "auto_gallery/*.ipynb"]
