@@ -168,6 +168,7 @@ class Result:
             assert figure is not None
             save_figure(figure, picture)
         note = "result.plot draws, result.view() moves, result.maps has the maps."
-        tables = {"": self._rows() | self._made()}
+        rows = self._rows() | self._made()
+        tables = {"": {label[0].upper() + label[1:]: value for label, value in rows.items()}}
         shown = picture.getvalue() or None
         return html_card("Result", self._title, tables, picture=shown, note=note)
