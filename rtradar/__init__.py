@@ -91,12 +91,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return import_module(f"rtradar.{name}")
-    if name in _HOME:
-        return getattr(import_module(f"rtradar.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'rtradar' has no attribute '{name}'")
+if not TYPE_CHECKING:  # checkers of types refuse names that are not imported above
+
+    def __getattr__(name: str) -> Any:
+        if name in _MODULES:
+            return import_module(f"rtradar.{name}")
+        if name in _HOME:
+            return getattr(import_module(f"rtradar.{_HOME[name]}"), name)
+        raise AttributeError(f"module 'rtradar' has no attribute '{name}'")
 
 
 def __dir__() -> list[str]:

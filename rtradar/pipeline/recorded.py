@@ -77,6 +77,16 @@ def process_samples(
         If a value is invalid, the samples are of another shape or type than the radar gives, one is
         not finite, they hold no whole frame, or the maps are too large for memory and ``out`` is
         left out; nothing is written then.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("punch", duration_s=0.5)
+    >>> radar = rt.Radar.preset("paper-12ghz")
+    >>> samples = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.15).samples
+    >>> result = rt.process_samples(samples.values, radar, clutter_removal="mean", pfa=1e-4)
+    >>> result.maps["spectrogram"].attrs["units"]
+    'm2'
     """
     settings = RunSettings(**options)
     forget_peak_memory()

@@ -21,6 +21,7 @@ from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.radar import Radar
 from rtradar.report.pages.inline import InlinePage
+from rtradar.report.pages.run_page import central_limits
 from rtradar.scatter.link_budget import LinkBudget
 
 if TYPE_CHECKING:
@@ -48,6 +49,20 @@ class Result:
         echoes are not known one by one.
     out : path, optional
         Folder of the files; None if everything is in memory.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("walk", duration_s=0.5)
+    >>> result = rt.run(
+    ...     motion, rt.Radar.preset("paper-12ghz"), fidelity="analytic", duration_s=0.15
+    ... )
+    >>> frame = result.maps["range_doppler"].sel(time=0.1, method="nearest")
+    >>> frame.shape, frame.attrs["units"]
+    ((256, 133), 'm2')
+    >>> axes = result.plot.spectrogram()
+    >>> axes.get_xlabel()
+    'Time [s]'
     """
 
     points: NDArray[np.float64]
@@ -129,9 +144,9 @@ class Result:
         """Return what the radar saw, by labels."""
         summary, rows = self.summary, {}
         if len(self.points):
-            low, high = self.points.min(axis=0), self.points.max(axis=0)
-            rows["range"] = f"{low[1]:.2f} to {high[1]:.2f} m"
-            rows["velocity"] = f"{low[2]:.2f} to {high[2]:.2f} m/s, positive receding"
+            low, high = central_limits(self.points[:, 1:])
+            rows["range"] = f"{low[0]:.1f} to {high[0]:.1f} m"
+            rows["velocity"] = f"{low[1]:+.1f} to {high[1]:+.1f} m/s, positive: receding"
         if "noise_power_m2" in summary:
             echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
             snr = f"{10 * np.log10(echo / noise):.1f} dB" if echo and noise else "no noise"

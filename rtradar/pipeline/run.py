@@ -73,6 +73,17 @@ def run(
         If the model traces rays and no backend of the requested kind works.
     ExtensionError
         If code of another package fails.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("walk", duration_s=0.5)
+    >>> radar = rt.Radar.preset("paper-12ghz")
+    >>> result = rt.run(motion, radar, fidelity="analytic", duration_s=0.15)
+    >>> result.maps["range_doppler"].dims
+    ('time', 'range', 'velocity')
+    >>> result.summary["windows"], result.out
+    (3, None)
     """
     settings = RunSettings(**options)
     if out is None:

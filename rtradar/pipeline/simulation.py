@@ -50,6 +50,17 @@ def simulate(
     ------
     InputError, BackendError, ExtensionError
         As in `run`.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("kick", duration_s=0.5)
+    >>> radar = rt.Radar.preset("paper-12ghz")
+    >>> capture = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.15, snr_db=10)
+    >>> capture.samples.dims, capture.samples.shape
+    (('chirp', 'rx', 'sample'), (2400, 8, 256))
+    >>> sum(len(block) for block in capture.blocks())
+    2400
     """
     return Simulation(prepare(motion, radar, scene or Scene(), RunSettings(**options)))
 

@@ -112,6 +112,15 @@ def os_cfar(
     InputError
         Where the map is not two-dimensional, holds NaN, infinity or a negative value, or has a cell
         without training cells, or where another argument is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rtradar as rt
+    >>> power = np.random.default_rng(0).exponential(size=(64, 64))
+    >>> power[20, 30] = 1000.0
+    >>> [tuple(map(int, cell)) for cell in np.argwhere(rt.process.os_cfar(power))]
+    [(20, 30)]
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     check_quantile(quantile)

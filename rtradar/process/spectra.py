@@ -77,6 +77,16 @@ def range_doppler(
     InputError
         Where the shape does not fit the radar, not one whole cycle is there, or a sample is not
         finite.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("walk", duration_s=0.5)
+    >>> radar = rt.Radar.preset("paper-12ghz")
+    >>> capture = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.12)
+    >>> frame = capture.samples.values[: radar.chirps_per_frame]
+    >>> rt.process.range_doppler(frame, radar).values.shape
+    (256, 133, 96)
     """
     samples = checked_chirps("IF samples", x, radar)
     n_cycles = samples.shape[0] // radar.n_tx

@@ -47,6 +47,15 @@ def ellipsoid(
     cos^2(theta))^2, from Mahafza, *Radar Systems Analysis and Design Using MATLAB*, eq. 2.39. Code
     published with the paper writes c cos^2(theta) in the denominator, whose unit does not fit and
     which is 14 to 26 dB low end-on.
+
+    Examples
+    --------
+    Seen along the long axis c, from theta = 0, and across it:
+
+    >>> import numpy as np
+    >>> import rtradar as rt
+    >>> np.round(rt.rcs.ellipsoid(0.1, 0.1, 0.3, theta=[0.0, np.pi / 2], phi=0.0), 4)
+    array([0.0035, 0.2827])
     """
     a, b, c, theta, phi = (np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
     if not all((axis > 0).all() for axis in (a, b, c)):
@@ -128,6 +137,15 @@ def sphere(
     Notes
     -----
     Mie series of a conductor: Harrington, *Time-Harmonic Electromagnetic Fields*, section 6-9.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> for method in ("go", "po", "mie"):
+    ...     print(method, f"{abs(rt.rcs.sphere(0.1, 12e9, method=method)) ** 2:.4f} m2")
+    go 0.0314 m2
+    po 0.0314 m2
+    mie 0.0321 m2
     """
     radius, frequency = np.broadcast_arrays(
         np.asarray(radius, np.float64), np.asarray(frequency, np.float64)

@@ -71,6 +71,20 @@ def scattering_length(
     Notes
     -----
     Equation :eq:`scattering-length` of the theory page.
+
+    Examples
+    --------
+    The specular echo of a conducting sphere of radius a is sqrt(pi) a:
+
+    >>> import numpy as np
+    >>> import rtradar as rt
+    >>> sphere = rt.Ellipsoids(
+    ...     centres=np.zeros((1, 3)), frames=np.eye(3)[None], semi_axes=np.full((1, 3), 0.1)
+    ... )
+    >>> radar = [[100.0, 0.0, 0.0]]
+    >>> length = rt.scattering_length(sphere, radar, radar, 12e9)
+    >>> np.round(abs(length) / (np.sqrt(np.pi) * 0.1), 2)
+    array([1.])
     """
     tx_array, rx_array, frequencies = _pairs(tx, rx, frequency)
     if polarization not in ("v", "h"):

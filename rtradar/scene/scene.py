@@ -86,6 +86,13 @@ class Scene:
     ------
     InputError
         Where a value has no meaning, or two walls or two pieces of furniture have one name.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> scene = rt.Scene.load("living-room")
+    >>> [wall.name for wall in scene.walls[:2]]
+    ['near', 'far']
     """
 
     name: str = "free-space"

@@ -84,7 +84,6 @@ def test_other_shapes_and_blocks_give_the_same(samples: xr.DataArray) -> None:
         assert_same(rt.process_samples(same, RADAR), expected)
 
 
-@pytest.mark.drawn
 def test_a_folder_holds_maps_clouds_and_pictures(samples: xr.DataArray, tmp_path: Path) -> None:
     written = rt.process_samples(samples, RADAR, tmp_path / "out")
     assert_same(written, rt.process_samples(samples, RADAR))

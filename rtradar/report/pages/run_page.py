@@ -150,11 +150,16 @@ def _sections(
     return sections
 
 
+def central_limits(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the limits (2, column) of most values (point, column), without outliers."""
+    half = (100 - _CENTRAL_PERCENT) / 2
+    return np.asarray(np.percentile(values, (half, 100 - half), axis=0))
+
+
 def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:
     """Yield what the radar saw, as figures with captions."""
     if len(points):
-        half = (100 - _CENTRAL_PERCENT) / 2
-        low, high = np.percentile(points[:, 1:], (half, 100 - half), axis=0)
+        low, high = central_limits(points[:, 1:])
         yield f"{low[0]:.1f} to {high[0]:.1f} m", "range of what was detected"
         yield (
             f"{low[1]:+.1f} to {high[1]:+.1f} m/s".replace("-", "\N{MINUS SIGN}"),
