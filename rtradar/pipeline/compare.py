@@ -17,6 +17,7 @@ from rtradar.motion import Motion
 from rtradar.pipeline.pictures import busiest_frame, removed, thinned
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
+from rtradar.pipeline.view import load_run_view
 from rtradar.pipeline.writer import files_of_runs
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
@@ -138,8 +139,9 @@ def compare(
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, radar, names[-1])
         pictures, unit = _draw(results, folder, radar, names[-1])
+        views = {name: load_run_view(folder / name) for name in names}
         comparison.write_comparison(
-            folder / "compare.html", summary, comparison_rows(summary), pictures, unit
+            folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
         )
         summary["files"] = kind.list_of(folder)
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"

@@ -17,6 +17,7 @@ from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds
 from rtradar.pipeline.result import Result
+from rtradar.pipeline.room_findings import room_findings
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.timing import forget_peak_memory
@@ -105,6 +106,7 @@ def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSett
     summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
     with capture.stages.time("write"), open_maps(file) as maps:
         maps.load()
+        _add_room(summary, capture, maps)
     _, summary = _finished(summary, capture, started)
     return Result(
         points=clouds.rdt.points,
@@ -143,6 +145,8 @@ def run_into(
         # Only now, for the echoes that the view asks for do not belong into the model's account.
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(capture))
+            with open_maps(folder / "maps.h5") as maps:
+                _add_room(summary, capture, maps)
         with capture.stages.time("report"):
             write_report(
                 folder / "report.html",
@@ -173,6 +177,12 @@ def _start() -> tuple[float, int]:
     """Return the time at which a run starts, and the number of rays traced before."""
     forget_peak_memory()
     return time.perf_counter(), rays_traced()
+
+
+def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
+    """Add what the open maps tell about the room, where there is one."""
+    if "room" in summary:
+        summary["room"] = summary["room"] | room_findings(capture, maps)
 
 
 def _finished(

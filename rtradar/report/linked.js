@@ -240,18 +240,17 @@ async function drawLinked() {
   const edge = (map, name, length) => [map[name][0] - map[name][1] / 2, map[name][0] + map[name][1] * (length - 0.5)];
   const map = await drawFlat("scene-map", [
     heat(data.map, mapRows(data.map, mapLevels, 0), {
-      colorscale: greys(), colorbar: scaleBar("power"), hovertemplate: `%{x:.2f} m/s, %{y:.2f} m<br>%{z:.1f} ${unitOf(data.map)}<extra></extra>`,
+      colorscale: greys(), colorbar: flatBar(data.map.label), hovertemplate: `%{x:.2f} m/s, %{y:.2f} m<br>%{z:.1f} ${unitOf(data.map)}<extra></extra>`,
     }),
     marks(true), marks(false),
   ], {
     xaxis: { text: velocityLabel, range: data.map.box[0] },
     yaxis: { text: "Range [m]", range: data.map.box[1] },
   }, (node) => Plotly.restyle(node, { colorscale: [greys()] }, [0]));
-  await Plotly.restyle(map, { "colorbar.title.text": data.map.label }, [0]);
 
   const cursor = (time) => ({ type: "line", x0: time, x1: time, y0: 0, y1: 1, yref: "paper", line: { color: now, width: 2 } });
   const spectrogram = await drawFlat("scene-spectrogram", [heat(data.spectrogram, mapRows(data.spectrogram, spectrogramLevels, 0), {
-    colorscale: "Viridis", colorbar: { ...scaleBar("power"), title: { text: data.spectrogram.label, side: "right" } },
+    colorscale: "Viridis", colorbar: flatBar(data.spectrogram.label),
     hovertemplate: `%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} ${unitOf(data.spectrogram)}<extra></extra>`,
   })], {
     xaxis: { text: "Time [s]", range: edge(data.spectrogram, "x", data.spectrogram.shape[1]) },
@@ -273,7 +272,7 @@ async function drawLinked() {
       { type: "scatter3d", mode: "lines", name: "now", ...frameAt(figure.times[0]), showlegend: false, hoverinfo: "skip", line: { width: 3, color: now } },
     ], {
       domain: { x: [0, 1], y: [0, 1] }, aspectmode: "manual", aspectratio: { x: 1.6, y: 1, z: 0.9 },
-      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis(velocityLabel),
+      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis("Velocity [m/s]"),
       camera: { eye: { x: -1.0, y: -1.9, z: 0.8 }, center: { x: 0, y: 0, z: -0.2 } },
     }, 1.5);
   }

@@ -49,7 +49,7 @@ async function draw(id, traces, scene, breadth, restyleTheme) {
     margin: { l: 0, r: 0, t: 0, b: 0 },
     paper_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12 },
-    legend: { x: 0, y: 1, itemsizing: "constant", bgcolor: "rgba(0,0,0,0)" },
+    legend: { x: 0, y: 0, yanchor: "bottom", orientation: "h", itemsizing: "constant", bgcolor: "rgba(0,0,0,0)" },
     modebar: { bgcolor: "rgba(0,0,0,0)" },
     scene: { ...scene, camera: { ...scene.camera, eye: stepBack(scene.camera.eye, node, breadth) } },
   };
@@ -69,11 +69,12 @@ const axis = (title, range) => ({ title: { text: title }, showbackground: false,
 
 const metres = (title, range) => ({ ...axis(title, range), dtick: 1 });
 // Room for the colour bar.
-const domain = window.innerWidth < 600 ? { x: [0, 1], y: [0.14, 1] } : { x: [0, 0.92], y: [0, 1] };
+const narrow = window.innerWidth < 600;
+const domain = narrow ? { x: [0, 1], y: [0.14, 1] } : { x: [0, 0.92], y: [0, 1] };
 
 /** Colour bar beside a view; below it where the window is narrow. */
 function bar(title) {
-  return window.innerWidth < 600
+  return narrow
     ? { title: { text: title, side: "top" }, orientation: "h", thickness: 10, len: 0.9, y: 0, yanchor: "bottom" }
     : { title: { text: title, side: "right" }, thickness: 12, len: 0.75, x: 1, xpad: 4 };
 }
@@ -85,6 +86,11 @@ function velocityMarkers(velocity, size) {
   };
 }
 
+/** The same in a flat view, where it lies below the labels of the axis. */
+function flatBar(title) {
+  return narrow ? { ...bar(title), y: -0.22, yanchor: "top", yref: "paper" } : { ...bar(title), len: 1 };
+}
+
 const flatConfig = { ...config, modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]] };
 
 /** A view with two axes that follows the page's colours. */
@@ -93,7 +99,8 @@ async function drawFlat(id, traces, layout, restyleTheme) {
   if (!node) return null;
   const side = (text) => ({ title: { text, standoff: 6 }, ticks: "outside", ticklen: 4, zeroline: false });
   await Plotly.newPlot(node, traces, {
-    margin: { l: 52, r: 8, t: 8, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
+    // Room for the buttons above, and below for the colour bar of a narrow window.
+    margin: { l: 52, r: 8, t: 30, b: narrow ? 92 : 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
     font: { family: getComputedStyle(document.body).fontFamily, size: 12 }, modebar: { bgcolor: "rgba(0,0,0,0)" },
     ...layout, xaxis: { ...side(layout.xaxis.text), ...layout.xaxis }, yaxis: { ...side(layout.yaxis.text), ...layout.yaxis },
   }, flatConfig);

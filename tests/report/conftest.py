@@ -78,13 +78,6 @@ class Browser:
         ]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
-        self.call(
-            "Emulation.setDeviceMetricsOverride",
-            width=SIZE[0],
-            height=SIZE[1],
-            deviceScaleFactor=1,
-            mobile=False,
-        )
 
     def close(self) -> None:
         os.close(self._commands)
@@ -129,8 +122,10 @@ class Browser:
         while not self.evaluate(script):
             time.sleep(0.05)
 
-    def open(self, address: str, scheme: str = "light") -> None:
+    def open(self, address: str, scheme: str = "light", width: int = SIZE[0]) -> None:
         self._deadline = time.monotonic() + TIMEOUT_S
+        size = {"width": width, "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
         self.call(
             "Emulation.setEmulatedMedia",
             features=[{"name": "prefers-color-scheme", "value": scheme}],

@@ -189,3 +189,15 @@ def test_saves_a_picture_of_what_is_seen(
     ):
         assert (quarter[..., :3].min(axis=2) < 0.8).sum() > 3000
     assert not browser.faults()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_overflows_a_narrow_window(
+    browser: Any, seen: tuple[str, RunView], scheme: str
+) -> None:
+    for page in ("view.html", "report.html"):
+        browser.open(seen[0].replace("view.html", page) + "#t=0.1", scheme, width=420)
+        assert browser.evaluate("document.documentElement.scrollWidth") <= 420
+        back = browser.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert (sum(map(int, back[4:-1].split(","))) > 3 * 128) == (scheme == "light")
+        assert not browser.faults()

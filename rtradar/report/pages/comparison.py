@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
@@ -14,17 +13,31 @@ from numpy.typing import NDArray
 from rtradar.report.figures import canvas
 from rtradar.report.figures.canvas import FieldUnit, draw_levels
 from rtradar.report.figures.maps import rdt_points
-from rtradar.report.pages.html import Titles, mapping_table, picture, table, write_page
+from rtradar.report.pages.html import (
+    Titles,
+    contents,
+    mapping_table,
+    picture,
+    player,
+    table,
+    write_page,
+)
+from rtradar.report.pages.labels import stage_label
+from rtradar.report.view.run_view import RunView
+from rtradar.report.view.three_d import posed_figure
 
-_DIFFERENCES = Template("""<section><h2>What differs</h2>$measures
-<p class="note">Differences are to the reference, $reference. Maps are compared in decibels:
+MOST_STEPS = 60
+"""Largest number of moments that the page shows."""
+
+_STEPS_HZ = 20.0
+_NOTE = """<p class="note">Differences are to the reference, {}. Maps are compared in decibels:
 range-Doppler in the cells that either model detects, spectrograms in the cells 10 dB above the
 median of either. All models have the same noise, sample by sample. Echo power is of one chirp every
-10 ms, each from another Tx, which makes it saw.</p></section>""")
-_TABLES = Template("""<div class="tables"><section><h2>Seconds a stage</h2>$stages</section>
-<section><h2>Mean echo power by part: $unit</h2>$parts</section>
-<section><h2>Parameters</h2>$parameters</section></div>
-""")
+10 ms, each from another Tx, which makes it saw.</p>"""
+_MAP_NOTE = """<p class="note">All maps have the same axes and colours. A difference is in decibels,
+the model less the reference, {}: red where the model is stronger. Below the floor of the colours
+nothing differs. The pointer shows range, velocity and level. Each model has a folder with its own
+report, and <code>rtradar view</code> of that folder shows its echoes.</p>"""
 
 
 def draw_power_over_time(
@@ -127,35 +140,101 @@ def write_comparison(
     rows: Sequence[Sequence[str]],
     pictures: Mapping[str, Path],
     unit: FieldUnit,
+    views: Mapping[str, RunView],
 ) -> None:
-    """Write a comparison as a page with its table and its pictures.
+    """Write a comparison as a page: maps side by side with one slider, tables and pictures.
 
     ``summary`` is the content of ``compare.json``; ``rows`` are a heading row and one row for each
-    measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts.
+    measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts;
+    ``views`` are the data of the maps of each model, the reference last.
     """
-    models = summary["fidelities"]
-    stages = {stage: None for found in models.values() for stage in found["stages"]}
-    parts = next(iter(models.values()))["part_power_m2"]
-    parameters = {key: value for key, value in summary["parameters"].items() if key != "radar"}
+    models, reference = summary["fidelities"], escape(summary["reference"])
     columns = ["", *models]
-    times, levels = [], []
-    for stage in stages:
-        seconds = [model["stages"].get(stage) for model in models.values()]
-        times.append([stage, *("-" if value is None else f"{value:.3f}" for value in seconds)])
-    for part in parts:
+    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
+    parameters = {key: value for key, value in summary["parameters"].items() if key != "radar"}
+    sections = {
+        "side": ("Side by side", _panels(list(views)) + _MAP_NOTE.format(reference)),
+        "measures": ("What differs", _wide(table(rows[1:], rows[0])) + _NOTE.format(reference)),
+        "maps": ("Pictures", f'<div class="pictures">{drawn}</div>'),
+        "parts": (
+            "Mean echo power by part",
+            f'<p class="note">{escape(unit.label())}</p>'
+            + _wide(table(_parts(models, unit), columns)),
+        ),
+        "parameters": ("Settings of all runs", _wide(mapping_table(parameters))),
+        "cost": ("Cost: seconds for each stage", _wide(table(_times(models), columns))),
+    }
+    subtitle = f"{summary['parameters']['radar']['name']}: {', '.join(models)}"
+    write_page(
+        path,
+        Titles("rtradar compare", str(summary["parameters"]["motion"]), subtitle),
+        contents({name: title for name, (title, _) in sections.items()}),
+        (
+            f'<section id="{name}"><h2>{escape(title)}</h2>{text}</section>\n'
+            for name, (title, text) in sections.items()
+        ),
+        data=comparison_data(views),
+        scripts=("plots.js", "figure.js", "compare.js"),
+    )
+
+
+def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
+    """Return the data of the page: body and maps, on the same axes and in the same colours.
+
+    ``limits_db`` are the highest floor and the highest peak of all maps, and ``difference_db`` the
+    colours' limit of differences, which one cell in a thousand exceeds.
+    """
+    thinned = {name: view.thinned(MOST_STEPS, _STEPS_HZ) for name, view in views.items()}
+    maps = {name: view.range_doppler for name, view in thinned.items()}
+    low = max(levels.low_db for levels in maps.values())
+    high = max(levels.high_db for levels in maps.values())
+    boxes = np.array([view.shown_box() for view in thinned.values()])
+    decibels = [np.maximum(one.low_db + one.step_db * one.level, low) for one in maps.values()]
+    most = max(float(np.percentile(np.abs(one - decibels[-1]), 99.9)) for one in decibels[:-1])
+    snapshots = next(iter(thinned.values())).snapshots
+    radar = next(iter(thinned.values())).radar
+    parts = snapshots.part_names.tolist()
+    return {
+        "figure": posed_figure(parts, snapshots.times, snapshots.poses, radar),
+        "models": [{"name": name, "map": levels.packed()} for name, levels in maps.items()],
+        "limits_db": [low, high],
+        "difference_db": max(float(np.ceil(most)), 1.0),
+        "box": np.stack([boxes[..., 0].min(axis=0), boxes[..., 1].max(axis=0)], axis=1).tolist(),
+    }
+
+
+def _panels(models: Sequence[str]) -> str:
+    *others, reference = map(escape, models)
+    titles = {"figure": "The body"}
+    maps = (*others, f"{reference} (reference)")
+    titles |= {f"map-{number}": name for number, name in enumerate(maps)}
+    titles |= {f"difference-{k}": f"{name} less {reference}" for k, name in enumerate(others)}
+    panels = "".join(
+        f'<section><h2>{title}</h2><div class="scene" id="scene-{name}"></div></section>'
+        for name, title in titles.items()
+    )
+    return f'{player()}<div class="linked even">{panels}</div>'
+
+
+def _parts(models: Mapping[str, Any], unit: FieldUnit) -> list[list[str]]:
+    rows = []
+    for part in next(iter(models.values()))["part_power_m2"]:
         powers = np.array([model["part_power_m2"][part] for model in models.values()])
         shown = zip(powers, unit.level(powers), strict=True)
-        levels.append(
-            [part, *(f"{level:.1f}" if power > 0 else "occluded" for power, level in shown)]
-        )
-    subtitle = f"{summary['parameters']['radar']['name']}: {', '.join(models)}"
-    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
-    figures = f'<div class="pictures">{drawn}</div>'
-    by_part = {"parts": table(levels, columns), "unit": escape(unit.label())}
-    tables = _TABLES.substitute(
-        by_part, stages=table(times, columns), parameters=mapping_table(parameters)
-    )
-    top = {"measures": table(rows[1:], rows[0]), "reference": escape(summary["reference"])}
-    titles = Titles("rtradar compare", str(summary["parameters"]["motion"]), subtitle)
-    body = f'<section id="maps"><h2>Side by side</h2>{figures}</section>', tables
-    write_page(path, titles, _DIFFERENCES.substitute(top), body)
+        levels = (f"{level:.1f}" if power > 0 else "occluded" for power, level in shown)
+        rows.append([part.capitalize(), *levels])
+    return rows
+
+
+def _times(models: Mapping[str, Any]) -> list[list[str]]:
+    stages = dict.fromkeys(stage for found in models.values() for stage in found["stages"])
+    rows = []
+    for stage in stages:
+        seconds = (model["stages"].get(stage) for model in models.values())
+        texts = ("-" if value is None else f"{value:.3f}" for value in seconds)
+        rows.append([stage_label(stage), *texts])
+    return rows
+
+
+def _wide(text: str) -> str:
+    return f'<div class="wide">{text}</div>'
