@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rtradar.clouds.dataset_store import UNKNOWN, Collection
+from rtradar.system.checks import printable
 
 _COLUMNS = {
     "source": "where the motion is from",
@@ -62,7 +63,8 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
     known = len(subjects) - (UNKNOWN in subjects)
     said = f"{len(collection)} samples of {motions} motions of {known} known people"
     empty = sum(not shape[0] for shape in collection.shapes("points"))
-    limits = Counter(line for row in rows for line in row.get("limits", ()))
+    told = [row["limits"] for row in rows if isinstance(row.get("limits"), list)]
+    limits = Counter(printable(str(line)) for lines in told for line in lines)
     if empty:
         limits["nothing was detected: the cloud is empty"] = empty
     return "\n".join(
@@ -117,7 +119,7 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
 def _made(rows: list[Mapping[str, Any]]) -> list[str]:
     lines = ["Made with `rtradar dataset build`.", ""]
     for key, name in _COLUMNS.items():
-        counted = Counter(str(row[key]) for row in rows if key in row)
+        counted = Counter(printable(str(row[key])) for row in rows if key in row)
         if counted:
             shown = [f"{value} ({count})" for value, count in counted.most_common(_MOST_SHOWN)]
             more = len(counted) - len(shown)
@@ -136,7 +138,7 @@ def _made(rows: list[Mapping[str, Any]]) -> list[str]:
 
 
 def _licences(rows: list[Mapping[str, Any]]) -> list[str]:
-    counted = Counter(str(row.get("licence", UNKNOWN)) for row in rows)
+    counted = Counter(printable(str(row.get("licence", UNKNOWN))) for row in rows)
     hints = {UNKNOWN: "; nobody said what may be done with them: find out before you pass them on"}
     return [
         f"- {name}: {count} samples{hints.get(name, '')}" for name, count in counted.most_common()
@@ -145,5 +147,5 @@ def _licences(rows: list[Mapping[str, Any]]) -> list[str]:
 
 def _table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     head = list(head)
-    lines = [head, ["---"] * len(head), *([str(cell) for cell in row] for row in rows)]
+    lines = [head, ["---"] * len(head), *([printable(str(cell)) for cell in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

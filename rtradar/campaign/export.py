@@ -20,7 +20,7 @@ from tqdm import tqdm
 from rtradar.campaign.card import data_card
 from rtradar.clouds.dataset_store import ARRAYS, KINDS, Collection, attributes
 from rtradar.errors import InputError
-from rtradar.system.checks import brief
+from rtradar.system.checks import brief, printable
 from rtradar.system.files import check_place, cleanup_on_exit, uninterruptible
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
@@ -134,12 +134,15 @@ def _write_columns(group: Any, collection: Collection) -> None:
 def _column(values: list[Any]) -> Any:
     """Return values as whole numbers, as numbers with NaN, or as text, JSON but for strings."""
     given = [value for value in values if value is not None]
-    if given and all(type(value) is int and abs(value) < 2**63 for value in values):
+    numbers = given and all(
+        type(value) is float or (type(value) is int and abs(value) < 2**63) for value in given
+    )
+    if numbers and all(type(value) is int for value in values):
         return np.array(values, dtype=np.int64)
-    if given and all(type(value) in (int, float) for value in given):
+    if numbers:
         return np.array([np.nan if value is None else float(value) for value in values])
     text = ["" if v is None else v if isinstance(v, str) else json.dumps(v) for v in values]
-    return np.array(text, dtype=object)
+    return np.array([printable(one) for one in text], dtype=object)
 
 
 def _write_arrays(group: Any, collection: Collection) -> None:
@@ -162,7 +165,7 @@ def _write_arrays(group: Any, collection: Collection) -> None:
             _stream(group, name, (size,), ("sample", name), collection, f"{name}_of_sample")
     dims = {dim for name in names for dim in ARRAYS[name].dims}
     known = _COORDINATES | (
-        {"joint": collection[0].provenance["joint_names"]} if "joint" in dims else {}
+        {"joint": collection.maps(0)["joint"].values} if "joint" in dims else {}
     )
     for name, values in known.items():
         _put(group, name, np.array(values, dtype=object), [name])

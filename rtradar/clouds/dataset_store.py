@@ -457,12 +457,14 @@ class Collection:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of arrays that every sample holds: clouds, and what the data set keeps."""
-        kept = [about["provenance"].get("keep", ()) for about in self._about]
-        return (
-            "clouds",
-            "spatial",
-            *(kind for kind in KINDS if kept and all(kind in one for one in kept)),
-        )
+        kept = [set(self._kept(index)) for index in range(len(self))]
+        shared = set.intersection(*kept) if kept else set()
+        return ("clouds", "spatial", *(kind for kind in KINDS if kind in shared))
+
+    def _kept(self, index: int) -> list[str]:
+        """Return the kinds of arrays that a sample holds beside its clouds."""
+        kept = self._about[index]["provenance"].get("keep")
+        return [kind for kind in KINDS if kind in kept] if isinstance(kept, list) else []
 
     def maps(self, index: int) -> xr.Dataset:
         """Read the maps and joints that the data set keeps of a sample.
@@ -485,17 +487,17 @@ class Collection:
         """
         import xarray as xr
 
-        path, provenance = self._paths[index], self._about[index]["provenance"]
-        kept = [KINDS[kind] for kind in provenance.get("keep", ())]
+        kept = [KINDS[kind] for kind in self._kept(index)]
         axes = {axis for name in kept for axis in ARRAYS[name].dims if axis in ARRAYS}
         found = {
-            name: (ARRAYS[name].dims, read_sample(path, name), attributes(name))
+            name: (ARRAYS[name].dims, self.array(index, name), attributes(name))
             for name in (*kept, *sorted(axes))
         }
-        names = (
-            {"joint": provenance["joint_names"], "axis": list("xyz")} if "joints" in kept else {}
-        )
-        return xr.Dataset(found, names).set_coords(axes)
+        names = {"joint": self.provenance(index).get("joint_names", []), "axis": list("xyz")}
+        try:
+            return xr.Dataset(found, names if "joints" in kept else {}).set_coords(axes)
+        except (ValueError, TypeError):  # arrays of a stranger's file that do not fit each other
+            raise _damaged(self._paths[index]) from None
 
     def to_pandas(self) -> pd.DataFrame:
         """Return what is known of every sample, without reading the clouds.
@@ -516,16 +518,12 @@ class Collection:
         import pandas as pd
 
         number = {name: index for index, name in enumerate(self.classes)}
-        rows = [
-            {
-                "activity": about["label"],
-                "label": number[about["label"]],
-                **about["provenance"],
-                "folder": str(path.parent),
-                "digest": read_digest(path),
-            }
-            for about, path in zip(self._about, self._paths, strict=True)
-        ]
+        rows = []
+        for about, path in zip(self._about, self._paths, strict=True):
+            own = {"activity": about["label"], "label": number[about["label"]]}
+            # What is first stays first, and what is last is said.
+            row = own | about["provenance"] | own
+            rows.append(row | {"folder": str(path.parent), "digest": read_digest(path)})
         return pd.DataFrame(rows, index=pd.Index(self.ids, name="id"))
 
     def torch(self, kind: str = "clouds", *, points: int = 1000) -> SampleDataset:

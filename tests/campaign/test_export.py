@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,6 +91,34 @@ def test_zarr_and_xarray_read_what_the_collection_holds(tmp_path: Path) -> None:
     ):  # fmt: skip
         assert said in card
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "x.zarr"]
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"keep": 7, "limits": 7, "label": "x", "licence": "a\nb\ud800"},
+        {"keep": ["spectrograms", "sound", []], "seed": 10**400},
+        {"keep": ["joints"], "joint_names": 7},
+        {"../out": 1},
+        {"points": 1},
+    ],
+)
+def test_a_stranger_s_provenance_gives_a_group_or_one_line(
+    tmp_path: Path, told: dict[str, Any]
+) -> None:
+    maps = {"joints": np.zeros((2, 2, 3)), "time": np.zeros(2)}
+    write_sample(tmp_path, "a", Sample(np.zeros((2, 3)), "walk", told), np.zeros((0, 3)), maps)
+    write_index(tmp_path, ["a"])
+    collection = Collection(tmp_path)
+    assert collection.to_pandas()["label"].tolist() == [0]
+    said = ""
+    try:
+        export_dataset([tmp_path], tmp_path / "x.zarr")
+    except InputError as error:
+        said = str(error)
+    assert "\n" not in said
+    assert said or zarr.open_group(tmp_path / "x.zarr")["points"].shape == (1, 2, 3)
+    assert not (tmp_path.parent / "out").exists()
 
 
 def test_samples_of_several_lengths_are_filled_up(tmp_path: Path) -> None:
