@@ -47,5 +47,6 @@ def bytes_of_maps(radar: Radar, n_chirps: int) -> float:
     steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S
     power, mask = np.dtype(np.float32).itemsize, np.dtype(np.uint8).itemsize
     a_range = radar.cycles_per_frame * (power + mask)
-    a_range += len(measured_angles(radar)) * len(angle_grid(radar)) * power
+    if angles := measured_angles(radar):
+        a_range += len(angles) * len(angle_grid(radar)) * power
     return radar.samples_per_chirp * (frames * a_range + steps * power)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import html
+import math
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -121,6 +122,16 @@ def test_maps_too_large_for_memory_are_refused_before_any_work(
     long = dataclasses.replace(MOTION, rate_hz=1e-3, first_frame_s=0.0, length_s=None)
     with pytest.raises(InputError, match=r"would take [\d.]+ GB .* 1\.0 GB are allowed; .* out="):
         rt.run(long, RADAR)
+
+
+def test_a_radar_of_one_channel_has_no_angles_and_does_without() -> None:
+    radar = dataclasses.replace(RADAR, tx_y=1, rx_y=1, chirp_duration_s=500e-6)
+    result = rt.run(MOTION, radar, fidelity="analytic", duration_s=0.2, snr_db=math.inf)
+    assert "range_azimuth" not in result.maps
+    assert "no noise" in repr(result)
+    assert "data:image/png" in result._repr_html_()
+    size = sum(result.maps[name].nbytes for name in ("range_doppler", "detections", "range_time"))
+    assert memory.bytes_of_maps(radar, result.summary["chirps"]) == pytest.approx(size, rel=0.1)
 
 
 def test_if_samples_are_not_kept_without_a_folder() -> None:
