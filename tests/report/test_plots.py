@@ -49,6 +49,7 @@ def test_a_handful_of_outliers_sets_no_limit_and_more_of_them_do() -> None:
     assert fitted_limits(counts, BINS) == pytest.approx((36.5, 62.5))
     counts[2] = 4
     assert fitted_limits(counts, BINS)[0] < 2
+    assert fitted_limits(counts, BINS, handful=4)[0] == pytest.approx(36.5)
 
 
 def test_few_detections_are_all_shown() -> None:
@@ -137,16 +138,17 @@ def test_a_picture_says_which_frame_it_is(plots_of: Callable[..., Plots]) -> Non
         plots.range_doppler(time_s=9.0)
 
 
-@pytest.mark.parametrize("missed", [0, 3])
+@pytest.mark.parametrize("missed", [0, 9])
 def test_self_masking_is_told_where_the_strongest_cells_are_not_detected(
     plots_of: Callable[..., Plots], missed: int
 ) -> None:
     power = np.arange(64 * 8.0).reshape(64, 8)
     mask = power >= 64 * 8 - 40
     mask.ravel()[64 * 8 - missed :] = False
+    mask.ravel()[:missed] = True
     axes = plots_of(RADAR, power=power, mask=mask).range_doppler()
     notes = " ".join(" ".join(text.get_text().split()) for text in axes.texts)
-    assert ("3 of the 20 strongest cells are not detected" in notes) == bool(missed)
+    assert ("9 of the 40 strongest cells are not detected" in notes) == bool(missed)
 
 
 def test_a_spectrogram_shows_an_echo_at_its_velocity(plots_of: Callable[..., Plots]) -> None:

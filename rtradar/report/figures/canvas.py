@@ -170,8 +170,8 @@ def draw_view(
         if low <= high - below_peak_db
         else "3 dB below the median of the view"
     )
-    words = f"Colours: ceiling {high:.0f} {unit.decibels}, the strongest cell; "
-    return image, f"{words}floor {low:.0f} {unit.decibels}, {floor}."
+    words = f"Colours: ceiling {round(high)} {unit.decibels}, the strongest cell; "
+    return image, f"{words}floor {round(low)} {unit.decibels}, {floor}."
 
 
 def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArray[np.bool_]:

@@ -8,19 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 HANDFUL = 3
 """Detections that may lie beyond each end of an axis, as false alarms do."""
 
-_STRONGEST = 20
+_MASKED = 0.1  # fraction of the strongest cells
 _FRACTION = 1e-3
 _FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
 _MARGIN, _LEAST_BINS = 0.15, 8
 
 
 def fitted_limits(
-    counts: ArrayLike, centres: NDArray[np.float64], *, include: ArrayLike = ()
+    counts: ArrayLike,
+    centres: NDArray[np.float64],
+    *,
+    include: ArrayLike = (),
+    handful: float = HANDFUL,
 ) -> tuple[float, float]:
     """Return the limits of an axis that show where something is, and not where outliers are.
 
-    At each end, a thousandth of the counts may lie outside, or `HANDFUL` if those are more, but
-    never more than a twentieth. The rest is inside, with a margin of 15 % of its extent, and at
+    At each end, a thousandth of the counts may lie outside, or a handful if that is more, but never
+    more than a twentieth. The rest is inside, with a margin of 15 % of its extent, and at
     least eight bins in all. The limits never pass the ends of the axis, and are those ends
     if nothing is counted.
 
@@ -32,6 +36,9 @@ def fitted_limits(
         Middle of each bin, evenly spaced and ascending.
     include : array_like
         Values of the axis that are shown whatever is counted, such as velocity 0.
+    handful : float
+        Number of counts that may lie outside at each end, `HANDFUL` if left out; more where more
+        false alarms are expected.
 
     Returns
     -------
@@ -44,7 +51,7 @@ def fitted_limits(
     total = number.sum()
     if total == 0:
         return first, last
-    outside = min(max(_FRACTION * total, HANDFUL), total / 20)
+    outside = min(max(_FRACTION * total, handful), total / 20)
     passed = np.cumsum(number)
     begin = int(np.argmax(passed > outside))
     end = len(number) - 1 - int(np.argmax(np.cumsum(number[::-1]) > outside))
@@ -75,6 +82,8 @@ def above_floor(power: NDArray[np.floating]) -> NDArray[np.bool_]:
 def masking_note(power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
     """Return how many of the strongest cells are not detected, in a sentence with the reason.
 
+    As many of the strongest cells are looked at as cells are detected.
+
     Parameters
     ----------
     power : (range, velocity) float
@@ -85,13 +94,14 @@ def masking_note(power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
     Returns
     -------
     str
-        Sentence, which is empty if all are detected, or nothing at all is.
+        Sentence, which is empty if nine in ten are detected.
     """
-    strongest = np.argsort(power, axis=None)[-_STRONGEST:]
+    count = int(np.count_nonzero(mask))
+    strongest = np.argsort(power, axis=None)[mask.size - count :]
     missed = int(np.count_nonzero(~mask.ravel()[strongest]))
-    if not missed or not mask.any():
+    if missed <= _MASKED * count:
         return ""
     return (
-        f"{missed} of the {_STRONGEST} strongest cells are not detected: strong cells about "
-        "them raise the threshold there (self-masking of CFAR)."
+        f"{missed} of the {count} strongest cells are not detected: strong cells about them raise "
+        "the threshold there (self-masking of CFAR)."
     )

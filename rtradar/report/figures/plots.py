@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rtradar.clouds import SpatialCloud
@@ -25,7 +26,7 @@ from rtradar.report.figures.canvas import (
     draw_view,
     field_unit,
 )
-from rtradar.report.figures.fitting import above_floor, fitted_limits, masking_note
+from rtradar.report.figures.fitting import HANDFUL, above_floor, fitted_limits, masking_note
 from rtradar.report.figures.maps import angle_label, rdt_points
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
@@ -37,6 +38,7 @@ _COLUMNS = 600
 
 _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
+_ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
 _HIGHEST_IN = 6.5
 _ANGLE_DB = 20.0  # below the peak: sidelobes of a line of eight are 13 dB or more below
 _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
@@ -298,6 +300,8 @@ class Plots:
         dots = rdt_points(axes, points[shown], "", fastest=max(abs(slow), abs(fast)), s=4)
         axes.set(ylim=(low, high), zlim=(slow, fast), zlabel="Velocity [m/s]")
         axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
+        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+            axis.set_major_locator(MaxNLocator(5))
         axes.xaxis.labelpad = axes.yaxis.labelpad = 10
         title = f"Range-Doppler-time cloud, {_drawn(len(points), int(shown.sum()))}"
         dress(axes, title=self._title(title, self.maps["range_doppler"]))
@@ -367,7 +371,8 @@ class Plots:
             own |= {"markersize": 8, "clip_on": False}
             axes.plot(place[0], place[up], "^", **own)
             view = "from above" if up == 1 else "from the side"
-            axes.set(xlabel=f"{self._x_label}\n{view}", ylabel=f"{'xyz'[up]} [m]")
+            label = f"{self._x_label}\n{view}" if len(self._angles) == 2 else self._x_label
+            axes.set(xlabel=label, ylabel=f"{'xyz'[up]} [m]")
             axes.set(xlim=limits[0], ylim=limits[up], aspect="equal")
         beside = len(panels) if panels[0].get_position().y0 == panels[-1].get_position().y0 else 1
         panels[0].legend(loc="best")
@@ -471,12 +476,18 @@ class Plots:
         if not counts.any():
             times = self.maps["slow_time"].values
             counts = above_floor(thinned(self.maps["range_time"], times)[0]).sum(axis=0)
-        return fitted_limits(counts, self.radar.range_m)
+        return fitted_limits(counts, self.radar.range_m, handful=self._handful)
 
     @cached_property
     def _velocity_limits(self) -> tuple[float, float]:
         counts, velocity = self._found.by_velocity, self.maps["velocity"].values
-        return fitted_limits(counts, velocity, include=0.0)
+        return fitted_limits(counts, velocity, include=0.0, handful=self._handful)
+
+    @property
+    def _handful(self) -> float:
+        """Detections that may be false alarms, of which about ``pfa`` in each cell is expected."""
+        cells = self.maps["detections"].size
+        return max(HANDFUL, 2 * self._parameters.get("pfa", 0.0) * cells)
 
     def _range_angle(
         self, name: str, time_s: float | None, ax: Axes | None, heading: bool = True
@@ -519,9 +530,11 @@ def _of_values(values: NDArray[np.float64], own: float) -> tuple[float, float]:
     """Limits that show values [m] but a few outliers, and the radar at its ``own`` place."""
     if not len(values):
         return own - 1, own + 1
-    edges = np.linspace(min(values.min(), own) - 0.05, max(values.max(), own) + 0.05, 401)
-    counts = np.histogram(values, edges)[0]
-    return fitted_limits(counts, (edges[1:] + edges[:-1]) / 2, include=own)
+    low, high = min(float(values.min()), own), max(float(values.max()), own)
+    margin = 0.2 * (high - low) + 0.05
+    edges = np.linspace(low - margin, high + margin, 601)
+    centres, counts = (edges[1:] + edges[:-1]) / 2, np.histogram(values, edges)[0]
+    return fitted_limits(counts, centres, include=own, handful=_ASTRAY * len(values))
 
 
 def thinned(
