@@ -108,22 +108,23 @@ def height_of_plan(limits: NDArray[np.float64]) -> float:
 def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
     """Draw walls, furniture and reflectors without their names, which `name_parts` writes."""
     theme = theme_of(axes)
-    page = np.array(to_rgb(theme.page))
+    covering: dict[str, list[NDArray[np.float64]]] = {theme.furniture: [], theme.reflector: []}
     for piece in scene.furniture:
         triangles = piece.triangles()
         corners = triangles.corners[..., :2]
         (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
         # Faces that look up cover a closed body; upright ones cover nothing.
         seen = ax * by - ay * bx
-        covering = corners[seen > 0 if triangles.closed else seen != 0]
         colour = theme.furniture if triangles.closed else theme.reflector
-        # Boards of a shelf lie over each other, and would add up if they were transparent.
-        pale = tuple((0.45 * np.array(to_rgb(colour)) + 0.55 * page).tolist())
-        axes.add_collection(
-            PolyCollection(list(covering), color=pale, linewidth=0.5), autolim=False
-        )
+        covering[colour].extend(corners[seen > 0 if triangles.closed else seen != 0])
         if not triangles.closed:  # a thin sheet of metal, which may be small and upright
             axes.plot(*corners.reshape(-1, 2).mean(axis=0), "D", color=colour, markersize=5)
+    for colour, faces in covering.items():
+        # Boards of a shelf lie over each other, and would add up if they were transparent.
+        pale = 0.45 * np.array(to_rgb(colour)) + 0.55 * np.array(to_rgb(theme.page))
+        style: dict[str, Any] = {"color": tuple(pale.tolist()), "linewidth": 0.5}
+        if faces:
+            axes.add_collection(PolyCollection(faces, **style), autolim=False)
     for first, last, wall in feet_of_walls(scene):
         behind = wall.thickness_m * wall.normal[:2]
         axes.fill(*np.array([first, last, last - behind, first - behind]).T, color=theme.wall)
