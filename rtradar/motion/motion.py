@@ -86,9 +86,6 @@ class Motion:
       place     root at x -1.79 to 1.79, y -0.02 to 0.02, z 0.95 to 0.99 m
       path      3.59 m over the floor
 
-    Examples
-    --------
-    >>> import rtradar as rt
     >>> motion = rt.synthetic_motion("walk", seed=1, duration_s=2.0)
     >>> positions, rotations = motion.at([0.0, 0.5])
     >>> positions.shape[0], positions.shape[2], motion.duration_s
