@@ -131,6 +131,8 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
     thing = THINGS[name]
     text = inspect.getdoc(thing) or ""
     assert text.strip(), "no docstring"
+    titles = re.findall(r"^(\w[\w ]*)\n-{3,}$", text, re.MULTILINE)
+    assert len(titles) == len(set(titles)), "a section appears twice"
     names = takes(thing)
     assert names <= named(text, "Parameters"), (
         f"not documented: {names - named(text, 'Parameters')}"

@@ -109,13 +109,6 @@ class Radar:
       angle     ±78.4° in azimuth and elevation, resolution 2.07° at boresight
     >>> print(f"{radar.max_velocity_mps:.2f} m/s")
     4.08 m/s
-
-    Examples
-    --------
-    >>> import rtradar as rt
-    >>> radar = rt.Radar.preset("paper-12ghz")
-    >>> f"{100 * radar.range_bin_m:.2f} cm, {radar.max_velocity_mps:.2f} m/s"
-    '3.75 cm, 7.14 m/s'
     >>> rt.Radar(name="own", tx_z=0, rx_z=0, bandwidth_hz=1e9).n_channels
     48
     """
