@@ -76,7 +76,7 @@ const domain = narrow ? { x: [0, 1], y: [0.14, 1] } : { x: [0, 0.92], y: [0, 1] 
 function bar(title) {
   return narrow
     ? { title: { text: title, side: "top" }, orientation: "h", thickness: 10, len: 0.9, y: 0, yanchor: "bottom" }
-    : { title: { text: title, side: "right" }, thickness: 12, len: 0.75, x: 1, xpad: 4 };
+    : { title: { text: title, side: "right", font: { size: 11 } }, thickness: 12, len: 0.75, x: 1, xpad: 4 };
 }
 
 function velocityMarkers(velocity, size) {

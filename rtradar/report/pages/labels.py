@@ -132,3 +132,8 @@ def with_unit(value: object, unit: str) -> str:
 def grouped(number: int) -> str:
     """Return a whole number in groups of three digits, from five digits on."""
     return str(number) if abs(number) < 10_000 else f"{number:,}".replace(",", "\u202f")
+
+
+def minus(text: str) -> str:
+    """Return a number in a text with the sign that is as wide as a plus."""
+    return text.replace("-", "\N{MINUS SIGN}")

@@ -11,6 +11,7 @@ import numpy as np
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import field_unit
 from rtradar.report.pages.html import picture, table, tiles
+from rtradar.report.pages.labels import minus
 
 ROOM_PICTURES = ("plan.png", "range_azimuth_walls.png", "clutter_removal.png")
 """Files of pictures that belong to a room, in the order of the section."""
@@ -30,7 +31,8 @@ def room_section(room: Mapping[str, Any], radar: Radar, pictures: Mapping[str, P
     ``pictures`` are those of `ROOM_PICTURES` by their titles.
     """
     clutter = room.get("clutter", {})
-    drawn = "".join(picture(title, Path(path)) for title, path in pictures.items())
+    order = sorted(pictures.items(), key=lambda item: ROOM_PICTURES.index(Path(item[1]).name))
+    drawn = "".join(picture(title, Path(path)) for title, path in order)
     parts = [
         tiles(_figures(room, clutter)),
         _HOW if "after_removal_db" in clutter else "",
@@ -52,16 +54,17 @@ def _figures(room: Mapping[str, Any], clutter: Mapping[str, Any]) -> list[tuple[
     found = []
     before = clutter.get("signal_to_clutter_db")
     if before is not None:
-        found.append((f"{before:.1f} dB", "signal to clutter, as received"))
+        found.append((minus(f"{before:.1f} dB"), "signal to clutter, as received"))
     after = clutter.get("after_removal_db")
     if after is not None:
-        found.append((f"{after:.1f} dB or more", "signal to clutter, after removal"))
+        found.append((minus(f"\u2265 {after:.1f} dB"), "signal to clutter, after removal"))
     paths = [path for path in room.get("paths", ()) if path["order"]]
     kept = sum(1 for path in paths if path["kept"])
     if paths:
         found.append((f"{kept} of {len(paths)}", "paths over walls are above the noise"))
     if "ghosts" in room:
-        found.append((str(len(room["ghosts"]["paths"])), "ghosts in the busiest frame"))
+        ghosts = room["ghosts"]
+        found.append((str(len(ghosts["paths"])), f"ghosts at {ghosts['time_s']:.2f} s"))
     return found
 
 
@@ -75,10 +78,10 @@ def _ghosts(room: Mapping[str, Any], radar: Radar) -> str:
     rows = [
         (
             str(ghost["path"]),
-            f"{level:.1f} {unit.name}",
+            minus(f"{level:.1f} {unit.name}"),
             f"{ghost['range_m']:.2f} m",
-            f"{ghost['velocity_mps']:+.2f} m/s",
-            f"{ghost['azimuth_deg']:+.1f}°",
+            minus(f"{ghost['velocity_mps']:+.2f} m/s"),
+            minus(f"{ghost['azimuth_deg']:+.1f}°"),
         )
         for ghost, level in zip(paths, levels, strict=True)
     ]

@@ -16,7 +16,7 @@ from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.pages import html
 from rtradar.report.pages.html import mapping_table, picture, table, write_page
-from rtradar.report.pages.labels import grouped, with_unit
+from rtradar.report.pages.labels import grouped, minus, with_unit
 from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
 from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
@@ -162,7 +162,7 @@ def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterat
         low, high = central_limits(points[:, 1:])
         yield f"{low[0]:.1f} to {high[0]:.1f} m", "range of what was detected"
         yield (
-            f"{low[1]:+.1f} to {high[1]:+.1f} m/s".replace("-", "\N{MINUS SIGN}"),
+            minus(f"{low[1]:+.1f} to {high[1]:+.1f} m/s"),
             "velocity of what was detected, positive: receding",
         )
     parameters = summary.get("parameters", {})
