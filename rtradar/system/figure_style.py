@@ -216,7 +216,7 @@ def dress(
     theme = theme_of(axes)
     is_3d = axes.name == "3d"
     figure: Any = axes.get_figure(root=True)
-    width_pt = 72 * across * axes.get_position().width * figure.get_size_inches()[0]
+    width_pt = 72 * across * axes.get_position(original=True).width * figure.get_size_inches()[0]
     if title:
         size, place = STYLE["axes.titlesize"], STYLE["axes.titlelocation"]
         style: dict[str, Any] = {"fontsize": size, "color": theme.text, "loc": place}

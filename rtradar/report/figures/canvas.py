@@ -182,7 +182,7 @@ def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any)
     """Put a colour bar beside axes that are dressed, with this label."""
     figure: Any = axes[0].get_figure(root=True)
     extend = "min" if isinstance(image, AxesImage) else "neither"
-    bounds = [one.get_position() for one in axes]
+    bounds = [one.get_position(original=True) for one in axes]
     height = max(one.y1 for one in bounds) - min(one.y0 for one in bounds)
     height_pt = 72 * height * figure.get_size_inches()[1]
     label = fit(label, height_pt, STYLE["axes.labelsize"])

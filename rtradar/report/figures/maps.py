@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,10 @@ from numpy.typing import NDArray
 from rtradar.process import measured_angles
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL
+from rtradar.report.figures.fitting import fitted_limits
 from rtradar.system.figure_style import DIVERGING
+
+_NOISY = 0.02  # fraction of the detected ranges whose strongest angle may be one of noise
 
 
 def angle_label(name: str, radar: Radar) -> str:
@@ -18,6 +22,27 @@ def angle_label(name: str, radar: Radar) -> str:
     if name == "azimuth" and measured_angles(radar) == ("azimuth",):
         return "Azimuth [°] (cone angle; elevation is not measured)"
     return f"{name.capitalize()} [°]"
+
+
+def angle_view(
+    power: NDArray[np.floating],
+    angles: NDArray[np.float64],
+    radar: Radar,
+    ghosts: Sequence[tuple[float, float]] = (),
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the limits of angle and range that show what is detected, and ghosts.
+
+    ``power`` (range, angle) is zero in ranges without a detection. Angles are fitted to where each
+    range is strongest, for sidelobes of the array fill all angles. ``ghosts`` are their angles and
+    ranges.
+    """
+    detected: NDArray[np.bool_] = np.asarray(power.any(axis=1))
+    near = detected[:, None] & (power > power.max(axis=1, keepdims=True) / 4)
+    counts = near.sum(axis=0)
+    wide = fitted_limits(
+        counts, angles, include=[one for one, _ in ghosts], handful=_NOISY * counts.sum()
+    )
+    return wide, fitted_limits(detected, radar.range_m, include=[one for _, one in ghosts])
 
 
 def rdt_points(

@@ -27,7 +27,7 @@ from rtradar.report.figures.canvas import (
     field_unit,
 )
 from rtradar.report.figures.fitting import HANDFUL, above_floor, fitted_limits, masking_note
-from rtradar.report.figures.maps import angle_label, rdt_points
+from rtradar.report.figures.maps import angle_label, angle_view, rdt_points
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
 if TYPE_CHECKING:
@@ -40,7 +40,6 @@ _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
 _ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
 _HIGHEST_IN = 6.5
-_ANGLE_DB = 20.0  # below the peak: sidelobes of a line of eight are 13 dB or more below
 _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
 
 
@@ -223,7 +222,7 @@ class Plots:
             )
         if ax is not None or len(names) == 1:
             return self._range_angle(names[0], time_s, ax)
-        upper, lower = self.new_figure(7.0).subplots(2, 1, sharey=True)
+        upper, lower = self.new_figure(7.0).subplots(2, 1)
         self._range_angle(names[0], time_s, upper)
         self._range_angle(names[1], time_s, lower, heading=False)
         return cast(Axes, upper)
@@ -374,7 +373,8 @@ class Plots:
             label = f"{self._x_label}\n{view}" if len(self._angles) == 2 else self._x_label
             axes.set(xlabel=label, ylabel=f"{'xyz'[up]} [m]")
             axes.set(xlim=limits[0], ylim=limits[up], aspect="equal")
-        beside = len(panels) if panels[0].get_position().y0 == panels[-1].get_position().y0 else 1
+        lowest = [axes.get_position(original=True).y0 for axes in panels]
+        beside = len(panels) if lowest[0] == lowest[-1] else 1
         panels[0].legend(loc="best")
         title = self._title(heading, self.maps["range_doppler"])
         for axes in panels[1:]:
@@ -506,13 +506,9 @@ class Plots:
         )
         unit = self._unit(range_m=self.radar.range_m[:, None])
         level = unit.level(power)
-        strong = level > level.max() - _ANGLE_DB
-        view = (
-            fitted_limits(strong.sum(axis=0), angles),
-            fitted_limits(strong.sum(axis=1), self.radar.range_m),
-        )
+        view = angle_view(power, angles, self.radar)
         image, colours = draw_view(
-            axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=30
+            axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=40
         )
         axes.set(xlabel=angle_label(name, self.radar), ylabel="Range [m]")
         what = f"Range-{name}"

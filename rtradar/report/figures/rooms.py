@@ -22,7 +22,7 @@ from rtradar.radar import Radar
 from rtradar.report.figures import canvas
 from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, draw_view, field_unit
 from rtradar.report.figures.fitting import fitted_limits, masking_note
-from rtradar.report.figures.maps import angle_label
+from rtradar.report.figures.maps import angle_label, angle_view
 from rtradar.scene import Furniture, Scene
 from rtradar.scene.plan import (
     draw_plan,
@@ -36,7 +36,6 @@ from rtradar.scene.plan import (
 from rtradar.system.figure_labels import Label, around, place_labels
 from rtradar.system.figure_style import DARK, dress, new_figure, theme_of
 
-_STRONG_DB = 30.0
 _HALF_TURN = 180.0
 
 
@@ -170,14 +169,11 @@ def draw_range_azimuth_with_walls(
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
     level = unit.level(power / velocities)  # one echo is spread over as many velocities
-    strong, angles = level > level.max() - _STRONG_DB, np.degrees(azimuth)
-    view = (
-        fitted_limits(strong.sum(axis=0), angles, include=[np.degrees(g.across) for g in ghosts]),
-        fitted_limits(strong.sum(axis=1), radar.range_m, include=[g.range_m for g in ghosts]),
-    )
+    angles = np.degrees(azimuth)
+    marked = [one._replace(across=float(np.degrees(one.across))) for one in ghosts]
+    view = angle_view(power, angles, radar, [(one.across, one.range_m) for one in marked])
     image, words = draw_view(axes, level, angles, radar.range_m, view, unit=unit, below_peak_db=40)
     place = np.asarray(radar.position_m)[:2]
-    marked = [one._replace(across=float(np.degrees(one.across))) for one in ghosts]
     labels = _circle(axes, marked)
     for first, last, wall in feet_of_walls(scene):
         along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
