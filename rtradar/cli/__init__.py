@@ -15,7 +15,8 @@ import logging
 import os
 import sys
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from typing import TextIO
 
 from rtradar.errors import BackendError, CampaignError, ExtensionError, InputError
@@ -99,11 +100,28 @@ def _done(options: argparse.Namespace) -> int:
     from rtradar.cli.ending import stay_if_ending
 
     try:
-        status: int = options.command(options)
+        with _only_errors() if getattr(options, "quiet", False) else nullcontext():
+            status: int = options.command(options)
     except BaseException:
         stay_if_ending()  # it may have failed because its files are being removed
         raise
     return status
+
+
+@contextmanager
+def _only_errors() -> Iterator[None]:
+    """Show neither warnings nor progress, which needs a terminal, inside."""
+    stream = sys.stderr
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda *_, **__: None
+        if stream is None:
+            yield
+            return
+        stream.isatty = lambda: False  # type: ignore[method-assign]
+        try:
+            yield
+        finally:
+            del stream.isatty
 
 
 def _show_warning(

@@ -5,17 +5,20 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rtradar.cli.values import (
+    QUIET_HELP,
     add_command,
     add_files,
     decibels,
     number,
     path,
+    say,
     seconds,
     setting,
+    show_page,
     whole,
     window,
 )
@@ -101,6 +104,12 @@ def _add_run(run: OneLineParser) -> None:
         metavar="NAME=VALUE",
         help="option of the model, such as shadow_rays=256 of fresnel; may be given again",
     )
+    run.add_argument(
+        "--no-pictures",
+        dest="pictures",
+        action="store_false",
+        help="draw no PNG files, for many runs; the report is made without them",
+    )
     run.set_defaults(command=_run)
 
 
@@ -145,6 +154,14 @@ def _add_capture(command: OneLineParser) -> None:
         help="leave out the loss with distance, as the paper does",
     )
     add_files(command, out="folder for the results", json="write the summary there too")
+    command.flag("--open", "open the page of the results in the browser")
+    amount = command.add_mutually_exclusive_group()
+    amount.add_argument("--quiet", action="store_true", help=QUIET_HELP)
+    amount.add_argument(
+        "--verbose",
+        action="store_true",
+        help="also print the time of each stage, the versions of packages and the backend",
+    )
 
 
 def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
@@ -176,21 +193,40 @@ def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
 def _run(options: argparse.Namespace) -> int:
     capture = _capture(options)
     from rtradar.pipeline import run
+    from rtradar.pipeline.timing import lines_shown
 
     model_options = dict(options.model_option)
     for name in ("tolerance_db", "tolerance_complex"):
         if getattr(options, name) is not None:
             model_options[name] = getattr(options, name)
-    summary = run(**capture, model_options=model_options).summary
+    with lines_shown():
+        summary = run(**capture, model_options=model_options, pictures=options.pictures).summary
     if options.json is not None:
         write_json(options.json, summary)
-    print(
+    if options.verbose:
+        say(options, _details(summary["stages"], summary["versions"], summary["variant"]))
+    say(
+        options,
         f"{summary['rdt_points']} points from {summary['detections']} detections "
         f"in {summary['windows']} windows; {summary['wall_s']:.1f} s "
-        f"for {summary['capture_s']:.2f} s of radar, and {summary['warmup_s']:.1f} s to warm up; "
-        f"see {options.out}"
+        f"for {summary['capture_s']:.2f} s of radar, and {summary['warmup_s']:.1f} s to warm up",
     )
+    _show(options, "report.html")
     return 0
+
+
+def _details(stages: Mapping[str, float], versions: Mapping[str, str], backend: str | None) -> str:
+    """Return the time of each stage, the versions and the backend as lines of text."""
+    times = ", ".join(f"{name} {seconds:.3f}" for name, seconds in stages.items())
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
+    return f"stages [s]: {times}\nversions: {packages}\nray-tracing backend: {backend or 'none'}"
+
+
+def _show(options: argparse.Namespace, page: str) -> None:
+    """Name the page to open as the last line, and open it where that is asked for."""
+    say(options, f"open {options.out / page}")
+    if options.open:
+        show_page(options.out / page)
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -200,12 +236,18 @@ def _compare(options: argparse.Namespace) -> int:
     check_fidelities(fidelities)
     capture = _capture(options)
     from rtradar.pipeline import compare
+    from rtradar.pipeline.timing import lines_shown
 
-    found = compare(**capture, fidelities=fidelities)
+    with lines_shown():
+        found = compare(**capture, fidelities=fidelities)
     if options.json is not None:
         write_json(options.json, found.summary)
-    print(found.table())
-    print(f"see {options.out / 'compare.html'}")
+    if options.verbose:
+        for name, figures in found.summary["fidelities"].items():
+            details = figures["stages"], found.summary["versions"], figures["variant"]
+            say(options, f"{name}:\n{_details(*details)}")
+    say(options, found.table())
+    _show(options, "compare.html")
     return 0
 
 

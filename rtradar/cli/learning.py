@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rtradar.cli.values import (
     OVERWRITE_HELP,
+    QUIET_HELP,
     OneLineParser,
     add_command,
     add_files,
@@ -14,6 +15,7 @@ from rtradar.cli.values import (
     number,
     numbers,
     path,
+    say,
     whole,
 )
 from rtradar.errors import InputError
@@ -82,6 +84,7 @@ def _add_dataset(dataset: OneLineParser) -> None:
         "--scheduler", metavar="ADDRESS", help="a Dask scheduler to use, such as tcp://host:8786"
     )
     add_files(build, json="write what was made there as JSON")
+    build.flag("--quiet", QUIET_HELP)
     build.set_defaults(
         command=_dataset_build,
         stopped="the same command goes on with the samples that '{out}' has not yet",
@@ -151,6 +154,7 @@ def _add_train(train: OneLineParser) -> None:
     train.option(
         "--seed", "N", "seed of splits and trainings (default: %(default)s)", type=whole, default=0
     )
+    train.flag("--quiet", QUIET_HELP)
     train.set_defaults(
         command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is"
     )
@@ -175,6 +179,7 @@ def _add_evaluate(evaluate: OneLineParser) -> None:
     )
     evaluate.flag("--overwrite", OVERWRITE_HELP)
     add_files(evaluate, json="write the numbers there too")
+    evaluate.flag("--quiet", QUIET_HELP)
     evaluate.set_defaults(command=_evaluate)
 
 
@@ -207,8 +212,8 @@ def _dataset_build(options: argparse.Namespace) -> int:
     )
     if options.json is not None:
         write_json(options.json, report)
-    print(in_words(report))
-    print(f"see {options.out}")
+    say(options, in_words(report))
+    say(options, f"see {options.out}")
     return 0
 
 
@@ -244,7 +249,7 @@ def _train(options: argparse.Namespace) -> int:
         device=device,
     )
     done, planned = len(study.outcomes), len(study.plan["trainings"])
-    print(f"{done} of {planned} trained; see how well: rtradar evaluate {options.out}")
+    say(options, f"{done} of {planned} trained; see how well: rtradar evaluate {options.out}")
     return 0
 
 
@@ -270,5 +275,5 @@ def _evaluate(options: argparse.Namespace) -> int:
         table, content = write_evaluation(studies, baselines, folder)
     if options.json is not None:
         write_json(options.json, content)
-    print(f"{table}\n\nsee {out}")
+    say(options, f"{table}\n\nsee {out}")
     return 0

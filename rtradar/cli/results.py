@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import add_command, add_files, path, seconds, there
+from rtradar.cli.values import add_command, add_files, path, seconds, show_page, there
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
@@ -92,12 +92,10 @@ def _view(options: argparse.Namespace) -> int:
         write_json(options.json, shown)
     for kind in ("page", "still"):
         if kind in shown:
-            print(f"see {shown[kind]['path']} ({shown[kind]['bytes'] / 1e6:.1f} MB)")
+            verb = "open" if kind == "page" else "see"
+            print(f"{verb} {shown[kind]['path']} ({shown[kind]['bytes'] / 1e6:.1f} MB)")
     if page is not None and options.out is None and not options.no_browser:
-        import webbrowser
-
-        if not webbrowser.open(page.resolve().as_uri()):
-            print("no browser was found here; open the page by hand")
+        show_page(page)
     return 0
 
 

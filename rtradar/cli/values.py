@@ -100,6 +100,21 @@ def add_files(command: OneLineParser, *, out: str = "", json: str) -> None:
     command.option("--json", "FILE", json, type=path)
 
 
+def say(options: argparse.Namespace, text: str) -> None:
+    """Print a result, unless ``--quiet`` asks for errors only."""
+    if not options.quiet:
+        print(text)
+
+
+def show_page(page: Path) -> None:
+    """Open a page in the browser, or say that there is none."""
+    import webbrowser
+
+    if not webbrowser.open(page.resolve().as_uri()):
+        print("no browser was found here; open the page by hand", file=sys.stderr)
+
+
+QUIET_HELP = "print nothing but errors: no progress, no warnings, no results"
 OVERWRITE_HELP = "replace files of others that have the names of new ones"
 
 

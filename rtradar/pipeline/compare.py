@@ -197,7 +197,10 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
         "rdt_chamfer_bins": _finite(chamfer(result.points, reference.points, bins)),
         "scatter_s": stages["scatter"] + stages["survey"],
         "wall_s": summary["wall_s"],
-        **{name: summary[name] for name in ("real_time_factor", "peak_memory_mb", "stages")},
+        **{
+            name: summary[name]
+            for name in ("real_time_factor", "peak_memory_mb", "stages", "variant")
+        },
         **{name: summary[name] for name in ("limits", "part_power_m2")},
         "part_hidden_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
     }

@@ -17,7 +17,7 @@ from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.processing import Processing
-from rtradar.pipeline.timing import reuse_freed_memory
+from rtradar.pipeline.timing import reuse_freed_memory, stage_line
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
@@ -39,20 +39,21 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
     if settings.snr_db == "physical":
         # They report a missing value before the work.
         radar.noise_power_w, radar.watts_per_m2  # noqa: B018
-    with processing_compiled_beside():
-        with processing.stages.time("motion"):
-            body = _placed(motion, scene, settings)
-            radar = scene.place(radar)
-            processing = replace(processing, radar=radar)
-        n_chirps, frame_starts = _frames(motion, radar, body)
-        warm_up_start = time.perf_counter()
-        model = _echo_model(radar, body, scene, settings)
-        echoes = model.echoes(np.arange(2 * radar.n_tx))
-        # Not every model has specular points; the report shows them of all.
-        geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
-        solve_specular_points(geometry, points=True)
-    warm_up_processing(echoes, radar)
-    warmup_s = time.perf_counter() - warm_up_start
+    with stage_line("preparing"):
+        with processing_compiled_beside():
+            with processing.stages.time("motion"):
+                body = _placed(motion, scene, settings)
+                radar = scene.place(radar)
+                processing = replace(processing, radar=radar)
+            n_chirps, frame_starts = _frames(motion, radar, body)
+            warm_up_start = time.perf_counter()
+            model = _echo_model(radar, body, scene, settings)
+            echoes = model.echoes(np.arange(2 * radar.n_tx))
+            # Not every model has specular points; the report shows them of all.
+            geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
+            solve_specular_points(geometry, points=True)
+        warm_up_processing(echoes, radar)
+        warmup_s = time.perf_counter() - warm_up_start
     with warnings.catch_warnings(record=True) as caught, processing.stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
         person = model.person if isinstance(model, RoomModel) else model

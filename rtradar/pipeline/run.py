@@ -39,6 +39,7 @@ def run(
     *,
     out: str | Path | None = None,
     overwrite: bool = False,
+    pictures: bool = True,
     **options: Unpack[RunOptions],
 ) -> Result:
     """Simulate one recording: maps, clouds and a summary, in memory or in a folder.
@@ -58,6 +59,8 @@ def run(
     overwrite : bool
         Whether files that ``out`` holds under names of the new ones are replaced even where no
         ``summary.json`` lists them.
+    pictures : bool
+        Whether pictures are drawn into ``out``. The report is made without them too.
     **options
         Settings, such as ``fidelity``, ``snr_db`` or ``seed``: the fields of `rtradar.RunSettings`.
 
@@ -89,7 +92,7 @@ def run(
     settings = RunSettings(**options)
     if out is None:
         return _run_in_memory(motion, radar, scene or Scene(), settings)
-    return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite)
+    return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite, pictures)
 
 
 def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
@@ -126,6 +129,7 @@ def run_into(
     scene: Scene,
     settings: RunSettings,
     overwrite: bool = False,
+    pictures: bool = True,
 ) -> Result:
     """Run with these settings and write the files of `RUN_FILES` into a folder; see `run`."""
     started, rays_before = _start()
@@ -138,8 +142,10 @@ def run_into(
         points = clouds.rdt.points
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
-        with capture.stages.time("pictures"):
-            pictures = draw_pictures(folder, capture, clouds)
+        drawn: dict[str, Path] = {}
+        if pictures:
+            with capture.stages.time("pictures"):
+                drawn = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
         # Only now, for the echoes that the view asks for do not belong into the model's account.
@@ -153,14 +159,14 @@ def run_into(
                 body=capture.body,
                 radar=capture.radar,
                 summary=summary,
-                pictures=pictures,
+                pictures=drawn,
                 rdt_points=points,
                 spatial=clouds.spatial,
                 run_view=run_view_of(
                     folder, summary, capture.radar, capture.processing.window_functions
                 ),
             )
-        summary |= {"files": RUN_FILES.list_of(folder)}
+        summary |= {"pictures": pictures, "files": RUN_FILES.list_of(folder)}
         text, summary = _finished(summary, capture, started)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     return Result(

@@ -8,8 +8,48 @@ import resource
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from pathlib import Path
+
+_LINES = {
+    "survey": "link budget",
+    "room": "tracing the room",
+    "pictures": "drawing pictures",
+    "view": "body and paths to view",
+    "report": "writing the report",
+}
+"""Stages that have a line of their own on a terminal. Echoes and maps have a progress bar."""
+
+_lines_shown: ContextVar[bool] = ContextVar("lines_shown", default=False)
+
+
+@contextmanager
+def lines_shown() -> Iterator[None]:
+    """Show a line for each stage inside, if stderr is a terminal."""
+    token = _lines_shown.set(True)
+    try:
+        yield
+    finally:
+        _lines_shown.reset(token)
+
+
+@contextmanager
+def stage_line(text: str) -> Iterator[None]:
+    """Show what is done inside, and in the end how long it took, if `lines_shown`."""
+    if not (_lines_shown.get() and sys.stderr is not None and sys.stderr.isatty()):
+        yield
+        return
+    start = time.perf_counter()
+    print(f"{text} ...", end="", file=sys.stderr, flush=True)
+    try:
+        yield
+    except BaseException:
+        print(file=sys.stderr)
+        raise
+    # A progress bar may have been here meanwhile.
+    said = f"{text}: {time.perf_counter() - start:.1f} s"
+    print(f"\r{said:60}", file=sys.stderr, flush=True)
 
 
 class Stages:
@@ -23,7 +63,8 @@ class Stages:
         """Add the time spent inside to stage ``name``."""
         start = time.perf_counter()
         try:
-            yield
+            with stage_line(_LINES[name]) if name in _LINES else nullcontext():
+                yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
 

@@ -36,7 +36,7 @@ def room_section(room: Mapping[str, Any], radar: Radar, pictures: Mapping[str, P
     parts = [
         tiles(_figures(room, clutter)),
         _HOW if "after_removal_db" in clutter else "",
-        f'<div class="pictures">{drawn}</div>',
+        f'<div class="pictures">{drawn}</div>' if drawn else "",
         _ghosts(room, radar),
         _static(clutter),
         _left_out(room, clutter),
