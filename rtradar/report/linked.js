@@ -254,7 +254,7 @@ async function drawLinked() {
     hovertemplate: `%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} ${unitOf(data.spectrogram)}<extra></extra>`,
   })], {
     xaxis: { text: "Time [s]", range: edge(data.spectrogram, "x", data.spectrogram.shape[1]) },
-    yaxis: { text: velocityLabel, range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
+    yaxis: { text: narrow ? "Velocity [m/s]" : velocityLabel, range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
     shapes: [cursor(figure.times[0])],
   });
 

@@ -144,11 +144,12 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
 
 
 def mapping_table(values: Mapping[str, Any]) -> str:
-    """Make a table of all values except mappings and lists of mappings."""
+    """Make a table of all values except None, mappings and lists of mappings."""
     return table(
         quantity(name, value)
         for name, value in values.items()
-        if not isinstance(value, Mapping)
+        if value is not None
+        and not isinstance(value, Mapping)
         and not (isinstance(value, list) and value and isinstance(value[0], Mapping))
     )
 
@@ -223,7 +224,7 @@ def tiles(values: Iterable[tuple[str, str]]) -> str:
 
 
 def picture(title: str, path: Path) -> str:
-    """Embed a PNG file with its caption; InputError if it is missing or not a PNG file."""
+    """Embed a PNG file with its caption, broad ones as such; InputError if it is no PNG file."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -233,9 +234,9 @@ def picture(title: str, path: Path) -> str:
     if data[:8] != _PNG or len(data) < 24:
         raise InputError(f"report: picture '{path}' is no PNG file; only PNG is embedded")
     width, height = struct.unpack(">II", data[16:24])
-    text = escape(title)
+    text, shape = escape(title), ' class="broad"' if width > 1.9 * height else ""
     return (
-        f'<figure><img alt="{text}" width="{width}" height="{height}" '
+        f'<figure{shape}><img alt="{text}" width="{width}" height="{height}" '
         f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
         f"<figcaption>{text}</figcaption></figure>"
     )
