@@ -28,7 +28,7 @@ var(--color-foreground-primary, var(--rtradar-ink))));
 .rtradar-card table { flex: 1 1 300px; max-width: min(100%, 560px); margin: 0 0 6px; border: 0;
   border-collapse: collapse; font: inherit; table-layout: auto; }
 .rtradar-card caption { padding: 2px 0; font-weight: 600; text-align: left; caption-side: top; }
-.rtradar-card tr, .rtradar-card tbody tr:nth-child(odd) { background: none; }
+.rtradar-card tr, .rtradar-card tbody tr:nth-child(n) { background: none; }
 .rtradar-card th, .rtradar-card td { padding: 2px 0; border: 0; text-align: left;
   vertical-align: top; max-width: none; white-space: normal; font-weight: 400;
   border-bottom: 1px solid var(--jp-border-color2, \
