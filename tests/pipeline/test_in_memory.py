@@ -15,6 +15,7 @@ import xarray as xr
 import rtradar as rt
 from rtradar.errors import InputError
 from rtradar.pipeline import memory
+from rtradar.settings import RunOptions
 
 RADAR = rt.Radar(
     name="small",
@@ -26,6 +27,7 @@ RADAR = rt.Radar(
     samples_per_chirp=128,
     frame_duration_s=0.05,
 )
+OPTIONS: RunOptions = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
 MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 
 
@@ -33,17 +35,20 @@ MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 def in_memory(tmp_path_factory: pytest.TempPathFactory) -> rt.Result:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("empty"))
-        result = rt.run(MOTION, RADAR, fidelity="analytic", duration_s=0.3, clutter_removal="mean")
+        result = rt.run(MOTION, RADAR, **OPTIONS)
         assert not list(Path().iterdir())
     return result
 
 
-def test_maps_in_memory_are_those_of_the_file(in_memory: rt.Result, tmp_path: Path) -> None:
-    options = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
-    written = rt.run(MOTION, RADAR, out=tmp_path / "out", **options)  # type: ignore[arg-type]
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> rt.Result:
+    return rt.run(MOTION, RADAR, out=tmp_path_factory.mktemp("run") / "out", **OPTIONS)
+
+
+def test_maps_in_memory_are_those_of_the_file(in_memory: rt.Result, written: rt.Result) -> None:
     assert in_memory.out is None
-    assert written.out == tmp_path / "out"
-    with xr.open_dataset(tmp_path / "out" / "maps.h5", engine="h5netcdf", decode_cf=False) as maps:
+    assert written.out is not None
+    with xr.open_dataset(written.out / "maps.h5", engine="h5netcdf", decode_cf=False) as maps:
         xr.testing.assert_identical(in_memory.maps, maps)
     xr.testing.assert_identical(in_memory.maps, written.maps)
     np.testing.assert_array_equal(in_memory.points, written.points)
@@ -89,10 +94,8 @@ def test_results_draw_themselves(in_memory: rt.Result) -> None:
 
 
 def test_the_view_is_the_same_in_memory_and_of_a_folder(
-    in_memory: rt.Result, tmp_path: Path
+    in_memory: rt.Result, written: rt.Result, tmp_path: Path
 ) -> None:
-    options = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
-    written = rt.run(MOTION, RADAR, out=tmp_path / "out", **options)  # type: ignore[arg-type]
     page, other = in_memory.view(height_px=700), written.view()
     assert page.html == other.html
     frame = page._repr_html_()
