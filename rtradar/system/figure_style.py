@@ -194,7 +194,7 @@ def theme_of(axes: Axes) -> Theme:
 
 
 def dress(
-    axes: Axes, *, title: str = "", note: str = "", grid: bool = True, across: int = 1
+    axes: Axes, *, title: str = "", note: str = "", grid: bool = True, across: float = 1
 ) -> None:
     """Give axes that are drawn on their title, note, fonts, grid and colours.
 
@@ -210,8 +210,9 @@ def dress(
         Sentence in small letters below the axes, broken into lines that fit.
     grid : bool
         Whether to draw grid lines.
-    across : int
-        Number of axes side by side, of which these are the first, that title and note may cover.
+    across : float
+        Width of title and note, as a multiple of the width of the axes: their number where the axes
+        are the first of several side by side.
     """
     theme = theme_of(axes)
     is_3d = axes.name == "3d"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from itertools import combinations
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 import rtradar as rt
+from rtradar.clouds import SpatialCloud
 from rtradar.report.figures.fitting import above_floor, fitted_limits
 from rtradar.report.figures.plots import Plots
 from rtradar.system.figure_style import DARK, fit, new_figure, theme_of
@@ -105,6 +108,24 @@ def test_every_text_is_whole_and_covers_no_other(plots_of: Callable[..., Plots],
             assert not here.overlaps(there), (one, other)
 
 
+def test_high_clouds_stand_beside_each_other_under_one_title(
+    plots_of: Callable[..., Plots],
+) -> None:
+    rng = np.random.default_rng(1)
+    points = rng.uniform([-4, -5, 0], [-3, 5, 3], (400, 3))
+    cloud = SpatialCloud(points, points[:, 2], points[:, 0] + 5, points[:, 0] + 5)
+    cross = rt.Radar(samples_per_chirp=64, tx_y=1, tx_z=1, rx_y=2, rx_z=2)
+    plots = plots_of(cross, title=LONG, spatial=cloud)
+    maps = plots.maps.assign(range_elevation=plots.maps["range_azimuth"])
+    figure = dataclasses.replace(plots, maps=maps).spatial().figure
+    seen = texts(figure)
+    upper, lower = figure.axes[0].get_window_extent(), figure.axes[1].get_window_extent()
+    assert upper.x1 < lower.x0
+    title = next(text for text in seen if "Spatial cloud" in text.get_text())
+    box = title.get_window_extent()
+    assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_picture_is_drawn_on_the_axes_that_are_given(
     plots_of: Callable[..., Plots], name: str
@@ -113,6 +134,18 @@ def test_a_picture_is_drawn_on_the_axes_that_are_given(
     own = figure.add_subplot(projection="3d" if name == "rdt" else None)
     assert getattr(plots_of(RADAR), name)(ax=own) is own
     assert [axes for axes in figure.axes if axes.get_label() != "<colorbar>"] == [own]
+
+
+def test_a_notebook_shows_what_is_drawn_without_axes(plots_of: Callable[..., Plots]) -> None:
+    made = plots_of(RADAR)
+    own = Plots(made.maps, made.points, made.spatial_cloud, made.radar, made.summary)
+    try:
+        figure = own.range_time().figure
+        assert plt.fignum_exists(figure.number)
+    finally:
+        plt.close("all")
+    made.range_time()
+    assert plt.get_fignums() == []  # files of a run leave pyplot alone
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -173,8 +206,8 @@ def test_a_part_of_the_points_is_drawn_and_all_are_counted(
     plots_of: Callable[..., Plots], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rtradar.report.figures.plots._DOTS", 4)
-    title = plots_of(RADAR).spatial().get_title("left")
-    assert title.startswith("Spatial cloud, 10 points (4 of them drawn)")
+    title = plots_of(RADAR).spatial().get_title("left").replace("\n", " ")
+    assert title.startswith("Spatial cloud, 10 points (4 drawn: one in 3 of those at most 40 dB")
 
 
 def test_lines_fit_and_no_letter_is_lost() -> None:

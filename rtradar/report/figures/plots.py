@@ -302,7 +302,9 @@ class Plots:
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
             axis.set_major_locator(MaxNLocator(5))
         axes.xaxis.labelpad = axes.yaxis.labelpad = 10
-        title = f"Range-Doppler-time cloud, {_drawn(len(points), int(shown.sum()))}"
+        title = f"Range-Doppler-time cloud, {len(points)} points"
+        if not shown.all():
+            title += f" ({int(shown.sum())} of them within the axes)"
         dress(axes, title=self._title(title, self.maps["range_doppler"]))
         add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
         return cast(Axes, axes)
@@ -344,9 +346,10 @@ class Plots:
             "vmin": -fastest,
             "vmax": fastest,
         }
-        heading = f"Spatial cloud, {_drawn(len(self.spatial_cloud.points), len(points))}"
-        note = "Drawn: the points at most 40 dB below the strongest"
-        note += f", one in {every} of them." if every > 1 else "."
+        heading = f"Spatial cloud, {len(self.spatial_cloud.points)} points"
+        if len(points) < len(self.spatial_cloud.points):
+            part = f"one in {every} of those" if every > 1 else "those"
+            heading += f" ({len(points)} drawn: {part} at most 40 dB below the strongest)"
         place = self.radar.position_m
         limits = [_of_values(points[:, axis], place[axis]) for axis in range(3)]
         width = limits[0][1] - limits[0][0]
@@ -359,10 +362,15 @@ class Plots:
             if 4.3 * sum(ratios) > _HIGHEST_IN:  # beside each other
                 high = 4.3 / len(ups) * max(ratios)
                 options |= {"ncols": len(ups)}
+                # Panels of one size, or the title of the first would meet the second.
+                span = width * max(ratios)
+                for up in ups:
+                    middle = sum(limits[up]) / 2
+                    limits[up] = middle - span / 2, middle + span / 2
             else:
                 high = 4.3 * sum(ratios) + 0.7 * (len(ups) - 1)
                 options |= {"nrows": len(ups), "height_ratios": ratios}
-            figure = self.new_figure(min(high, 10.0) + 1.6)
+            figure = self.new_figure(min(high, 10.0) + 1.9)
             panels = list(figure.subplots(**options).flat)
         for axes, up in zip(panels, ups, strict=True):
             dots = axes.scatter(points[:, 0], points[:, up], s=2.5, linewidths=0, **colours)
@@ -373,14 +381,13 @@ class Plots:
             label = f"{self._x_label}\n{view}" if len(self._angles) == 2 else self._x_label
             axes.set(xlabel=label, ylabel=f"{'xyz'[up]} [m]")
             axes.set(xlim=limits[0], ylim=limits[up], aspect="equal")
+        panels[0].legend(loc="best")
+        for axes in panels[1:]:
+            dress(axes)
         lowest = [axes.get_position(original=True).y0 for axes in panels]
         beside = len(panels) if lowest[0] == lowest[-1] else 1
-        panels[0].legend(loc="best")
         title = self._title(heading, self.maps["range_doppler"])
-        for axes in panels[1:]:
-            dress(axes, note="" if beside > 1 else note)
-        own_note = note if beside > 1 or len(panels) == 1 else ""
-        dress(panels[0], title=title, note=own_note, across=beside)
+        dress(panels[0], title=title, across=0.92 * beside)
         add_colour_bar(dots, panels, VELOCITY_LABEL)
         return panels[0]
 
@@ -516,10 +523,6 @@ class Plots:
         dress(axes, title=title, note=colours, grid=False)
         add_colour_bar(image, [axes], unit.label("detected cells"))
         return axes
-
-
-def _drawn(there: int, shown: int) -> str:
-    return f"{there} points" + ("" if there == shown else f" ({shown} of them drawn)")
 
 
 def _of_values(values: NDArray[np.float64], own: float) -> tuple[float, float]:
