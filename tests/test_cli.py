@@ -382,6 +382,9 @@ def test_wrong_input_is_refused_before_anything_slow_is_imported(tmp_path: Path)
         ["compare", "none.bvh", "--out", "o"],
         ["compare", "synthetic:walk", "--fidelities", "analytic,x", "--out", "o"],
         ["view", "none"],
+        ["dataset", "build", "none.toml", "--out", "o"],
+        ["train", "none", "--out", "o"],
+        ["evaluate", "none"],
         ["export", "none", "--out", "o.mat"],
     ]
     code = f"from rtradar.cli import main\nassert [main(words) for words in {refused}] == " + str(

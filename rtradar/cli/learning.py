@@ -16,6 +16,7 @@ from rtradar.cli.values import (
     numbers,
     path,
     say,
+    there,
     whole,
 )
 from rtradar.errors import InputError
@@ -70,7 +71,7 @@ def _add_dataset(dataset: OneLineParser) -> None:
         "build",
         help="make the samples of a collection that are missing or damaged; may be run again",
     )
-    build.option("spec", "SPEC.toml", "what the collection shall hold", type=path)
+    build.option("spec", "SPEC.toml", "file that says what the collection shall hold", type=there)
     build.option("--out", "DIR", "folder of the collection", type=path, required=True)
     build.flag("--plan", "make a sample of each kind, and say how long the others will take")
     place = build.add_mutually_exclusive_group()
@@ -92,14 +93,14 @@ def _add_dataset(dataset: OneLineParser) -> None:
     export = commands.add_parser(
         "export", help="copy a whole collection into one Zarr group, with a data card"
     )
-    export.option("data", "DIR", "folders of one collection or several", type=path, nargs="+")
+    export.option("data", "DIR", "folders of one collection or several", type=there, nargs="+")
     export.option("--out", "X.zarr", "new group; nothing is replaced", type=path, required=True)
     export.set_defaults(command=_dataset_export)
 
 
 def _add_train(train: OneLineParser) -> None:
     train.option(
-        "data", "DIR", "folders of clouds, made by rtradar dataset build", type=path, nargs="+"
+        "data", "DIR", "folders of clouds, made by rtradar dataset build", type=there, nargs="+"
     )
     train.option(
         "--out",
@@ -165,7 +166,7 @@ def _add_evaluate(evaluate: OneLineParser) -> None:
         "trained",
         "OUT",
         "folders that rtradar train made, of the same clouds",
-        type=path,
+        type=there,
         nargs="+",
     )
     evaluate.flag(

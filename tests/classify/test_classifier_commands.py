@@ -215,7 +215,7 @@ def test_bad_folders_are_refused_in_one_line(
             ["train", collection, "--out", tmp_path / "out", *TINY, "--points", "49"],
             "--points 49: the clouds hold 48",
         ),
-        (["evaluate", tmp_path / "none"], "holds no trainings"),
+        (["evaluate", tmp_path / "none"], "there is no"),
         (["evaluate", trained, "--out", tmp_path / "file"], "--out"),
         (["evaluate", trained, "--data", collection], "--data"),
         (["evaluate", trained, "--json", tmp_path / "none" / "file"], "--json"),
