@@ -300,8 +300,9 @@ def fit(text: str, width_pt: float, size_pt: float) -> str:
 
 
 def _width_pt(text: str, size_pt: float) -> float:
-    from matplotlib.textpath import TextPath
+    from matplotlib.font_manager import FontProperties, findfont, get_font
 
-    # A dollar sign would begin a formula; an S is as wide.
-    plain = text.replace("$", "S").strip()
-    return float(TextPath((0, 0), plain, size=size_pt).get_extents().width) if plain else 0.0
+    font = get_font(findfont(FontProperties()))  # one for each thread
+    font.set_size(size_pt, 72)
+    font.set_text(text.strip())
+    return float(font.get_width_height()[0]) / 64
