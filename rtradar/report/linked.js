@@ -146,9 +146,7 @@ function cloudAt(mode, time) {
 
 /** A frame about the whole cloud at one time. */
 function frameAt(time) {
-  const [[r0, r1], [v0, v1]] = [1, 2].map((k) => component(cloud.points, k)).map((values) => [
-    values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b)),
-  ]);
+  const [[v0, v1], [r0, r1]] = data.map.box;
   return { x: new Array(5).fill(time), y: [r0, r1, r1, r0, r0], z: [v0, v0, v1, v1, v0] };
 }
 
@@ -254,7 +252,7 @@ async function drawLinked() {
     hovertemplate: `%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} ${unitOf(data.spectrogram)}<extra></extra>`,
   })], {
     xaxis: { text: "Time [s]", range: edge(data.spectrogram, "x", data.spectrogram.shape[1]) },
-    yaxis: { text: narrow ? "Velocity [m/s]" : velocityLabel, range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
+    yaxis: { text: narrow ? "Velocity [m/s]" : velocityLabel, range: data.map.box[0] },
     shapes: [cursor(figure.times[0])],
   });
 
@@ -272,7 +270,7 @@ async function drawLinked() {
       { type: "scatter3d", mode: "lines", name: "now", ...frameAt(figure.times[0]), showlegend: false, hoverinfo: "skip", line: { width: 3, color: now } },
     ], {
       domain: { x: [0, 1], y: [0, 1] }, aspectmode: "manual", aspectratio: { x: 1.6, y: 1, z: 0.9 },
-      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis("Velocity [m/s]"),
+      xaxis: axis("Time [s]"), yaxis: axis("Range [m]", data.map.box[1]), zaxis: axis("Velocity [m/s]", data.map.box[0]),
       camera: { eye: { x: -1.0, y: -1.9, z: 0.8 }, center: { x: 0, y: 0, z: -0.2 } },
     }, 1.5);
   }

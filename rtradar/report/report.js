@@ -6,10 +6,10 @@ async function plan() {
   const along = data.spatial.measured[1] ? 1 : 2;
   const velocity = floats(data.spatial.velocity);
   await drawFlat("scene-spatial", [{
-    type: "scatter", mode: "markers", x: component(points, 0), y: component(points, along), marker: velocityMarkers(velocity, 3),
+    type: "scatter", mode: "markers", x: component(points, 0), y: component(points, along), marker: { ...velocityMarkers(velocity, 3), colorbar: flatBar(velocityLabel) },
     customdata: floats(data.spatial.time), hovertemplate: "(%{x:.2f}, %{y:.2f}) m<br>%{customdata:.2f} s<extra></extra>",
   }], {
-    xaxis: { text: "x [m], by the distance from the line of the array" },
+    xaxis: { text: narrow ? "x [m]" : "x [m], by the distance from the line of the array" },
     yaxis: { text: `${"xyz"[along]} [m]`, scaleanchor: "x" },
   });
 }

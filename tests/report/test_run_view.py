@@ -159,3 +159,9 @@ def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
     assert (data["rdt"]["count"], data["rdt"]["group"]) == (0, [])
     # Walls lie in the box too: up to 2.2 m, in half metres.
     assert data["figure"]["ranges"][0][1] == 2.5
+
+
+def test_a_false_alarm_does_not_set_the_box() -> None:
+    points = [(0.1, 4.5, 0.5)] * 200 + [(0.1, 9.0, 7.0)]
+    (_, fast), (_, far) = linked(points).shown_box()
+    assert (fast, far) == pytest.approx((1.5, 5.5))

@@ -47,6 +47,7 @@ _NO_SCRIPT = """
 <noscript><p class="box warn">The views that move need JavaScript; all else on this page does
 without.</p></noscript>
 """
+_LONG = 16
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -138,9 +139,14 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
     head_row = f"<thead><tr>{top}</tr></thead>" if head else ""
     body = ""
     for name, *values in rows:
-        cells = "".join(f"<td>{escape(cell)}</td>" for cell in values)
+        cells = "".join(f"<td{_wraps(cell)}>{escape(cell)}</td>" for cell in values)
         body += f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>'
     return f"<table>{head_row}<tbody>{body}</tbody></table>"
+
+
+def _wraps(cell: str) -> str:
+    """Return the class of a cell that may be broken, which a number and its unit are not."""
+    return ' class="long"' if len(cell) > _LONG else ""
 
 
 def mapping_table(values: Mapping[str, Any]) -> str:

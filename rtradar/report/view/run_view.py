@@ -176,7 +176,10 @@ class RunView:
         return replace(self, snapshots=self.snapshots.every(every), range_doppler=levels)
 
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
+        """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin.
+
+        One point in a hundred at either end, such as a false alarm, does not set them.
+        """
         snapshots, levels = self.snapshots, self.range_doppler
 
         def box(
@@ -184,7 +187,10 @@ class RunView:
         ) -> tuple[float, float]:
             (first, step), count = axis, levels.level.shape[column]
             least, most = first - step / 2, first + step * (count - 0.5)
-            inside = np.concatenate([values[self.seen], self.rdt_points[:, column]])
+            points = self.rdt_points[:, column]
+            if len(points):
+                points = np.percentile(points, (1, 99))
+            inside = np.concatenate([values[self.seen], points])
             inside = inside[(inside >= least) & (inside <= most)]
             if not len(inside):
                 return least, most
