@@ -234,7 +234,9 @@ def dress(
         axes.set_facecolor(theme.page)
     if is_3d:
         for name in "xyz":
-            getattr(axes, f"{name}axis").set_pane_color(theme.page)
+            axis = getattr(axes, f"{name}axis")
+            axis.set_pane_color(theme.page)
+            axis.line.set_color(theme.faint)
     elif grid:
         style = {"linewidth": STYLE["grid.linewidth"], "alpha": STYLE["grid.alpha"]}
         axes.grid(True, color=theme.faint, **style)

@@ -207,7 +207,7 @@ def _line(axes: Axes, xy: NDArray[np.float64], name: str, kind: str, **style: An
         return []
     chosen = points[(np.array([0.5, 0.3, 0.7, 0.1, 0.9]) * len(points)).astype(int)].tolist()
     places = [place for x, y in chosen for place in around((x, y))[:17]]
-    return [Label(name, places, getattr(theme_of(axes), kind))]
+    return [Label(name, places, theme_of(axes).text)]
 
 
 def _outline(piece: Furniture) -> NDArray[np.float64]:
@@ -229,8 +229,7 @@ def _circle(axes: Axes, ghosts: Sequence[GhostMark]) -> list[Label]:
     for one in ghosts:
         axes.plot(one.across, one.range_m, "o", markeredgecolor=theme.ghost, **style)
     return [
-        Label(str(one.number), around((one.across, one.range_m), 9.0), theme.ghost)
-        for one in ghosts
+        Label(str(one.number), around((one.across, one.range_m), 9.0), theme.text) for one in ghosts
     ]
 
 
