@@ -64,7 +64,8 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+        said = " ".join(message.split())
+        self.exit(2, f"{self.prog}: {said}; see '{self.prog} --help'\n")
 
     def option(self, name: str, metavar: str, text: str, **more: Any) -> None:
         """Add an option, or an argument, that takes a value; ``text`` is its help."""

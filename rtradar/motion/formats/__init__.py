@@ -53,14 +53,13 @@ def load_motion(
     # Readers of other packages may take folders, and names of what is no file; none may wait.
     if kind := special_kind(file):
         raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
-    # Before the reader is loaded, which takes longer.
-    for needed in (file, skeleton) if name in READERS.built_in else ():
-        if needed is not None and not os.path.lexists(needed):
-            kind = Path(needed).suffix.upper().removeprefix(".")
-            raise InputError(
-                f"{needed}: cannot read this {kind} file (No such file or directory); check the "
-                "path"
-            )
+    # Before the reader is loaded, which takes longer. The skeleton is read first.
+    needed = Path(skeleton or file)
+    if name in READERS.built_in and not os.path.lexists(needed):
+        kind = needed.suffix.upper().removeprefix(".")
+        raise InputError(
+            f"{needed}: cannot read this {kind} file (No such file or directory); check the path"
+        )
     read = READERS[name]
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters
