@@ -383,6 +383,7 @@ def test_wrong_input_is_refused_before_anything_slow_is_imported(tmp_path: Path)
         ["compare", "synthetic:walk", "--fidelities", "analytic,x", "--out", "o"],
         ["view", "none"],
         ["dataset", "build", "none.toml", "--out", "o"],
+        ["dataset", "build", bad, "--out", "o"],
         ["train", "none", "--out", "o"],
         ["evaluate", "none"],
         ["export", "none", "--out", "o.mat"],

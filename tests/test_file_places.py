@@ -57,12 +57,13 @@ def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:
 def test_a_place_where_no_json_can_be_is_found_out_before_the_work(
     tmp_path: Path, name: str, says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # There is no such folder of clouds either, which would be reported next.
+    # The folder holds no clouds either, which would be reported next.
+    empty = str(tmp_path)
     for command in (
         ["doctor"],
-        ["view", "nowhere"],
-        ["evaluate", "nowhere"],
-        ["export", "nowhere", "--out", "x.npz"],
+        ["view", empty],
+        ["evaluate", empty],
+        ["export", empty, "--out", "x.npz"],
     ):
         assert main([*command, "--json", str(tmp_path / name)]) == 2
         err = capsys.readouterr().err

@@ -202,6 +202,9 @@ def _dataset_export(options: argparse.Namespace) -> int:
 
 def _dataset_build(options: argparse.Namespace) -> int:
     check_place(options.json)
+    from rtradar.system.checks import read_toml
+
+    read_toml(options.spec, "data set", "give a TOML file")  # what follows is slow to import
     from rtradar.campaign import build_dataset, in_words
 
     report = build_dataset(
