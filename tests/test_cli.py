@@ -378,7 +378,7 @@ def test_wrong_input_is_refused_before_anything_slow_is_imported(tmp_path: Path)
         *([*walk, option, bad] for option in ("--radar", "--scene")),
         ["run", "synthetic:fly", "--out", "o"],
         ["run", "none.bvh", "--out", "o"],
-        ["run", "none.amc", "--skeleton", "none.asf", "--out", "o"],
+        ["run", "none.amc", "--out", "o"],
         ["compare", "none.bvh", "--out", "o"],
         ["compare", "synthetic:walk", "--fidelities", "analytic,x", "--out", "o"],
         ["view", "none"],

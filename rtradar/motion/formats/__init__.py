@@ -53,12 +53,11 @@ def load_motion(
     # Readers of other packages may take folders, and names of what is no file; none may wait.
     if kind := special_kind(file):
         raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
-    # Before the reader is loaded, which takes longer. The skeleton is read first.
-    needed = Path(skeleton or file)
-    if name in READERS.built_in and not os.path.lexists(needed):
-        kind = needed.suffix.upper().removeprefix(".")
+    # Before the reader is loaded, which takes longer. A skeleton is read before its recording.
+    if name in READERS.built_in and skeleton is None and not os.path.lexists(file):
+        kind = name.upper()
         raise InputError(
-            f"{needed}: cannot read this {kind} file (No such file or directory); check the path"
+            f"{file}: cannot read this {kind} file (No such file or directory); check the path"
         )
     read = READERS[name]
     with READERS.guarded(name):
