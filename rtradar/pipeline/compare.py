@@ -22,6 +22,7 @@ from rtradar.pipeline.writer import files_of_runs
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.fitting import above_floor
 from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
@@ -244,19 +245,24 @@ def _draw(
     # One echo is spread over as many range bins.
     windows = WindowFunctions(range=parameters["range_window"])
     range_bins = noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
-    levels, spectrograms = {}, {}
+    levels, spectrograms, shown = {}, {}, []
     for name, result in results.items():
         with h5py.File(_maps_of(result)) as maps:
-            levels[name] = by_range.level(maps["range_doppler"][frame] / radar.n_channels)
+            power = maps["range_doppler"][frame]
+            levels[name] = by_range.level(power / radar.n_channels)
+            shown.append(above_floor(power))
             spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / range_bins
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
-    comparison.draw_maps(
-        next(paths), levels, by_range.label("mean of channels"), across, up, frame_title
-    )
+    label, seen = by_range.label("mean of channels"), np.any(shown, axis=0)
+    comparison.draw_maps(next(paths), levels, label, across, up, frame_title, seen)
     unit = unit_of(spectrograms.values())
     levels = {name: unit.level(power) for name, power in spectrograms.items()}
     across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
-    comparison.draw_maps(next(paths), levels, unit.label("one channel"), across, up, slow_title)
+    label, seen = (
+        unit.label("one channel"),
+        above_floor(np.sum(list(spectrograms.values()), axis=0)),
+    )
+    comparison.draw_maps(next(paths), levels, label, across, up, slow_title, seen)
     comparison.draw_rdt_clouds(
         next(paths), {name: result.points for name, result in results.items()}, title
     )

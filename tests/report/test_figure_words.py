@@ -126,6 +126,7 @@ EVERY: dict[str, Callable[[], None]] = {
         ("", np.arange(8.0)),
         ("", np.arange(16.0)),
         NAME,
+        POWER > 0,
     ),
     "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
     "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
@@ -172,6 +173,7 @@ def test_comparisons_say_their_unit(drawn: list[Figure]) -> None:
         ("", np.arange(8.0)),
         ("", np.arange(16.0)),
         "run",
+        POWER > 0,
     )
     assert drawn[0].axes[0].get_ylabel() == "Power, all parts [dB re maximum]"
     assert drawn[1].axes[0].get_xlabel() == "Power, mean over time [dB re maximum]"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.report.figures import canvas
 from rtradar.report.figures.canvas import FieldUnit, draw_levels
+from rtradar.report.figures.fitting import fitted_limits
 from rtradar.report.figures.maps import rdt_points
 from rtradar.report.pages.html import (
     Titles,
@@ -100,11 +101,12 @@ def draw_maps(
     across: tuple[str, NDArray[np.float64]],
     up: tuple[str, NDArray[np.float64]],
     title: str,
+    shown: NDArray[np.bool_],
 ) -> None:
     """Draw the same map (up, across) [dB] of each model in the same colours.
 
     ``label`` is that of the colour bar, with its unit; ``across`` and ``up`` are the label and the
-    values (n,) of an axis.
+    values (n,) of an axis, which is fitted to the cells ``shown (up, across)``.
     """
     figure = canvas.new_figure(1.5 + 4.2 * len(maps), 4.6)
     columns = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
@@ -112,7 +114,11 @@ def draw_maps(
     for axes, (name, level) in zip(columns, maps.items(), strict=True):
         image = draw_levels(axes, level, across[1], up[1], limits, interpolation="nearest")
         axes.set(xlabel=across[0], title=name)
-    columns[0].set_ylabel(up[0])
+    columns[0].set(
+        ylabel=up[0],
+        xlim=fitted_limits(shown.sum(axis=0), across[1]),
+        ylim=fitted_limits(shown.sum(axis=1), up[1]),
+    )
     figure.colorbar(image, ax=list(columns), label=label)
     figure.suptitle(title, wrap=True)
     canvas.save_figure(figure, path)
