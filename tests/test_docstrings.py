@@ -186,13 +186,18 @@ def test_a_filler_is_found() -> None:
     find_spec("sphinx_gallery") is None, reason="pages are built by what the extra docs brings"
 )
 def test_the_pages_can_be_built(tmp_path: Path) -> None:
-    """All pages but the gallery's pictures, which `test_gallery` draws; a warning is an error."""
+    """All pages without what the gallery and the notebook draw; a warning is an error.
+
+    `test_gallery` and `test_notebook` run those.
+    """
     words = [
         "-q",
         "--fail-on-warning",
         "--keep-going",
         "-D",
         "sphinx_gallery_conf.filename_pattern=^$",
+        "-D",
+        "nb_execution_mode=off",
     ]
     command = [
         sys.executable,

@@ -127,7 +127,7 @@ def test_commands_import_all_that_they_need(read_only: Command) -> None:
     done = read_only("-m", "rtradar", "view", "nothing")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert line.startswith("rtradar: 'nothing' ")
+    assert line.startswith("rtradar view: argument DIR: there is no 'nothing'")
     assert read_only("-m", "rtradar", "--help").returncode == 0
 
 

@@ -73,13 +73,9 @@ def test_the_cloud_is_drawn_in_two_coordinates_and_says_what_is_missing(
     line, _, figures = made
     view_, *others = figures["cloud_xyz.png"].axes
     assert [axes.get_label() for axes in others] == ["<colorbar>"]
-    said = {
-        "y": "From above; elevation is not measured",
-        "z": "From the side; azimuth is not measured",
-    }[line]
-    assert view_.get_title() == said
+    missing = {"y": "elevation", "z": "azimuth"}[line]
     assert (view_.get_xlabel(), view_.get_ylabel()) == (
-        "x [m], by the distance from the line of the array",
+        f"x [m], from the distance to the array's line\n({missing} is not measured)",
         f"{line} [m]",
     )
     assert np.isfinite(view_.collections[0].get_offsets()).all()
