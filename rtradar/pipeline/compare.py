@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.pipeline.pictures import busiest_frame, removed, thinned
+from rtradar.pipeline.output.pictures import busiest_frame, removed, thinned
+from rtradar.pipeline.output.writer import files_of_runs
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.pipeline.view import load_run_view
-from rtradar.pipeline.writer import files_of_runs
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit

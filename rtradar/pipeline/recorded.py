@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, Unpack
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.memory import IN_A_FOLDER, bytes_of_maps, refuse_large
-from rtradar.pipeline.pictures import draw_found
+from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.pictures import draw_found
+from rtradar.pipeline.output.summary import plain, summary_of_samples
+from rtradar.pipeline.output.writer import RUN_FILES, ReceivedFrame, RunWriter, write_clouds
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.summary import plain, summary_of_samples
 from rtradar.pipeline.timing import forget_peak_memory
-from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, write_clouds
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.settings import ProcessingOptions, RunSettings
@@ -108,17 +108,7 @@ def process_samples(
             with processing.stages.time("pictures"):
                 pictures, _ = draw_found(folder, clouds, radar, settings)
             summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-            write_report(
-                folder / "report.html",
-                radar=radar,
-                summary=summary,
-                pictures=pictures,
-                rdt_points=clouds.rdt.points,
-                spatial=clouds.spatial,
-            )
-            summary["files"] = RUN_FILES.list_of(folder)
-            text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
-            (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+            _write_pages(folder, radar, clouds, pictures, summary)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
@@ -127,6 +117,27 @@ def process_samples(
         out=None if out is None else Path(out),
         _in_memory=maps,
     )
+
+
+def _write_pages(
+    folder: Path,
+    radar: Radar,
+    clouds: Clouds,
+    pictures: Mapping[str, Path],
+    summary: dict[str, Any],
+) -> None:
+    """Write the report, and then the summary, which lists all files."""
+    write_report(
+        folder / "report.html",
+        radar=radar,
+        summary=summary,
+        pictures=pictures,
+        rdt_points=clouds.rdt.points,
+        spatial=clouds.spatial,
+    )
+    summary["files"] = RUN_FILES.list_of(folder)
+    text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
+    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
 
 
 def _stream(

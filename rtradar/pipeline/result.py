@@ -17,8 +17,8 @@ from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.map_store import open_maps
-from rtradar.pipeline.snapshots import snapshots
+from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
 from rtradar.report.pages.inline import InlinePage
 from rtradar.report.pages.run_page import central_limits

@@ -11,18 +11,24 @@ from typing import Any, BinaryIO, Unpack
 from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.map_store import open_maps
 from rtradar.pipeline.memory import refuse_large_maps
-from rtradar.pipeline.pictures import draw_pictures
+from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.pictures import draw_pictures
+from rtradar.pipeline.output.room_findings import room_findings
+from rtradar.pipeline.output.snapshots import snapshots
+from rtradar.pipeline.output.summary import cost, plain, summary_of
+from rtradar.pipeline.output.writer import (
+    RUN_FILES,
+    ReceivedFrame,
+    RunWriter,
+    if_array,
+    write_clouds,
+)
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.room_findings import room_findings
-from rtradar.pipeline.snapshots import snapshots
-from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.view import run_view_of
-from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_array, write_clouds
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots

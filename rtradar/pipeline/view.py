@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.pictures import thinned
+from rtradar.pipeline.output.pictures import thinned
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar

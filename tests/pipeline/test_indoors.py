@@ -11,7 +11,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
-from rtradar.pipeline.writer import ReceivedFrame
+from rtradar.pipeline.output.writer import ReceivedFrame
 from rtradar.scatter import build_model
 from rtradar.scatter.multipath.ghosts import ghosts
 

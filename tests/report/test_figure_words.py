@@ -79,7 +79,7 @@ ROOMS: dict[str, Callable[[rt.Radar], None]] = {
         FILE, {"As received": (POWER, MASK)}, [], {}, radar, "run"
     ),
     "walls": lambda radar: draw_range_azimuth_with_walls(
-        FILE, *MAPS["azimuth"], rt.Scene(), radar, [], {}, "run"
+        FILE, MAPS["azimuth"], rt.Scene(), radar, [], {}, "run"
     ),
 }
 SAID = {
@@ -112,7 +112,7 @@ EVERY: dict[str, Callable[[], None]] = {
         FILE, {"As received": (POWER, MASK)}, [GHOST], {1: NAME}, RADAR, NAME
     ),
     "walls": lambda: draw_range_azimuth_with_walls(
-        FILE, *MAPS["azimuth"], ROOM, RADAR, [GHOST], {1: NAME}, NAME
+        FILE, MAPS["azimuth"], ROOM, RADAR, [GHOST], {1: NAME}, NAME
     ),
     "room_plan": lambda: draw_room_plan(
         FILE, ROOM, RADAR, np.zeros((3, 2)), {1: POINTS}, {1: NAME}, NAME

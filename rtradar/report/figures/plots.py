@@ -340,12 +340,8 @@ class Plots:
         points, velocity = cloud.points[::every], cloud.velocity[::every]
         slow, fast = self._velocity_limits
         fastest = max(abs(slow), abs(fast))
-        colours: dict[str, Any] = {
-            "c": velocity,
-            "cmap": DIVERGING,
-            "vmin": -fastest,
-            "vmax": fastest,
-        }
+        colours: dict[str, Any] = {"c": velocity, "cmap": DIVERGING}
+        colours |= {"vmin": -fastest, "vmax": fastest}
         heading = f"Spatial cloud, {len(self.spatial_cloud.points)} points"
         if len(points) < len(self.spatial_cloud.points):
             part = f"one in {every} of those" if every > 1 else "those"

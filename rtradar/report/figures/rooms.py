@@ -150,8 +150,7 @@ def draw_before_after(
 
 def draw_range_azimuth_with_walls(
     path: Path,
-    power: NDArray[np.floating],
-    azimuth: NDArray[np.float64],
+    found: tuple[NDArray[np.floating], NDArray[np.float64]],
     scene: Scene,
     radar: Radar,
     ghosts: Sequence[GhostMark],
@@ -161,10 +160,11 @@ def draw_range_azimuth_with_walls(
 ) -> None:
     """Draw power over azimuth and range, with upright walls and furniture where they are.
 
-    ``power`` (range, azimuth) is summed over detected cells [m^2], ``azimuth`` are the angles of
-    its columns [rad], over which ``ghosts`` are marked. The ``window_functions`` are those of the
-    transforms that gave the power.
+    What was ``found`` is the power (range, azimuth), summed over detected cells [m^2], and the
+    angles (azimuth,) of its columns [rad], over which ``ghosts`` are marked. The
+    ``window_functions`` are those of the transforms that gave the power.
     """
+    power, azimuth = found
     axes = new_figure(5.6).add_subplot()
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
-from rtradar.pipeline.map_store import open_maps
+from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
@@ -111,9 +111,8 @@ def _draw_room(
             rooms.GhostMark(numbers[_walls(ghost.path)], ghost.range_m, ghost.azimuth_rad)
             for ghost in found
         ]
-        power, azimuth = received("range_azimuth"), maps["azimuth"][:]
         windows = capture.processing.window_functions
-        axes = power, azimuth, scene, radar
+        axes = (received("range_azimuth"), maps["azimuth"][:]), scene, radar
         rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, key, heading, windows)
     track = body.motion.at(np.linspace(0, body.duration_s, _TRACK_POINTS))[0][:, 0, :2]
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.pipeline import snapshots as module
-from rtradar.pipeline.snapshots import snapshots
+from rtradar.pipeline.output import snapshots as module
+from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 

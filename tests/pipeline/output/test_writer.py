@@ -10,8 +10,8 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline import processing
+from rtradar.pipeline.output.writer import RunWriter
 from rtradar.pipeline.processing import Processing
-from rtradar.pipeline.writer import RunWriter
 from rtradar.settings import RunSettings
 
 RADAR = rt.Radar(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.map_store import MapStore
+from rtradar.pipeline.output.map_store import MapStore
 from rtradar.pipeline.processing import (
     RANGE_TIME_S,
     CloudMaker,
