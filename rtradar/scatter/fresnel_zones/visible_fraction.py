@@ -37,7 +37,7 @@ BISECTIONS = 13
 differences of V are 2e-4 with 11 rays, 6e-5 with 13, and would be 5e-6 with exact edges."""
 
 _AT_ONCE = 216
-"""Pairs of a zone and an antenna whose rays are traced together."""
+"""Pairs of a zone and an antenna whose rays are traced together, `SHADOW_RAYS` to each zone."""
 
 _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
@@ -86,7 +86,7 @@ def zone_fractions(
     """
     bounds = bounds_of(shadow_rays)
     out = np.ones((len(zones.part), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
-    step = max(1, _AT_ONCE // zones.antennas.shape[1])
+    step = max(1, _AT_ONCE * SHADOW_RAYS // (shadow_rays * zones.antennas.shape[1]))
     for begin in range(0, len(out), step):
         own = slice(begin, begin + step)
         some = Zones._make(np.ascontiguousarray(field[own]) for field in zones)
