@@ -220,7 +220,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from rtradar.classify.recipes import RECIPES
     from rtradar.classify.study import write_plan
     from rtradar.clouds import Sample
-    from rtradar.clouds.dataset_store import write_index, write_sample
+    from rtradar.clouds.sample_files import write_sample
+    from rtradar.clouds.sample_index import write_index
 
     root = tmp_path_factory.mktemp("folders")
     radar = rt.Radar(

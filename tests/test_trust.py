@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 import rtradar
 from rtradar.campaign.spec import read_spec
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.dataset_store import write_index, write_sample
+from rtradar.clouds.sample_files import write_sample
+from rtradar.clouds.sample_index import write_index
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import load_motion
 from rtradar.radar import Radar

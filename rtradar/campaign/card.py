@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rtradar.clouds.dataset_store import UNKNOWN, Collection
+from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import UNKNOWN, read_shape
 from rtradar.system.checks import printable
 
 _COLUMNS = {
@@ -56,13 +57,13 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
     -------
     str
     """
-    rows = [collection.provenance(index) for index in range(len(collection))]
+    rows = collection.provenance
     labels = Counter(collection.labels.tolist())
     motions = len({str(row.get("recording")) for row in rows})
     subjects = Counter(str(row.get("subject", UNKNOWN)) for row in rows)
     known = len(subjects) - (UNKNOWN in subjects)
     said = f"{len(collection)} samples of {motions} motions of {known} known people"
-    empty = sum(not shape[0] for shape in collection.shapes("points"))
+    empty = sum(not read_shape(path, "points")[0] for path in collection.paths)
     told = [row["limits"] for row in rows if isinstance(row.get("limits"), list)]
     limits = Counter(printable(str(line)) for lines in told for line in lines)
     if empty:

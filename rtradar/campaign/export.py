@@ -18,7 +18,15 @@ import numpy as np
 from tqdm import tqdm
 
 from rtradar.campaign.card import data_card
-from rtradar.clouds.dataset_store import ARRAYS, KINDS, Collection, attributes
+from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import (
+    ARRAYS,
+    KINDS,
+    UNKNOWN,
+    attributes,
+    read_sample,
+    read_shape,
+)
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import check_place, cleanup_on_exit, uninterruptible
@@ -150,18 +158,18 @@ def _write_arrays(group: Any, collection: Collection) -> None:
     names = [KINDS[kind] for kind in collection.kinds]
     axes = sorted({axis for name in names for axis in ARRAYS[name].dims if axis in ARRAYS})
     for name in names:
-        shapes = np.array(collection.shapes(name))
+        shapes = np.array([read_shape(path, name) for path in collection.paths])
         shape = tuple(shapes.max(axis=0).tolist())
         if name in _COUNTS:
             said = f"number of points of {name}, which the others follow as NaN"
             _put(group, _COUNTS[name], shapes[:, 0], ["sample"], long_name=said)
         _stream(group, name, shape, ("sample", *ARRAYS[name].dims), collection)
     for name in axes:
-        first = collection.array(0, name)
-        if all(np.array_equal(collection.array(i, name), first) for i in range(len(collection))):
+        first = read_sample(collection.paths[0], name)
+        if all(np.array_equal(read_sample(path, name), first) for path in collection.paths):
             _put(group, name, first, [name], **attributes(name))
         else:
-            size = max(shape[0] for shape in collection.shapes(name))
+            size = max(read_shape(path, name)[0] for path in collection.paths)
             _stream(group, name, (size,), ("sample", name), collection, f"{name}_of_sample")
     dims = {dim for name in names for dim in ARRAYS[name].dims}
     known = _COORDINATES | (
@@ -194,24 +202,21 @@ def _stream(
     bar: dict[str, Any] = {"desc": name, "unit": "chunk", "disable": None, "leave": False}
     for begin in tqdm(range(0, len(collection), step), **bar):
         block = np.full((min(step, len(collection) - begin), *shape), np.nan, kind)
-        for row, index in enumerate(range(begin, begin + len(block))):
-            values = collection.array(index, name)
-            block[row][tuple(map(slice, values.shape))] = values
+        for row, path in zip(block, collection.paths[begin : begin + step], strict=True):
+            values = read_sample(path, name)
+            row[tuple(map(slice, values.shape))] = values
         array[begin : begin + len(block)] = block
 
 
 def _summary(collection: Collection) -> dict[str, Any]:
     """Return the attributes of the group."""
-    table = collection.to_pandas()
-    radars = {}
-    for provenance in (collection.provenance(index) for index in range(len(collection))):
-        radars[str(provenance.get("radar"))] = provenance.get("radar_parameters")
+    rows = collection.provenance
     return {
         "title": f"Radar point clouds of {len(collection)} motions, simulated by rtradar",
         "classes": list(collection.classes),
         "counts": dict(sorted(Counter(collection.labels.tolist()).items())),
-        "licences": dict(Counter(map(str, table.get("licence", ["unknown"] * len(table))))),
-        "radars": radars,
+        "licences": dict(Counter(str(row.get("licence", UNKNOWN)) for row in rows)),
+        "radars": {str(row.get("radar")): row.get("radar_parameters") for row in rows},
         # Not "coordinates", a name that has a meaning of its own in these files.
         "world_axes": "x from the radar to the person, y left, z up [m]",
     }

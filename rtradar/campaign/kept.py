@@ -9,7 +9,7 @@ from typing import NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds.dataset_store import ARRAYS, KINDS
+from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.motion import Motion
 from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.prepare import prepare

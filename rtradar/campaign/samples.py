@@ -20,7 +20,7 @@ from tqdm import tqdm
 from rtradar import __version__
 from rtradar.campaign.kept import JOINTS, capture_of
 from rtradar.campaign.spec import DRAWN, RUN_KEYS, Actor, Combination, Recorded, Spec, check_samples
-from rtradar.clouds.dataset_store import FORMAT, Sample
+from rtradar.clouds.sample_files import FORMAT, Sample
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
 from rtradar.radar import Radar

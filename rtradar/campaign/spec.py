@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from rtradar.campaign.kept import KEPT, sizes
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
-from rtradar.clouds.dataset_store import UNKNOWN
+from rtradar.clouds.sample_files import UNKNOWN
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions, measured_angles

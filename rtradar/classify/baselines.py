@@ -20,7 +20,7 @@ from tqdm import tqdm
 from rtradar.classify.outcomes import Outcome, outcome_of
 from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.classify.splits import Split
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json
 

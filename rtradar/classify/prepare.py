@@ -22,7 +22,7 @@ import torch
 from torch import Tensor
 
 from rtradar.classify.recipes import Augmentation, Scaling
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import stream
 

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.dataset_store import UNKNOWN, Collection
+from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import UNKNOWN
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 

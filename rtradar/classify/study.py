@@ -28,7 +28,7 @@ from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json, remove_parts
 

@@ -225,7 +225,7 @@ def _train(options: argparse.Namespace) -> int:
     from rtradar.classify.recipes import RECIPES
     from rtradar.classify.study import train_study
     from rtradar.classify.training import pick_device, pick_precision
-    from rtradar.clouds.dataset_store import Collection
+    from rtradar.clouds.collection import Collection
 
     if options.recipe not in RECIPES:
         raise InputError(
@@ -267,7 +267,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     baselines = {}
     if options.baselines:
         from rtradar.classify.baselines import evaluate_baselines
-        from rtradar.clouds.dataset_store import Collection
+        from rtradar.clouds.collection import Collection
 
         baselines = evaluate_baselines(
             Collection(*(options.data or studies[0].plan["data"])), studies[0]

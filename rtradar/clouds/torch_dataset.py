@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from rtradar.clouds.dataset_store import read_sample
+from rtradar.clouds.sample_files import read_sample
 
 
 class SampleDataset(Dataset[tuple[Tensor, int]]):

@@ -23,7 +23,8 @@ from rtradar.campaign.cluster import _place_for_kernels as place_for_kernels
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.dataset_store import sample_path, sweep, write_index
+from rtradar.clouds.sample_files import sample_path
+from rtradar.clouds.sample_index import sweep, write_index
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.output_folder import exclusive_lock
 

@@ -16,7 +16,8 @@ from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.campaign.spec import DRAWN, EACH, INTERVAL_KEYS, RUN_KEYS, read_spec
 from rtradar.cli import main
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.dataset_store import write_index, write_sample
+from rtradar.clouds.sample_files import read_sample, write_sample
+from rtradar.clouds.sample_index import write_index
 from rtradar.errors import InputError
 
 SIZES = (3, 0, 5)
@@ -57,7 +58,7 @@ def test_zarr_and_xarray_read_what_the_collection_holds(tmp_path: Path) -> None:
         for index in range(3):
             one = data.isel(sample=index)
             for name, count in (("points", "n_points"), ("spatial", "n_spatial")):
-                own = collection.array(index, name)
+                own = read_sample(collection.paths[index], name)
                 assert int(one[count]) == len(own)
                 np.testing.assert_array_equal(one[name].values[: len(own)], own)
                 assert np.isnan(one[name].values[len(own) :]).all()
@@ -67,7 +68,7 @@ def test_zarr_and_xarray_read_what_the_collection_holds(tmp_path: Path) -> None:
                 np.testing.assert_array_equal(one[name].values, maps[name].values)
                 assert one[name].dims == maps[name].dims
             assert one["spectrogram"].attrs["units"] == "m2"
-            for name, value in collection.provenance(index).items():
+            for name, value in collection.provenance[index].items():
                 read = one[name].values[()]
                 assert (json.loads(read) if isinstance(value, list) else read) == value
         assert set(data.coords) == {"sample", "coordinate", "axis", "joint", "time"} | {
@@ -128,7 +129,9 @@ def test_samples_of_several_lengths_are_filled_up(tmp_path: Path) -> None:
     export_dataset([tmp_path / "data"], tmp_path / "x.zarr")
     with xr.open_zarr(tmp_path / "x.zarr") as data:
         np.testing.assert_array_equal(data["time_of_sample"][0], [0.0, 0.1, np.nan])
-        np.testing.assert_array_equal(data["joints"][2, :1], collection.array(2, "joints"))
+        np.testing.assert_array_equal(
+            data["joints"][2, :1], read_sample(collection.paths[2], "joints")
+        )
         assert np.isnan(data["joints"][2, 1:]).all()
 
 

@@ -12,7 +12,8 @@ import pytest
 import torch
 
 from rtradar.clouds import Sample
-from rtradar.clouds.dataset_store import write_index, write_sample
+from rtradar.clouds.sample_files import write_sample
+from rtradar.clouds.sample_index import write_index
 
 PAGE = Path(__file__).parents[2] / "docs" / "data-sets.md"
 

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rtradar.clouds.dataset_store import Collection, Sample, write_index, write_sample
+from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import Sample, write_sample
+from rtradar.clouds.sample_index import write_index
 
 LABELS = ("kick", "punch", "walk")
 

@@ -20,7 +20,7 @@ from rtradar.classify.splits import (
     subjects_of,
     values_of,
 )
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 
 

@@ -30,7 +30,7 @@ from sklearn.model_selection import StratifiedKFold, cross_val_score
 from rtradar.campaign.samples import plan_samples
 from rtradar.campaign.spec import Spec, read_spec
 from rtradar.classify.baselines import metadata_features
-from rtradar.clouds.dataset_store import Collection
+from rtradar.clouds.collection import Collection
 
 DATA_SETS = Path(__file__).resolve().parents[1]
 SIZES = (500, 1000, 2000, 3000)

@@ -25,7 +25,8 @@ from pathlib import Path
 
 import psutil
 
-from rtradar.clouds.dataset_store import INDEX, is_whole
+from rtradar.clouds.sample_files import is_whole
+from rtradar.clouds.sample_index import INDEX
 from rtradar.validate.rows import Row, judged, main, reported
 
 RADAR = """

@@ -11,14 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.dataset_store import (
-    INDEX,
-    is_whole,
-    sample_path,
-    sweep,
-    write_index,
-    write_sample,
-)
+from rtradar.clouds.sample_files import is_whole, sample_path, write_sample
+from rtradar.clouds.sample_index import INDEX, sweep, write_index
 from rtradar.errors import InputError
 
 SPATIAL = np.arange(12.0).reshape(4, 3)

@@ -1,0 +1,315 @@
+"""Data sets of labelled clouds, read sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.cards import html_card, text_card
+from rtradar.clouds import display
+from rtradar.clouds.sample_files import (
+    ARRAYS,
+    KINDS,
+    Sample,
+    attributes,
+    damaged,
+    read_digest,
+    read_sample,
+    read_shape,
+    sample_path,
+)
+from rtradar.clouds.sample_index import read_index
+from rtradar.errors import InputError
+from rtradar.system.checks import brief
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from rtradar.clouds.torch_dataset import SampleDataset
+
+
+class Collection:
+    """Labelled clouds of one or several folders, ordered by folder and then by id.
+
+    Labels and provenance are read at once, a cloud from its file when it is asked for.
+
+    Parameters
+    ----------
+    *folders : path
+        At least one folder made by ``rtradar dataset build``.
+
+    Attributes
+    ----------
+    folders : tuple of path
+        Folders of the samples.
+    ids : tuple of str
+        Id of each sample.
+    paths : tuple of path
+        File of each sample.
+
+    Raises
+    ------
+    InputError
+        If no folder is given, samples are missing or damaged, or a sample is in two folders; also
+        where a cloud of a damaged file is read.
+    """
+
+    def __init__(self, *folders: str | Path) -> None:
+        if not folders:
+            raise InputError("no folder of clouds; give at least one of rtradar dataset build")
+        self.folders = tuple(Path(folder) for folder in folders)
+        found = {folder: read_index(folder) for folder in self.folders}
+        self._name = ", ".join(f"'{folder}'" for folder in found)
+        self.paths = tuple(
+            sample_path(folder, identity) for folder, ids in found.items() for identity in ids
+        )
+        self.ids = tuple(path.stem for path in self.paths)
+        for folder, ids in found.items():
+            missing = sum(not sample_path(folder, identity).is_file() for identity in ids)
+            if missing:
+                raise InputError(
+                    f"collection '{folder}': {missing} of {len(ids)} samples are missing; "
+                    "finish it with: rtradar dataset build"
+                )
+        if repeated := len(self.ids) - len(set(self.ids)):
+            raise InputError(
+                f"{repeated} samples are in more than one of {self._name}; leave one out"
+            )
+        self._about = [read_sample(path, "about") for path in self.paths]
+
+    def __repr__(self) -> str:
+        lines = {label.lower(): value for label, value in self._rows.items()}
+        return text_card("Collection", self._name, lines)
+
+    def _repr_html_(self) -> str:
+        return html_card("Collection", self._name, {"": self._rows})
+
+    @property
+    def _rows(self) -> dict[str, str]:
+        return display.rows(self.labels.tolist(), self.provenance)
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def __getitem__(self, index: int) -> Sample:
+        about = self._about[index]
+        return Sample(self.points(index), about["label"], about["provenance"])
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the activities, ascending."""
+        return tuple(sorted({about["label"] for about in self._about}))
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """Activity of each sample, (sample,)."""
+        return np.array([about["label"] for about in self._about], dtype=np.str_)
+
+    @property
+    def provenance(self) -> list[Mapping[str, Any]]:
+        """Provenance of each sample; the clouds are not read."""
+        return [about["provenance"] for about in self._about]
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return one entry of the provenance of each sample, without reading the clouds.
+
+        Parameters
+        ----------
+        name : str
+            Name of the entry, such as ``subject`` or ``snr_db``.
+
+        Returns
+        -------
+        (sample,) ndarray
+            Values of the entry, None for a sample that lacks it.
+
+        Raises
+        ------
+        InputError
+            If no sample has such an entry.
+        """
+        if not any(name in entries for entries in self.provenance):
+            known = sorted({key for entries in self.provenance for key in entries})
+            raise InputError(
+                f"collection {self._name}: no sample has '{name}'; there are: {', '.join(known)}"
+            )
+        values = [entries.get(name) for entries in self.provenance]
+        if all(isinstance(value, int | float | str) for value in values):
+            return np.array(values)
+        # Assigned to an object array, because lists of equal length would become a second axis.
+        column = np.empty(len(values), dtype=object)
+        column[:] = values
+        return column
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of arrays that every sample holds: clouds, and what the data set keeps."""
+        kept = [set(self._kept(index)) for index in range(len(self))]
+        shared = set.intersection(*kept) if kept else set()
+        return ("clouds", "spatial", *(kind for kind in KINDS if kind in shared))
+
+    def _kept(self, index: int) -> list[str]:
+        """Return the kinds of arrays that a sample holds beside its clouds."""
+        kept = self._about[index]["provenance"].get("keep")
+        return [kind for kind in KINDS if kind in kept] if isinstance(kept, list) else []
+
+    def maps(self, index: int) -> xr.Dataset:
+        """Read the maps and joints that the data set keeps of a sample.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        Dataset
+            Those of ``spectrogram``, ``range_doppler``, ``range_azimuth`` and ``joints`` that are
+            kept, with their axes; units are attributes.
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        import xarray as xr
+
+        kept = [KINDS[kind] for kind in self._kept(index)]
+        axes = {axis for name in kept for axis in ARRAYS[name].dims if axis in ARRAYS}
+        found = {
+            name: (ARRAYS[name].dims, read_sample(self.paths[index], name), attributes(name))
+            for name in (*kept, *sorted(axes))
+        }
+        joints = self._about[index]["provenance"].get("joint_names", [])
+        names = {"joint": joints, "axis": list("xyz")}
+        try:
+            return xr.Dataset(found, names if "joints" in kept else {}).set_coords(axes)
+        except (ValueError, TypeError):  # arrays of a stranger's file that do not fit each other
+            raise damaged(self.paths[index]) from None
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return what is known of every sample, without reading the clouds.
+
+        Returns
+        -------
+        DataFrame
+            One row for each sample, under its id: ``activity``, its class number ``label``, all
+            entries of the provenance, such as subject, recording, licence, radar, scene, fidelity,
+            heading_deg, snr_db and seed, the ``folder`` of the sample and the ``digest`` of its
+            file (SHA-256). What a sample lacks is NaN or None.
+
+        Raises
+        ------
+        InputError
+            If the file of a sample is not there any more.
+        """
+        import pandas as pd
+
+        number = {name: index for index, name in enumerate(self.classes)}
+        rows = []
+        for about, path in zip(self._about, self.paths, strict=True):
+            own = {"activity": about["label"], "label": number[about["label"]]}
+            # What is first stays first, and what is last is said.
+            row = own | about["provenance"] | own
+            rows.append(row | {"folder": str(path.parent), "digest": read_digest(path)})
+        return pd.DataFrame(rows, index=pd.Index(self.ids, name="id"))
+
+    def torch(self, kind: str = "clouds", *, points: int = 1000) -> SampleDataset:
+        """Return the samples as a `torch.utils.data.Dataset`, for a `DataLoader`.
+
+        All items have one size, so that they can be batched as they are. They follow from the
+        samples alone: the same item is the same in every epoch, worker and session.
+
+        Parameters
+        ----------
+        kind : str
+            Array of each sample: ``clouds`` gives (point, 3) time [s], range [m] and velocity
+            [m/s], ``spatial`` (point, 3) world coordinates [m]. If the data set keeps them,
+            ``spectrograms`` gives (time, velocity), ``range_doppler`` (time, range, velocity) and
+            ``range_azimuth`` (time, range, azimuth) power [m^2], and ``joints`` (time, joint, 3)
+            world coordinates [m].
+        points : int
+            Number of points of each cloud. Of larger clouds as many are taken, a random sample of
+            an RDT cloud; points of smaller ones are repeated, and an empty one becomes zeros.
+
+        Returns
+        -------
+        torch.utils.data.Dataset
+            Pairs of a float32 tensor and the class number, an index into its ``classes``.
+
+        Raises
+        ------
+        InputError
+            If torch is missing, the kind is unknown or not kept, its arrays have several sizes, or
+            the number of points is not positive.
+        """
+        if kind not in KINDS:
+            raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
+        if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+            raise InputError(f"points = {brief(points)}; it must be a whole number from 1 on")
+        try:
+            from rtradar.clouds.torch_dataset import SampleDataset
+        except ImportError:
+            raise InputError(
+                "Collection.torch needs torch; install the extra 'learn' of rtradar, "
+                "in a checkout: pip install -e '.[learn]'"
+            ) from None
+        if kind not in self.kinds:
+            raise InputError(
+                f"not every sample of collection {self._name} holds {kind}, only "
+                f'{", ".join(self.kinds)}; build it anew with keep = ["{kind}"]'
+            )
+        clouds = kind in ("clouds", "spatial")
+        shapes = {read_shape(path, KINDS[kind]) for path in self.paths if not clouds}
+        if len(shapes) > 1:
+            raise InputError(
+                f"{kind} of collection {self._name} have {len(shapes)} sizes, such as "
+                f"{' and '.join(map(str, sorted(shapes)[:2]))}, which cannot be batched; "
+                "build data sets of one duration_s and one radar"
+            )
+        return SampleDataset(
+            self.paths, self.labels.tolist(), KINDS[kind], points if clouds else None
+        )
+
+    def points(self, index: int) -> NDArray[np.float64]:
+        """Read the RDT cloud of a sample.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (n, 3) float64
+            Time [s], range [m] and velocity [m/s] of each point.
+        """
+        points: NDArray[np.float64] = read_sample(self.paths[index], "points")
+        return points
+
+    def spatial(self, index: int) -> NDArray[np.float64]:
+        """Read the spatial cloud of the same capture.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (m, 3) float64
+            World coordinates x, y and z [m] in the order of time; m may be 0. A coordinate that the
+            radar does not measure is NaN in every point (`SpatialCloud`).
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        points: NDArray[np.float64] = read_sample(self.paths[index], "spatial")
+        return points
