@@ -5,12 +5,9 @@ from __future__ import annotations
 import json
 import os
 import re
-import secrets
-import shutil
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +26,8 @@ from rtradar.clouds.sample_files import (
 )
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, printable
-from rtradar.system.files import check_place, cleanup_on_exit, uninterruptible
+from rtradar.system.files import check_place
+from rtradar.system.output_folder import new_folder
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 _CHUNK_BYTES = 4_000_000  # about what is read at a time
@@ -70,7 +68,7 @@ def export_dataset(folders: Sequence[Path], out: Path) -> int:
         raise InputError(f"'{folders[0]}' holds no sample; build a data set that has some")
     import zarr
 
-    with _new_folder(out) as work, warnings.catch_warnings():
+    with new_folder(out) as work, warnings.catch_warnings():
         # Both are in use everywhere, though no part of the specification of Zarr 3 yet.
         warnings.filterwarnings("ignore", message=".*(specification|Consolidated metadata).*")
         group = zarr.create_group(work)
@@ -82,30 +80,6 @@ def export_dataset(folders: Sequence[Path], out: Path) -> int:
         zarr.consolidate_metadata(work)
         (work / "README.md").write_text(text, encoding="utf-8")
     return len(collection)
-
-
-@contextmanager
-def _new_folder(out: Path) -> Iterator[Path]:
-    """Make a folder beside ``out``, which gets that name at the end, or is removed."""
-    work = out.with_name(f".{out.name}.{secrets.token_hex(6)}.part")
-
-    def remove() -> None:
-        shutil.rmtree(work, ignore_errors=True)
-
-    with cleanup_on_exit(remove):
-        try:
-            work.mkdir()
-            yield work
-            with uninterruptible():
-                if os.path.lexists(out):
-                    raise InputError(f"'{out}' was made meanwhile; give another name (--out)")
-                work.rename(out)
-        except OSError as error:
-            raise InputError(
-                f"cannot write '{out}': {error.strerror}; make room, or give another name (--out)"
-            ) from None
-        finally:
-            remove()
 
 
 def _put(group: Any, name: str, values: Any, dims: Sequence[str], **attrs: Any) -> None:

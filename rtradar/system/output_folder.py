@@ -30,7 +30,9 @@ from rtradar.errors import InputError
 from rtradar.system.directory import Directory
 from rtradar.system.files import DISK_ERRORS, cleanup_on_exit, uninterruptible
 
-_WORK = re.compile(r"\.rtradar-[0-9a-f]{16}")
+_PREFIX, _NEW_PREFIX = ".rtradar-", ".rtradar-new-"  # of work folders, and those of `new_folder`
+_DIGITS = r"[0-9a-f]{16}"
+_WORK = re.compile(re.escape(_PREFIX) + _DIGITS)
 _MARKER = ".made-by-rtradar"
 _UNFINISHED = ".unfinished"
 _MOST_LIST_BYTES = 100_000_000
@@ -116,11 +118,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
         def abandon() -> None:
             if moving:
                 return  # what is moved and what is not belong together
-            gone = f"{work.path.name}-gone"
-            with suppress(OSError):
-                # So that no thread that still writes finds the way into it.
-                place.move(work.path.name, place, gone)
-            place.remove_tree(gone)
+            _discard(place, work)
             for folder in made if place.is_in_place() else ():
                 with suppress(OSError):
                     folder.rmdir()  # an empty one only
@@ -136,7 +134,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         _move(work, place, kind)
                     place.remove_tree(work.path.name)
                     # Files that a killed command had still to move are replaced now.
-                    _remove_leftovers(place, but=None)
+                    _remove_leftovers(place)
             except BaseException as error:
                 if moving:
                     raise _while_moving(out, work.path, error) from None
@@ -152,6 +150,33 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         f"cannot write to '{out}': {why}; make room, or give another folder (--out)"
                     ) from None
                 raise
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """Make a folder that takes the name ``out`` at the end, if nothing has it, or is removed.
+
+    It yields a folder beside ``out`` to write into. InputError is raised if the name is taken, or
+    the disk takes no more. What killed commands of this kind left there is removed first.
+    """
+    with ExitStack() as stack:
+        try:
+            place = stack.enter_context(Directory.at(out.parent))
+            _remove_leftovers(place, prefix=_NEW_PREFIX)
+            work = stack.enter_context(_new_work_folder(place, _NEW_PREFIX))
+            stack.callback(_discard, place, work)
+            stack.enter_context(cleanup_on_exit(lambda: _discard(place, work)))
+            made = work.path / "made"
+            made.mkdir()
+            yield made
+            with uninterruptible():
+                if place.mode(out.name):
+                    raise InputError(f"'{out}' was made meanwhile; give another name (--out)")
+                work.move(made.name, place, out.name)
+        except OSError as error:
+            raise InputError(
+                f"cannot write '{out}': {error.strerror}; make room, or give another name (--out)"
+            ) from None
 
 
 @contextmanager
@@ -334,10 +359,10 @@ def _while_moving(out: Path, work: Path, error: BaseException) -> BaseException:
     )
 
 
-def _new_work_folder(place: Directory) -> Directory:
+def _new_work_folder(place: Directory, prefix: str = _PREFIX) -> Directory:
     """Make a work folder, locked as long as its command lives, with a marker of its owner."""
     while True:
-        name = f".rtradar-{secrets.token_hex(8)}"
+        name = f"{prefix}{secrets.token_hex(8)}"
         with suppress(FileExistsError):
             place.make(name)
             work = place.open(name)
@@ -347,7 +372,15 @@ def _new_work_folder(place: Directory) -> Directory:
             return work
 
 
-def _remove_leftovers(place: Directory, but: str | None) -> None:
+def _discard(place: Directory, work: Directory) -> None:
+    gone = f"{work.path.name}-gone"
+    with suppress(OSError):
+        # So that no thread that still writes finds the way into it.
+        place.move(work.path.name, place, gone)
+    place.remove_tree(gone)
+
+
+def _remove_leftovers(place: Directory, but: str | None = None, *, prefix: str = _PREFIX) -> None:
     """Remove work folders of killed commands: those whose marker holds their own inode number.
 
     A folder that came from elsewhere, or that the user made, has no such marker, and stays.
@@ -355,7 +388,7 @@ def _remove_leftovers(place: Directory, but: str | None) -> None:
     if sys.platform == "win32":  # no locks, and no numbers that tell
         return
     for name in place.names():
-        if not _WORK.fullmatch(name) or name == but:
+        if not re.fullmatch(re.escape(prefix) + _DIGITS, name) or name == but:
             continue
         with suppress(OSError), place.open(name) as folder:
             if not folder.is_own():

@@ -18,7 +18,7 @@ import pytest
 
 from rtradar.errors import InputError
 from rtradar.system.directory import Directory
-from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole
+from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole, new_folder
 
 KIND = OutputFiles(
     "list.json",
@@ -567,3 +567,46 @@ def test_a_folder_in_use_is_let_be(tmp_path: Path) -> None:
         make(tmp_path, "second")
         assert (folder / "maps").read_text() == "first"
     assert unlisted(tmp_path) == made("first")
+
+
+def test_a_new_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    def fail(folder: Path) -> None:
+        (folder / "half").write_text("half")
+        raise ZeroDivisionError
+
+    out = tmp_path / "out"
+    with pytest.raises(ZeroDivisionError), new_folder(out) as folder:
+        fail(folder)
+    assert not list(tmp_path.iterdir())
+    with new_folder(out) as folder:
+        (folder / "maps").write_text("first")
+        assert not out.exists()
+    assert contents(tmp_path) == {"out/maps": "first"}
+    with (
+        pytest.raises(InputError, match="was made meanwhile"),
+        new_folder(out) as folder,
+    ):
+        (folder / "maps").write_text("second")
+    assert contents(tmp_path) == {"out/maps": "first"}
+
+
+@POSIX
+def test_what_a_killed_maker_of_a_new_folder_left_goes_and_a_living_one_s_stays(
+    tmp_path: Path,
+) -> None:
+    code = """
+import os, sys
+from pathlib import Path
+from rtradar.system.output_folder import new_folder
+with new_folder(Path(sys.argv[1])) as folder:
+    (folder / "half").write_text("half")
+    os.kill(os.getpid(), 9)
+"""
+    killed = subprocess.run([sys.executable, "-c", code, tmp_path / "killed"], check=False)
+    assert killed.returncode == -9
+    (left,) = tmp_path.iterdir()
+    with new_folder(tmp_path / "one") as one:
+        assert not left.exists()
+        with new_folder(tmp_path / "two"):
+            assert one.exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["one", "two"]
