@@ -15,7 +15,8 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
-from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS, RUN_LIMITS, Intervals
+from rtradar.campaign.spec import DRAWN, RUN_KEYS, Intervals
+from rtradar.campaign.spec_file import EACH, RUN_LIMITS
 from rtradar.radar import Radar
 from rtradar.scene import (
     MATERIALS,

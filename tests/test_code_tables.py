@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import rtradar as rt
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
 
 pytest.importorskip("docutils", reason="pages are built by what the extra docs brings")

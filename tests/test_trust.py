@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rtradar
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.sample_files import write_sample
 from rtradar.clouds.sample_index import write_index

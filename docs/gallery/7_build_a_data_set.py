@@ -3,7 +3,7 @@ Build a data set
 ================
 
 A TOML file says what a data set shall hold; ``rtradar dataset build`` makes what is missing of it,
-on all cores, and may be stopped at any time. ``rtradar/campaign/spec.py`` lists all keys.
+on all cores, and may be stopped at any time. The page on data sets lists all keys.
 """
 
 import os

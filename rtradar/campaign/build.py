@@ -18,7 +18,7 @@ from tqdm import tqdm
 from rtradar import __version__
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.sample_files import check_size, is_whole, sample_path, write_sample
 from rtradar.clouds.sample_index import sweep, write_index
 from rtradar.errors import CampaignError, InputError

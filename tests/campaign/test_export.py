@@ -13,7 +13,8 @@ import zarr
 
 from rtradar.campaign import build_dataset, export_dataset, write_template
 from rtradar.campaign.samples import Made, SamplePlan
-from rtradar.campaign.spec import DRAWN, EACH, INTERVAL_KEYS, RUN_KEYS, read_spec
+from rtradar.campaign.spec import DRAWN, INTERVAL_KEYS, RUN_KEYS
+from rtradar.campaign.spec_file import EACH, read_spec
 from rtradar.cli import main
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.sample_files import read_sample, write_sample

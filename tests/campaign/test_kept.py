@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader
 import rtradar as rt
 from rtradar.campaign import build_dataset
 from rtradar.campaign.samples import make_sample, plan_samples
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.sample_files import check_size
 from rtradar.errors import InputError
 from rtradar.motion.skeleton import NODES

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rtradar.campaign.samples import counts, plan_samples
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.validate import validation_folder
 
 FOUR = ("jumping_jack", "kick", "punch", "walk")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rtradar.campaign.samples import SamplePlan, counts, plan_samples
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
 from rtradar.settings import RunSettings
 

@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.campaign.patterns import matching_files
-from rtradar.campaign.spec import Intervals, _spec, read_spec
+from rtradar.campaign.spec import Intervals
+from rtradar.campaign.spec_file import _spec, read_spec
 from rtradar.errors import InputError, InputErrors
 
 SMALL = """
@@ -49,8 +50,8 @@ def test_what_is_left_out_has_a_value(tmp_path: Path) -> None:
         "specular",
     )
     assert spec.drawn["snr_db"] == (20.0, 20.0)
-    assert spec.actors[0].seeds == (0, 1, 2)
-    assert spec.actors[0].subjects == tuple(range(10))
+    assert tuple(spec.actors[0].seeds) == (0, 1, 2)
+    assert tuple(spec.actors[0].subjects) == tuple(range(10))
 
 
 LISTS = {
@@ -171,7 +172,10 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         ("body_material = 'wood'" + SMALL, "body_material = 'wood'; allowed: perfect-conductor"),
         ("range_window = 'square'" + SMALL, "range window 'square' is unknown; allowed: "),
         ("doppler_window = [1, 2]" + SMALL, "doppler_window = [1, 2]; it must be a name"),
-        ("order = 4" + SMALL, "order = 4; it must be a whole number from 0 to 3"),
+        (
+            "order = 4" + SMALL,
+            "order = 4 of reflections at walls; it must be a whole number from 0 to 3",
+        ),
         ("keep_all = 1" + SMALL, "keep_all = 1; allowed: true, false"),
         ("windows = 3", "windows = 3; it must be a table"),
         (SMALL + "colour = 1", "[[synthetic]] number 1 unknown key 'colour'"),

@@ -28,7 +28,8 @@ from sklearn.ensemble import RandomForestClassifier
 from sklearn.model_selection import StratifiedKFold, cross_val_score
 
 from rtradar.campaign.samples import plan_samples
-from rtradar.campaign.spec import Spec, read_spec
+from rtradar.campaign.spec import Spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.classify.baselines import metadata_features
 from rtradar.clouds.collection import Collection
 

@@ -18,7 +18,7 @@ import trimesh
 from fuzz_kit import Target, npy, written
 
 from rtradar.body import Body
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.classify.outcomes import load_outcome
 from rtradar.classify.recipes import LEAN
 from rtradar.classify.study import load_network, load_study

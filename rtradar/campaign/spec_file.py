@@ -1,0 +1,394 @@
+"""Reader of the specification of a data set from TOML; errors are lines that name the key.
+
+The page on data sets, ``docs/data-sets.md``, lists the keys and has an example.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rtradar.campaign.kept import KEPT
+from rtradar.campaign.patterns import FIELD, file_in, matching_files
+from rtradar.campaign.spec import (
+    DRAWN,
+    INTERVAL_KEYS,
+    NAMED,
+    RUN_KEYS,
+    SWITCHES,
+    WINDOWS,
+    Actor,
+    Combination,
+    Intervals,
+    Recorded,
+    Spec,
+    check_equal_sizes,
+    check_samples,
+)
+from rtradar.clouds.sample_files import UNKNOWN
+from rtradar.errors import InputError, InputErrors
+from rtradar.motion import ACTIVITIES
+from rtradar.process import WindowFunctions
+from rtradar.radar import Radar
+from rtradar.scatter import MODELS
+from rtradar.scene import Scene
+from rtradar.settings import RunSettings
+from rtradar.system.checks import (
+    Complaints,
+    Table,
+    brief,
+    check_number,
+    check_order,
+    check_text,
+    check_vector,
+    inside,
+    read_toml,
+    table_at,
+    tables_at,
+    wrong_keys,
+)
+from rtradar.system.seeds import check_seed
+
+RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
+"""Limits of settings of a run, narrower than those of the settings themselves."""
+
+EACH: Mapping[str, list[Any]] = {
+    "radar": ["paper-12ghz"],
+    "scene": ["free-space"],
+    "fidelity": ["specular"],
+    "heading_deg": [None],
+    "snr_db": [None],
+    "person_position_m": [None],
+    "radar_position_m": [None],
+}
+"""Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
+
+_TOP = ("seed", *RUN_KEYS, "keep", "folder", "windows", "each", "drawn", "synthetic", "recordings")
+_SYNTHETIC = ("label",), ("count", "seeds", "subjects")
+_RECORDING = ("file",), ("label", "subject", "licence", "skeleton", *INTERVAL_KEYS)
+_MOST = 1_000_000
+_VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
+
+
+def read_spec(path: Path) -> Spec:
+    """Read the specification of a data set from a TOML file.
+
+    InputError, in one line with the file and the key, if the file cannot be read, a key is unknown,
+    a value is invalid, or a file that it names is missing; InputErrors, a line for each, if several
+    things are wrong.
+    """
+    table = read_toml(path, "data set", "give a TOML file")
+    try:
+        # The path is absolute, because other processes read the meshes of scenes.
+        return _spec(table, path.resolve().parent)
+    except InputErrors as errors:
+        raise InputErrors([f"data set file '{path}': {line}" for line in errors.lines]) from None
+    except InputError as error:
+        raise InputError(f"data set file '{path}': {error}") from None
+
+
+def _spec(table: Table, folder: Path) -> Spec:
+    wrong = Complaints()
+    wrong.lines += wrong_keys("", table, (), _TOP)
+    drawn_table, each, windows = (
+        wrong.of(table_at, key, table) or {} for key in ("drawn", "each", "windows")
+    )
+    wrong.lines += wrong_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
+    wrong.lines += wrong_keys("[each] ", each, (), tuple(EACH))
+    wrong.lines += wrong_keys("[windows] ", windows, (), INTERVAL_KEYS)
+    wrong.lines += [
+        f"{key} is under [each] and under [drawn]; give it once"
+        for key in drawn_table
+        if key in each
+    ]
+    intervals = wrong.of(Intervals.read, "[windows]", windows)
+    actors = _actors(table, wrong)
+    recordings = _recordings(table, windows if intervals else {}, folder, wrong)
+    if not table.get("synthetic") and not table.get("recordings"):
+        wrong.lines.append("there is neither [[synthetic]] nor [[recordings]]; give one of them")
+    if table.get("synthetic") and intervals and intervals.needed_s is None:
+        wrong.lines.append(
+            "[windows] duration_s is missing; synthetic actors have no end of their own"
+        )
+    lists = _lists(each, folder, wrong)
+    drawn = {
+        key: wrong.of(_range, key, drawn_table.get(key, usual), least, most) or (0.0, 0.0)
+        for key, (usual, least, most) in DRAWN.items()
+    }
+    keep = wrong.of(_keep, table) or ()
+    run = wrong.of(_run_settings, table)
+    wrong.check()
+    assert intervals is not None  # for else there are complaints
+    assert run is not None
+    takes = sum(len(actor.seeds) for actor in actors)
+    count = takes * intervals.count(intervals.needed_s)
+    count += sum(recorded.intervals.count() for recorded in recordings)
+    check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
+    combinations = _combinations(lists)
+    if keep:
+        lengths = {recorded.intervals.duration_s for recorded in recordings}
+        lengths |= {intervals.duration_s} if actors else set()
+        check_equal_sizes(keep, lengths, combinations)
+    return Spec(run, intervals, combinations, drawn, actors, recordings, keep)
+
+
+def _keep(table: Table) -> tuple[str, ...]:
+    """Return the kinds of arrays to keep, in the order of `KEPT`."""
+    kinds = table.get("keep", [])
+    known = isinstance(kinds, list) and all(
+        isinstance(kind, str) and kind in KEPT for kind in kinds
+    )
+    if not known:
+        raise InputError(f"keep = {brief(kinds)}; it must be a list of: {', '.join(KEPT)}")
+    return tuple(kind for kind in KEPT if kind in kinds)
+
+
+def _run_settings(table: Table) -> RunSettings:
+    wrong, given = Complaints(), {key: table[key] for key in RUN_KEYS if key in table}
+    for key, allowed in NAMED.items():
+        value = given.get(key)
+        if key in given and not (isinstance(value, str) and value in allowed):
+            wrong.lines.append(f"{key} = {brief(value)}; allowed: {', '.join(allowed)}")
+    for key in SWITCHES:
+        if not isinstance(given.get(key, True), bool):
+            wrong.lines.append(f"{key} = {brief(given[key])}; allowed: true, false")
+    for key in WINDOWS:
+        value = given.get(key, "")
+        if not isinstance(value[0] if isinstance(value, list) and value else value, str):
+            wrong.lines.append(
+                f"{key} = {brief(value)}; it must be a name, or a list of a name and a number"
+            )
+            del given[key]
+    if "pfa" in given:
+        given["pfa"] = wrong.of(check_number, "data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
+    if "order" in given:
+        wrong.of(check_order, given["order"])
+    seed = wrong.of(check_seed, "", table.get("seed", 0))
+    named = {
+        axis: given[f"{axis}_window"] for axis in ("range", "doppler") if f"{axis}_window" in given
+    }
+    windows = wrong.of(lambda: WindowFunctions(**named))
+    wrong.check()
+    assert windows is not None  # for else there are complaints
+    assert seed is not None
+    run = RunSettings(seed=seed, **given)
+    return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
+
+
+def _folder(table: Table, beside: Path) -> Path:
+    """Folder of the recordings, below the file's own or below that of an environment variable."""
+    named = check_text("data set", "folder", table.get("folder", "."))
+    allowed, below = beside, named
+    if variable := _VARIABLE.match(named):
+        if not os.environ.get(variable[1]):
+            raise InputError(
+                f"folder = {brief(named)}: the environment has no such variable; "
+                "set it to the folder of recordings"
+            )
+        allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
+    there = inside(allowed, below)
+    if there is None:
+        raise InputError(
+            f"folder = {brief(named)} leaves the folder of the file; "
+            "put recordings below it, or name a variable of the "
+            'environment that holds their folder: "${RECORDINGS}"'
+        )
+    if not there.is_dir():
+        raise InputError(f"folder = {brief(named)}: there is no such folder")
+    return there
+
+
+def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]:
+    """Return the values under ``[each]``, checked; radars and scenes are loaded."""
+
+    def number(key: str) -> Callable[[object], float]:
+        return lambda value: check_number("[each]", key, value, *DRAWN[key][1:])
+
+    def place(key: str, size: int) -> Callable[[object], tuple[float, ...]]:
+        return lambda value: check_vector("[each]", key, value, size, 100.0)
+
+    readers: dict[str, Callable[[Any], Any]] = {
+        "radar": lambda value: _loaded("radar", value, folder, Radar.load),
+        "scene": lambda value: _loaded("scene", value, folder, Scene.load),
+        "fidelity": _fidelity,
+        "heading_deg": number("heading_deg"),
+        "snr_db": number("snr_db"),
+        "person_position_m": place("person_position_m", 2),
+        "radar_position_m": place("radar_position_m", 3),
+    }
+    lists = {key: wrong.of(_several, each, key, usual) or [] for key, usual in EACH.items()}
+    # A default of None stays: it is no value of the file.
+    return {
+        key: [
+            None if key not in each and value is None else wrong.of(readers[key], value)
+            for value in values
+        ]
+        for key, values in lists.items()
+    }
+
+
+def _fidelity(value: object) -> str:
+    model = check_text("[each]", "fidelity", value)
+    if model not in MODELS:
+        raise InputError(
+            f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"
+        )
+    return model
+
+
+def _combinations(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
+    places = [
+        [{} if value is None else {key: value} for value in lists[key]]
+        for key in ("person_position_m", "radar_position_m")
+    ]
+    placed = [
+        dataclasses.replace(scene, **person, **radar)
+        for scene, person, radar in itertools.product(lists["scene"], *places)
+    ]
+    values = itertools.product(
+        lists["radar"], placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
+    )
+    return tuple(itertools.starmap(Combination, values))
+
+
+def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
+    values = each.get(key, usual)
+    if not isinstance(values, list) or not values:
+        raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
+    different = {
+        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
+        for value in values
+    }
+    if len(different) < len(values):
+        raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
+    return values
+
+
+def _comparable(value: object) -> object:
+    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
+    return value if isinstance(value, int | float | str | None) else repr(value)
+
+
+def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
+    source = check_text("[each]", key, value)
+    if source.endswith(".toml") and inside(folder, source) is None:
+        raise InputError(
+            f"[each] {key} = {brief(source)} leaves the folder of the file; "
+            "put it beside it or below"
+        )
+    try:
+        return load(folder / source if source.endswith(".toml") else source)
+    except InputError as error:
+        raise InputError(f"[each] {key}: {error}") from None
+
+
+def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
+    found: dict[str, Actor] = {}
+    for where, one in wrong.of(tables_at, "synthetic", table) or ():
+        wrong.lines += wrong_keys(where, one, *_SYNTHETIC)
+        actor = wrong.of(_actor, where, one) if "label" in one else None
+        if actor and actor.label in found:
+            wrong.lines.append(
+                f"[[synthetic]] label = '{actor.label}' is given twice; give its takes together"
+            )
+        elif actor:
+            found[actor.label] = actor
+    return tuple(found.values())
+
+
+def _actor(where: str, table: Table) -> Actor:
+    wrong = Complaints()
+    label = wrong.of(check_text, where.strip(), "label", table["label"])
+    if label is not None and label not in ACTIVITIES:
+        wrong.lines.append(
+            f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+        )
+    seeds = None
+    if ("count" in table) == ("seeds" in table):
+        wrong.lines.append(f"{where}: give count or seeds, one of them")
+    else:
+        seeds = wrong.of(_numbers, where, "seeds" if "seeds" in table else "count", table)
+    subjects = wrong.of(_numbers, where, "subjects", {"subjects": 10, **table})
+    wrong.check()
+    return Actor(label or "", seeds or (), subjects or ())
+
+
+def _numbers(where: str, key: str, table: Table) -> Sequence[int]:
+    """Return a list of whole numbers as it is, or for a count all numbers below it."""
+    value = table[key]
+    if isinstance(value, list) and value and len(set(map(str, value))) == len(value):
+        return tuple(_whole(where, key, number) for number in value)
+    if isinstance(value, list):
+        raise InputError(
+            f"{where}{key} = {brief(value)}; "
+            "it must be a list of different whole numbers, not empty"
+        )
+    count = _whole(where, key, value)
+    if count == 0:
+        raise InputError(f"{where}{key} = 0; it must be at least 1")
+    return range(count)
+
+
+def _recordings(
+    table: Table, windows: Table, folder: Path, wrong: Complaints
+) -> tuple[Recorded, ...]:
+    beside = wrong.of(_folder, table, folder)
+    found: list[Recorded] = []
+    for where, one in wrong.of(tables_at, "recordings", table) or ():
+        wrong.lines += wrong_keys(where, one, *_RECORDING)
+        if beside is not None and "file" in one:
+            found += wrong.of(_recorded, where, one, windows, beside) or ()
+    return tuple(found)
+
+
+def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Recorded]:
+    """Return the recordings of one table: those of its pattern, or the one that it names."""
+    wrong, place = Complaints(), where.strip()
+    texts = {
+        key: wrong.of(check_text, place, key, table[key]) or ""
+        for key in ("file", "label", "subject", "licence", "skeleton")
+        if key in table
+    }
+    own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
+    intervals = wrong.of(Intervals.read, place, {**windows, **own})
+    if "label" not in texts and "{label}" not in texts["file"]:
+        wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
+    matches = wrong.of(matching_files, where, texts["file"], folder) if texts["file"] else None
+    wrong.check()
+    assert intervals is not None  # for else there are complaints
+    found = []
+    for name, fields in matches or ():
+        values = {"subject": UNKNOWN, "licence": UNKNOWN, **texts, **fields}
+        skeleton = None
+        if "skeleton" in texts:
+            named = FIELD.sub(lambda field: values[field[1]], texts["skeleton"])  # noqa: B023
+            skeleton = wrong.of(file_in, where, "skeleton", named, folder)
+        about = {key: values[key] for key in ("label", "subject", "licence")}
+        for key in fields:
+            wrong.of(check_text, place, key, fields[key])
+        found.append(Recorded(name, folder / name, skeleton, intervals=intervals, **about))
+    wrong.check()
+    return found
+
+
+def _range(key: str, value: object, least: float, most: float) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise InputError(f"[drawn] {key} = {brief(value)}; it must be a range: [least, most]")
+    low, high = (check_number("[drawn]", key, end, least, most) for end in value)
+    if low > high:
+        raise InputError(f"[drawn] {key} = {brief(value)}; the least must come first")
+    return low, high
+
+
+def _whole(where: str, key: str, value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _MOST:
+        raise InputError(
+            f"{where}{key} = {brief(value)}; it must be a whole number from 0 to {_MOST}"
+        )
+    return value
