@@ -15,13 +15,12 @@ from rtradar.motion.motion import Motion
 from rtradar.system.figure_style import (
     LIGHT,
     STYLE,
-    WIDTH_IN,
     dress,
     figure_for,
-    fit,
     new_figure,
     png_of,
     theme_of,
+    write_heading,
 )
 
 _POSES, _PATH_POSES = 6, 400
@@ -49,9 +48,7 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     _draw(above, motion, (across, 1 - across), "From above")
     theme = theme_of(side)
     style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
-    size = STYLE["axes.titlesize"]
-    name = fit(f"Motion {motion.name}", 0.95 * 72 * WIDTH_IN, size)
-    figure.suptitle(name, fontsize=size, color=theme.text, parse_math=False)
+    write_heading(figure, f"Motion {motion.name}")
     figure.legend(
         handles=handles, loc="outside lower center", ncols=_POSES, labelcolor=theme.text, **style
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -171,19 +170,15 @@ class Result:
         return text_card("Result", self._title, self._rows() | self._made())
 
     def _repr_html_(self) -> str:
-        from rtradar.report.figures.canvas import save_figure
         from rtradar.report.figures.plots import Plots
-        from rtradar.system.figure_style import new_figure
+        from rtradar.system.figure_style import new_figure, png_of
 
-        picture = BytesIO()
+        picture = None
         with suppress(InputError):  # the folder may be gone
             found = self.maps, self.points, self.spatial, self.radar, self.summary
             axes = Plots(*found, new_figure=new_figure).range_doppler()
-            figure = axes.get_figure(root=True)
-            assert figure is not None
-            save_figure(figure, picture)
+            picture = png_of(axes.get_figure(root=True))
         note = "result.plot draws, result.view() moves, result.maps has the maps."
         rows = self._rows() | self._made()
         tables = {"": {label[0].upper() + label[1:]: value for label, value in rows.items()}}
-        shown = picture.getvalue() or None
-        return html_card("Result", self._title, tables, picture=shown, note=note)
+        return html_card("Result", self._title, tables, picture=picture, note=note)

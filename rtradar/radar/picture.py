@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from rtradar.radar.display import limit_rows, measured_angles
 from rtradar.radar.radar import Radar
-from rtradar.system.figure_style import STYLE, WIDTH_IN, dress, figure_for, fit, theme_of
+from rtradar.system.figure_style import STYLE, dress, figure_for, theme_of, write_heading
 
 
 def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
@@ -20,9 +20,7 @@ def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
         return ax
     figure = figure_for(4.3)
     array, limits = figure.subplots(1, 2)
-    size = STYLE["axes.titlesize"]
-    name = fit(f"Radar {radar.name}", 0.95 * 72 * WIDTH_IN, size)
-    figure.suptitle(name, fontsize=size, color=theme_of(array).text, parse_math=False)
+    write_heading(figure, f"Radar {radar.name}")
     _draw_array(radar, array, "Array, seen from behind")
     _draw_limits(radar, limits)
     return array

@@ -4,22 +4,23 @@ Nothing here changes Matplotlib's global settings, for pictures of a run may be 
 threads, and the user's own figures keep their style. A picture is drawn on axes of `axes_for`, in
 the colours of `theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
 
-All pictures are `WIDTH_IN` wide. Shown 420 pixels wide, a letter of the smallest font is 8 pixels
-high.
+Pictures are `WIDTH_IN` wide, but for the still of a view and tables of many columns. Shown 420
+pixels wide, a letter of the smallest font is 8 pixels high.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WIDTH_IN = 6.0
-"""Width of every picture [inch]."""
+"""Width of pictures [inch]."""
 
 STYLE: Mapping[str, Any] = {
     "figure.dpi": 150,
@@ -114,8 +115,29 @@ def new_figure(height_in: float, theme: str = "light", width_in: float = WIDTH_I
     return Figure(figsize=size, dpi=STYLE["figure.dpi"], facecolor=colour, layout="constrained")
 
 
-def png_of(figure: Figure) -> bytes:
-    """Return the PNG file of a figure of `new_figure`.
+def save_figure(figure: Any, file: Path | BinaryIO) -> None:
+    """Save a figure in the format of the path's suffix, or as PNG to an open file, and clear it.
+
+    Figure and axes refer to each other. Without clearing, the memory of one picture could
+    still be in use with the next, until Python's garbage collector runs.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure of `new_figure`, in which no text is read as a formula.
+    file : Path or binary file
+        Path, or file open for writing.
+    """
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):  # names of files, radars and walls may have dollar signs
+        text.set_parse_math(False)
+    figure.savefig(file, format=None if isinstance(file, Path) else "png")
+    figure.clear()
+
+
+def png_of(figure: Any) -> bytes:
+    """Return the PNG file of a figure of `new_figure`, and clear the figure.
 
     Parameters
     ----------
@@ -130,7 +152,7 @@ def png_of(figure: Figure) -> bytes:
     from io import BytesIO
 
     file = BytesIO()
-    figure.savefig(file, format="png")
+    save_figure(figure, file)
     return file.getvalue()
 
 
@@ -170,6 +192,21 @@ def axes_for(ax: Axes | None, height_in: float = 4.0, **options: Any) -> Axes:
         Axes that `dress` is applied to once they are drawn on.
     """
     return figure_for(height_in).add_subplot(**options) if ax is None else ax
+
+
+def write_heading(figure: Any, title: str) -> None:
+    """Write the title of a figure of several axes, in lines that fit.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure that has its axes.
+    title : str
+        Title, of which no part is read as a formula.
+    """
+    size, colour = STYLE["axes.titlesize"], theme_of(figure.axes[0]).text
+    lines = fit(title, 0.95 * 72 * figure.get_size_inches()[0], size)
+    figure.suptitle(lines, fontsize=size, color=colour, parse_math=False)
 
 
 def theme_of(axes: Axes) -> Theme:

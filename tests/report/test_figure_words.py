@@ -28,7 +28,7 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.report.figures import rooms
-from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
+from rtradar.report.figures.canvas import FieldUnit
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.rooms import (
     GhostMark,
@@ -45,6 +45,7 @@ from rtradar.report.pages.comparison import (
 )
 from rtradar.scene import Wall, material
 from rtradar.signal import synthesize
+from rtradar.system.figure_style import new_figure, save_figure
 
 pytestmark = pytest.mark.drawn
 
@@ -352,7 +353,7 @@ def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path
     gc.disable()
     before = renderers()
     try:
-        figure = new_figure(4, 3)
+        figure = new_figure(3.0)
         figure.add_subplot().imshow(POWER)
         save_figure(figure, tmp_path / "out.png")
         assert renderers() == before

@@ -121,6 +121,8 @@ def test_high_clouds_stand_beside_each_other_under_one_title(
     seen = texts(figure)
     upper, lower = figure.axes[0].get_window_extent(), figure.axes[1].get_window_extent()
     assert upper.x1 < lower.x0
+    bar = figure.axes[2].get_window_extent()
+    assert bar.height == pytest.approx(upper.height, rel=0.05)
     title = next(text for text in seen if "Spatial cloud" in text.get_text())
     box = title.get_window_extent()
     assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes)

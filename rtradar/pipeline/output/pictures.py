@@ -17,12 +17,11 @@ from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
-from rtradar.report.figures.canvas import save_figure
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.plots import thinned as average
 from rtradar.scatter.multipath.ghosts import Ghost, ghosts
 from rtradar.settings import RunSettings
-from rtradar.system.figure_style import new_figure
+from rtradar.system.figure_style import new_figure, save_figure
 
 _TRACK_POINTS = 400
 

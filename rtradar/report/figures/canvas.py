@@ -23,14 +23,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar import Radar
@@ -89,28 +86,6 @@ def field_unit(
     # The first bin begins at the antennas.
     distance = np.maximum(np.asarray(range_m, dtype=np.float64), radar.range_bin_m / 2)
     return FieldUnit("dBsm", distance**4)
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure of this size [inch] without a window."""
-    return Figure(figsize=(width, height), dpi=130, layout="constrained")
-
-
-def save_figure(figure: Any, file: Path | BinaryIO) -> None:
-    """Save in the format of the path's suffix, or as PNG to an open file, and clear the figure.
-
-    Figure and axes refer to each other. Without clearing, the memory of one picture could
-    still be in use with the next, until Python's garbage collector runs.
-    """
-    for axes in figure.axes:
-        axes.title.set_wrap(True)
-    for text in figure.findobj(Text):  # names of files, radars and walls may have dollar signs
-        if text.get_wrap():  # Matplotlib measures such a text as a formula whether or not it is one
-            text.set_text(text.get_text().replace("$", r"\$"))
-        else:
-            text.set_parse_math(False)
-    figure.savefig(file, format=None if isinstance(file, Path) else "png")
-    figure.clear()
 
 
 def colour_limits(
@@ -179,13 +154,16 @@ def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArra
 
 
 def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any) -> None:
-    """Put a colour bar beside axes that are dressed, with this label."""
+    """Put a colour bar beside axes that are dressed, with this label, as high as they are."""
     figure: Any = axes[0].get_figure(root=True)
-    extend = "min" if isinstance(image, AxesImage) else "neither"
+    if axes[0].get_aspect() != "auto" and figure.get_constrained_layout():
+        # Equal scales make axes smaller than the room that the layout gives them, not so the bar.
+        figure.set_layout_engine("compressed")
+    options = {"extend": "min" if isinstance(image, AxesImage) else "neither"} | options
     bounds = [one.get_position(original=True) for one in axes]
     height = max(one.y1 for one in bounds) - min(one.y0 for one in bounds)
     height_pt = 72 * height * figure.get_size_inches()[1]
     label = fit(label, height_pt, STYLE["axes.labelsize"])
-    bar = figure.colorbar(image, ax=list(axes), label=label, extend=extend, **options)
+    bar = figure.colorbar(image, ax=list(axes), label=label, **options)
     dress(bar.ax, grid=False)
     bar.outline.set_edgecolor(theme_of(axes[0]).faint)

@@ -45,12 +45,8 @@ def angle_view(
     return wide, fitted_limits(detected, radar.range_m, include=[one for _, one in ghosts])
 
 
-def rdt_points(
-    axes: Any, points: NDArray[np.float64], title: str, *, fastest: float | None = None, s: float
-) -> Any:
+def rdt_points(axes: Any, points: NDArray[np.float64], *, fastest: float, s: float) -> Any:
     """Draw points (point, 3) [s, m, m/s] in 3D, coloured by velocity up to ``fastest`` [m/s]."""
-    if fastest is None:
-        fastest = float(np.abs(points[:, 2]).max(initial=1e-9))
-    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=title)
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
     colours = {"c": points[:, 2], "cmap": DIVERGING, "vmin": -fastest, "vmax": fastest}
     return axes.scatter(*points.T, s=s, **colours)

@@ -296,7 +296,7 @@ class Plots:
         (low, high), (slow, fast) = self._range_limits, self._velocity_limits
         shown = (points[:, 1] >= low) & (points[:, 1] <= high)
         shown &= (points[:, 2] >= slow) & (points[:, 2] <= fast)
-        dots = rdt_points(axes, points[shown], "", fastest=max(abs(slow), abs(fast)), s=4)
+        dots = rdt_points(axes, points[shown], fastest=max(abs(slow), abs(fast)), s=4)
         axes.set(ylim=(low, high), zlim=(slow, fast), zlabel="Velocity [m/s]")
         axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
         for axis in (axes.xaxis, axes.yaxis, axes.zaxis):

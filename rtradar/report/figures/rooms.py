@@ -19,8 +19,13 @@ from scipy.spatial import ConvexHull, QhullError
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures import canvas
-from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, draw_view, field_unit
+from rtradar.report.figures.canvas import (
+    VELOCITY_LABEL,
+    add_colour_bar,
+    draw_levels,
+    draw_view,
+    field_unit,
+)
 from rtradar.report.figures.fitting import fitted_limits, masking_note
 from rtradar.report.figures.maps import angle_label, angle_view
 from rtradar.scene import Furniture, Scene
@@ -34,7 +39,7 @@ from rtradar.scene.plan import (
     plan_note,
 )
 from rtradar.system.figure_labels import Label, around, place_labels
-from rtradar.system.figure_style import DARK, dress, new_figure, theme_of
+from rtradar.system.figure_style import DARK, dress, new_figure, save_figure, theme_of
 
 _HALF_TURN = 180.0
 
@@ -92,7 +97,7 @@ def draw_room_plan(
     notes = [_key("Paths of echoes over", key), plan_note(scene)]
     dress(axes, title=f"Plan of the room\n{title}", note="\n".join(filter(None, notes)))
     name_parts(axes, scene, labels, avoided)
-    canvas.save_figure(axes.get_figure(root=True), path)
+    save_figure(axes.get_figure(root=True), path)
 
 
 def draw_before_after(
@@ -141,11 +146,11 @@ def draw_before_after(
                 axes.set_xlabel(VELOCITY_LABEL.replace(" (", "\n("))
         dress(left, title=heading, note="\n".join(filter(None, notes)), grid=False, across=2)
         dress(right)
-    canvas.add_colour_bar(image, list(panels.flat), unit.label("mean of channels"))
+    add_colour_bar(image, list(panels.flat), unit.label("mean of channels"))
     for left in panels[:, 0]:
         left.set(xlim=view[0], ylim=view[1])
         place_labels(left, labels[0])
-    canvas.save_figure(figure, path)
+    save_figure(figure, path)
 
 
 def draw_range_azimuth_with_walls(
@@ -186,9 +191,9 @@ def draw_range_azimuth_with_walls(
     notes += ["Dashed: walls. Outlined: furniture and reflectors."] if labels else []
     note = "\n".join(filter(None, notes))
     dress(axes, title=f"Range-azimuth map and room\n{title}", note=note, grid=False)
-    canvas.add_colour_bar(image, [axes], unit.label("detected cells"))
+    add_colour_bar(image, [axes], unit.label("detected cells"))
     place_labels(axes, labels)
-    canvas.save_figure(axes.get_figure(root=True), path)
+    save_figure(axes.get_figure(root=True), path)
 
 
 def _line(axes: Axes, xy: NDArray[np.float64], name: str, kind: str, **style: Any) -> list[Label]:

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures import canvas
-from rtradar.report.figures.canvas import FieldUnit, draw_levels
+from rtradar.report.figures.canvas import FieldUnit, add_colour_bar, colour_limits, draw_levels
 from rtradar.report.figures.fitting import fitted_limits
 from rtradar.report.figures.maps import rdt_points
 from rtradar.report.pages.html import (
@@ -26,6 +25,7 @@ from rtradar.report.pages.html import (
 from rtradar.report.pages.labels import stage_label
 from rtradar.report.view.run_view import RunView
 from rtradar.report.view.three_d import posed_figure
+from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading
 
 MOST_STEPS = 60
 """Largest number of moments that the page shows."""
@@ -50,18 +50,20 @@ def draw_power_over_time(
     title: str,
 ) -> None:
     """Draw the echo power [m^2] of each model over time [s], and differences to the reference."""
-    figure = canvas.new_figure(9, 5.5)
+    figure = new_figure(5.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    for axes in (above, below):
+        axes.set_prop_cycle(color=LIGHT.cycle)
     for name, values in power.items():
         level = unit.level(values)
         above.plot(times, level, label=name, linewidth=1.2)
         below.plot(times, level - unit.level(power[reference]), linewidth=1.2)
-    above.set(ylabel=unit.label("all parts"), title=title)
+    above.set_ylabel(unit.label("all parts"))
     above.legend()
     below.set(xlabel="Time [s]", ylabel=f"Less {reference} [dB]")
-    for axes in (above, below):
-        axes.grid(alpha=0.3)
-    canvas.save_figure(figure, path)
+    dress(above, title=title)
+    dress(below)
+    save_figure(figure, path)
 
 
 def draw_part_power(
@@ -76,8 +78,10 @@ def draw_part_power(
 
     ``power`` (part,) [m^2] and ``hidden`` (part,), a fraction of time and channels, are by model.
     """
-    figure = canvas.new_figure(11, 6.5)
+    figure = new_figure(6.5)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
+    for axes in (left, right):
+        axes.set_prop_cycle(color=LIGHT.cycle)
     places, height = np.arange(len(parts)), 0.8 / len(power)
     for number, name in enumerate(power):
         seen = power[name] > 0
@@ -85,13 +89,13 @@ def draw_part_power(
         offset = places + (number - (len(power) - 1) / 2) * height
         left.plot(level[seen], offset[seen], "o", markersize=4, label=name)
         right.barh(offset, 100 * hidden[name], height)
-    left.set(yticks=places, yticklabels=parts, xlabel=unit.label("mean over time"), title=title)
+    left.set(yticks=places, yticklabels=parts, xlabel=unit.label("mean over time"))
     left.invert_yaxis()
     left.legend()
-    right.set(xlabel="Occluded [% of time and channels]", xlim=(0, 100))
-    for axes in (left, right):
-        axes.grid(alpha=0.3)
-    canvas.save_figure(figure, path)
+    right.set(xlabel="Occluded [% of\ntime and channels]", xlim=(0, 100))
+    dress(left, title=title, across=1.4)
+    dress(right)
+    save_figure(figure, path)
 
 
 def draw_maps(
@@ -103,41 +107,42 @@ def draw_maps(
     title: str,
     shown: NDArray[np.bool_],
 ) -> None:
-    """Draw the same map (up, across) [dB] of each model in the same colours.
+    """Draw the same map (up, across) [dB] of each model in the same colours, one above another.
 
     ``label`` is that of the colour bar, with its unit; ``across`` and ``up`` are the label and the
     values (n,) of an axis, which is fitted to the cells ``shown (up, across)``.
     """
-    figure = canvas.new_figure(1.5 + 4.2 * len(maps), 4.6)
-    columns = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
-    limits = canvas.colour_limits(np.concatenate([np.ravel(level) for level in maps.values()]))
-    for axes, (name, level) in zip(columns, maps.items(), strict=True):
+    figure = new_figure(1.0 + 2.6 * len(maps))
+    panels = figure.subplots(len(maps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    limits = colour_limits(np.concatenate([np.ravel(level) for level in maps.values()]))
+    for axes, (name, level) in zip(panels, maps.items(), strict=True):
         image = draw_levels(axes, level, across[1], up[1], limits, interpolation="nearest")
-        axes.set(xlabel=across[0], title=name)
-    columns[0].set(
-        ylabel=up[0],
+        axes.set_ylabel(up[0])
+        dress(axes, title=f"{title}\n{name}" if axes is panels[0] else name, grid=False)
+    panels[-1].set(
+        xlabel=across[0],
         xlim=fitted_limits(shown.sum(axis=0), across[1]),
         ylim=fitted_limits(shown.sum(axis=1), up[1]),
     )
-    figure.colorbar(image, ax=list(columns), label=label)
-    figure.suptitle(title, wrap=True)
-    canvas.save_figure(figure, path)
+    add_colour_bar(image, list(panels), label)
+    save_figure(figure, path)
 
 
 def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title: str) -> None:
     """Draw RDT clouds (point, 3), time [s], range [m] and velocity [m/s], on the same axes."""
-    figure = canvas.new_figure(1 + 4.6 * len(clouds), 4.8)
+    figure = new_figure(0.6 + 3.6 * len(clouds))
     every = np.concatenate(list(clouds.values()))
     largest = float(np.abs(every[:, 2]).max(initial=1e-9))
     for number, (name, points) in enumerate(clouds.items(), start=1):
-        axes = figure.add_subplot(1, len(clouds), number, projection="3d")
-        rdt_points(axes, points, f"{name}: {len(points)} points", fastest=largest, s=3)
+        axes: Any = figure.add_subplot(len(clouds), 1, number, projection="3d")
+        rdt_points(axes, points, fastest=largest, s=3)
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect((1.5, 1, 1), zoom=0.85)  # room for the labels at its right
-    figure.suptitle(title, wrap=True)
-    canvas.save_figure(figure, path)
+        axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
+        dress(axes, title=f"{name}: {len(points)} points")
+    write_heading(figure, title)
+    save_figure(figure, path)
 
 
 def write_comparison(

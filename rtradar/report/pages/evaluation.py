@@ -16,8 +16,17 @@ from rtradar.classify import outcomes as scores
 from rtradar.classify.outcomes import HISTORY, TABLE_4, Outcome
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
-from rtradar.report.figures.canvas import new_figure, save_figure
+from rtradar.report.figures.canvas import add_colour_bar
 from rtradar.system.checks import printable
+from rtradar.system.figure_style import (
+    LIGHT,
+    STYLE,
+    WIDTH_IN,
+    dress,
+    new_figure,
+    save_figure,
+    write_heading,
+)
 from rtradar.system.output_folder import OutputFiles
 
 Group = tuple[str, Sequence[Outcome]]
@@ -173,18 +182,18 @@ def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:
     """Draw a box plot of the accuracies in each row: a box between quartiles, a dot each."""
-    figure = new_figure(max(4.0, 1.4 + 1.1 * len(rows)), 4.2)
+    figure = new_figure(4.2, width_in=max(WIDTH_IN, 1.4 + 1.1 * len(rows)))
     axes = figure.subplots()
     percent = [100 * np.asarray(fractions) for _, fractions in rows]
-    axes.boxplot(percent, widths=0.5, showfliers=False, medianprops={"color": "C1"})
+    axes.boxplot(percent, widths=0.5, showfliers=False, medianprops={"color": LIGHT.cycle[1]})
     for place, values in enumerate(percent, start=1):
         offsets = np.linspace(-0.12, 0.12, len(values)) if len(values) > 1 else np.zeros(1)
-        axes.plot(place + offsets, values, ".", color="C0", alpha=0.6)
+        axes.plot(place + offsets, values, ".", color=LIGHT.cycle[0], alpha=0.6)
     names = [name.replace(", ", "\n", 1) for name, _ in rows]
-    axes.set_xticks(range(1, len(rows) + 1), names, fontsize=7)
-    axes.set(ylabel="Test accuracy [%]", xlabel="Classifier", title="Test accuracy")
+    axes.set_xticks(range(1, len(rows) + 1), names)
+    axes.set(ylabel="Test accuracy [%]", xlabel="Classifier")
     axes.set_ylim(min(0.0, *map(min, percent)), 102)
-    axes.grid(axis="y", alpha=0.3)
+    dress(axes, title="Test accuracy")
     save_figure(figure, path)
 
 
@@ -222,13 +231,13 @@ def draw_transfer(
 
 def draw_learning(path: Path, histories: Sequence[Sequence[dict[str, float]]], title: str) -> None:
     """Draw loss and accuracy over epochs: a thin line a training, a thick one for their mean."""
-    figure = new_figure(9, 3.8)
+    figure = new_figure(3.4)
     left, right = figure.subplots(1, 2)
     for axes, name, label, factor in (
         (left, "loss", "Negative log-likelihood [nat]", 1),
         (right, "accuracy", "Accuracy [%]", 100),
     ):
-        for side, colour in (("train", "C0"), ("test", "C1")):
+        for side, colour in zip(("train", "test"), LIGHT.cycle, strict=False):
             curves = [[factor * row[f"{side}_{name}"] for row in history] for history in histories]
             epochs = np.arange(1, min(map(len, curves)) + 1)
             curves = [curve[: len(epochs)] for curve in curves]
@@ -236,9 +245,9 @@ def draw_learning(path: Path, histories: Sequence[Sequence[dict[str, float]]], t
                 axes.plot(epochs, curve, color=colour, linewidth=0.5, alpha=0.35)
             axes.plot(epochs, np.mean(curves, axis=0), color=colour, label=side)
         axes.set(xlabel="Epoch", ylabel=label)
-        axes.grid(alpha=0.3)
         axes.legend()
-    figure.suptitle(title, wrap=True)
+        dress(axes)
+    write_heading(figure, title)
     save_figure(figure, path)
 
 
@@ -251,15 +260,18 @@ def _draw_matrix(
     title: str,
 ) -> None:
     size = 2.6 + 0.85 * len(names)
-    figure = new_figure(size + 0.9, size)
+    figure = new_figure(size, width_in=max(WIDTH_IN, size + 0.9))
     axes = figure.subplots()
     image = axes.imshow(percent, cmap="Blues", vmin=0, vmax=100)
     for row, line in enumerate(cells):
         for column, text in enumerate(line):
             tint = "white" if percent[row, column] > 55 else "black"
-            axes.text(column, row, text, ha="center", va="center", color=tint, fontsize=8)
+            axes.text(
+                column, row, text, ha="center", va="center", color=tint, fontsize=STYLE["font.size"]
+            )
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(names)), names)
-    axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
-    figure.colorbar(image, label=labels[2])
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+    dress(axes, title=title, grid=False)
+    add_colour_bar(image, [axes], labels[2], extend="neither")
     save_figure(figure, path)

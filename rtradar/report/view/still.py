@@ -15,8 +15,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
-from rtradar.report.figures.canvas import VELOCITY_LABEL, new_figure, save_figure
+from rtradar.report.figures.canvas import VELOCITY_LABEL, add_colour_bar
 from rtradar.report.view.run_view import GROUPS, VELOCITY_COLOURS, Levels, RunView, group_of_parts
+from rtradar.system.figure_style import dress, new_figure, save_figure, write_heading
 from rtradar.system.files import atomic_file
 
 _HIDDEN = "#8c8c94"
@@ -29,19 +30,19 @@ def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = 
     ``colour`` is the quantity that colours show, one of `COLOURS`. InputError if the PNG file
     cannot be written.
     """
-    figure = new_figure(15, 9.5)
+    figure = new_figure(8.2, width_in=13)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
     time = f"{run_view.snapshots.times[step]:.2f} s"
-    figure.suptitle(f"{run_view.heading}, {run_view.subtitle}: {time}", wrap=True)
     paint = _Paint(run_view, colour)
     views = [
         figure.add_subplot(grid[row, column], projection=None if column else "3d")
         for row, column in np.ndindex(2, 2)
     ]
     _draw_body(views[0], run_view, step, paint)
-    _draw_map(figure, views[1], run_view, step, paint)
+    _draw_map(views[1], run_view, step, paint)
     _draw_cloud(views[2], run_view, step, paint)
-    _draw_spectrogram(figure, views[3], run_view, step)
+    _draw_spectrogram(views[3], run_view, step)
+    write_heading(figure, f"{run_view.heading}, {run_view.subtitle}: {time}")
     paint.legend(figure, views)
     for view in (views[0], views[2]):
         for artist in (*view.collections, *view.lines):
@@ -110,7 +111,7 @@ class _Paint:
             label = self._run_view.power_unit.label("of an echo")
         place = {"location": "bottom", "shrink": 0.4, "aspect": 50, "pad": 0.02}
         bar = figure.colorbar(ScalarMappable(self.norm, self.map), ax=views, label=label, **place)
-        bar.ax.tick_params(labelsize=8)
+        dress(bar.ax, grid=False)
 
 
 def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
@@ -145,12 +146,13 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Body and paths")
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MultipleLocator(1.0))
     axes.set_box_aspect(high - low, zoom=1.35)
     axes.view_init(elev=22, azim=-75)
-    axes.legend(loc="upper left", fontsize=8)
+    axes.legend(loc="upper left")
+    dress(axes, title="Body and paths")
 
 
 def _extent(levels: Levels) -> tuple[float, float, float, float]:
@@ -167,7 +169,7 @@ def _image(axes: Any, levels: Levels, number: int, colours: str) -> Any:
     )  # fmt: skip
 
 
-def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+def _draw_map(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     snapshots = run_view.snapshots
     image = _image(axes, run_view.range_doppler, step, "Greys")
     rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
@@ -180,14 +182,15 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
         axes.scatter(velocity[own], snapshots.range_m[step, own], linewidths=0.7, **style)
     across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
-    axes.set_title("Range-Doppler map of this window, and where echoes are")
-    figure.colorbar(image, ax=axes, label=run_view.range_doppler.label)
+    title = "Range-Doppler map of this window, and where echoes are"
+    dress(axes, title=title, grid=False)
+    add_colour_bar(image, [axes], run_view.range_doppler.label)
 
 
 def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     points, time = run_view.rdt_points, run_view.snapshots.times[step]
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
-    axes.set_title(f"Range-Doppler-time cloud: {len(points)} points")
+    dress(axes, title=f"Range-Doppler-time cloud: {len(points)} points")
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
         return
@@ -199,12 +202,13 @@ def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     axes.plot([time] * 5, [r0, r1, r1, r0, r0], [v0, v0, v1, v1, v0], color=_NOW, linewidth=1.2)
 
 
-def _draw_spectrogram(figure: Any, axes: Any, run_view: RunView, step: int) -> None:
-    axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
+def _draw_spectrogram(axes: Any, run_view: RunView, step: int) -> None:
+    axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL)
+    dress(axes, title="Spectrogram", grid=False)
     if not run_view.spectrogram.level.size:
         style = {"ha": "center", "va": "center", "transform": axes.transAxes}
         axes.text(0.5, 0.5, "The capture is too short for one.", **style)
         return
     image = _image(axes, run_view.spectrogram, 0, "viridis")
     axes.axvline(run_view.snapshots.times[step], color=_NOW, linewidth=1.5)
-    figure.colorbar(image, ax=axes, label=run_view.spectrogram.label)
+    add_colour_bar(image, [axes], run_view.spectrogram.label)
