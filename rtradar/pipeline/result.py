@@ -19,8 +19,8 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
+from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.inline import InlinePage
-from rtradar.report.pages.run_page import central_limits
 from rtradar.scatter.link_budget import LinkBudget
 
 if TYPE_CHECKING:

@@ -82,7 +82,7 @@ function pointsTraces() {
   if (!spatial) return [];
   const [x, y, z] = pointsAt(figure.times[0]);
   return [{
-    type: "scatter3d", mode: "markers", name: "spatial cloud, this frame", x, y, z, marker: { size: 2.2, color: "#e0389a" }, hoverinfo: "skip",
+    type: "scatter3d", mode: "markers", name: "spatial cloud", x, y, z, marker: { size: 2.2, color: "#e0389a" }, hoverinfo: "skip",
   }];
 }
 

@@ -49,7 +49,8 @@ async function draw(id, traces, scene, breadth, restyleTheme) {
     margin: { l: 0, r: 0, t: 0, b: 0 },
     paper_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12 },
-    legend: { x: 0, y: 0, yanchor: "bottom", orientation: "h", itemsizing: "constant", bgcolor: "rgba(0,0,0,0)" },
+    // Below the view, which gives it the room: in a small one it would meet the labels of the axes.
+    legend: { x: 0, y: 0, yanchor: "top", orientation: "h", itemsizing: "constant", bgcolor: "rgba(0,0,0,0)" },
     modebar: { bgcolor: "rgba(0,0,0,0)" },
     scene: { ...scene, camera: { ...scene.camera, eye: stepBack(scene.camera.eye, node, breadth) } },
   };

@@ -1,16 +1,23 @@
 // The page of a run: the linked views, or the moving figure alone where the maps are not given, and the clouds by themselves.
 
+/** The radar beside its cloud, at coordinates named as the axes of the view. */
+const radarMark = (type, place) => ({
+  type, mode: "markers+text", text: ["radar"], textposition: "top center", ...Object.fromEntries(Object.entries(place).map(([name, value]) => [name, [value]])),
+  marker: { size: 6, symbol: "diamond", color: colour("--tx") }, hoverinfo: "skip", showlegend: false,
+});
+
 /** The cloud of an array on one line: x and the coordinate along the line, which are all that it measures. */
 async function plan() {
   const points = floats(data.spatial.points);
   const along = data.spatial.measured[1] ? 1 : 2;
   const velocity = floats(data.spatial.velocity);
+  const { ranges, radar_m: place } = data.spatial;
   await drawFlat("scene-spatial", [{
     type: "scatter", mode: "markers", x: component(points, 0), y: component(points, along), marker: { ...velocityMarkers(velocity, 3), colorbar: flatBar(velocityLabel) },
     customdata: floats(data.spatial.time), hovertemplate: "(%{x:.2f}, %{y:.2f}) m<br>%{customdata:.2f} s<extra></extra>",
-  }], {
-    xaxis: { text: narrow ? "x [m]" : "x [m], by the distance from the line of the array" },
-    yaxis: { text: `${"xyz"[along]} [m]`, scaleanchor: "x" },
+  }, radarMark("scatter", { x: place[0], y: place[along] })], {
+    xaxis: { range: ranges[0], text: narrow ? "x [m]" : "x [m], by the distance from the line of the array" },
+    yaxis: { text: `${"xyz"[along]} [m]`, range: ranges[along], scaleanchor: "x" },
   });
 }
 
@@ -45,12 +52,13 @@ async function main() {
     }, 1.6);
   }
   if (spatial) {
+    const [[x, y, z], place] = [data.spatial.ranges, data.spatial.radar_m];
     await draw("scene-spatial", [{
       type: "scatter3d", mode: "markers", x: component(spatial.points, 0), y: component(spatial.points, 1), z: component(spatial.points, 2),
-      marker: velocityMarkers(spatial.velocity, 1.8), customdata: spatial.time,
+      marker: velocityMarkers(spatial.velocity, 1.8), customdata: spatial.time, showlegend: false,
       hovertemplate: "(%{x:.2f}, %{y:.2f}, %{z:.2f}) m<br>%{customdata:.2f} s<extra></extra>",
-    }], {
-      domain, aspectmode: "data", xaxis: axis("x [m]"), yaxis: axis("y [m]"), zaxis: axis("z [m]"),
+    }, radarMark("scatter3d", { x: place[0], y: place[1], z: place[2] })], {
+      domain, aspectmode: "data", xaxis: axis("x [m]", x), yaxis: axis("y [m]", y), zaxis: axis("z [m]", z),
       camera: { eye: { x: -1.6, y: -1.3, z: 0.7 }, center: { x: 0, y: 0, z: -0.1 } },
     }, 1.6);
   } else if (data.spatial && data.spatial.count) {

@@ -232,8 +232,23 @@ def test_large_clouds_are_thinned_and_counted() -> None:
     data = rdt_data(points)
     assert (data["count"], data["shown"]) == (count, len(range(0, count, 3)))
     np.testing.assert_array_equal(floats(data["points"]).reshape(-1, 3), points[::3])
-    cloud = spatial_data(SpatialCloud(points, points[:, 0], points[:, 1], points[:, 0] / 10))
+    cloud = spatial_data(SpatialCloud(points, points[:, 0], points[:, 1], points[:, 0] / 10), RADAR)
     np.testing.assert_allclose(floats(cloud["time"]), points[::3, 0] / 10, rtol=1e-7)  # float32
+
+
+def test_outliers_do_not_set_the_axes_of_the_spatial_cloud() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform([0, -1, 0], [2, 1, 2], (1000, 3))
+    points[:2] = [[0, 30, -40], [20, 1, 1]]
+    ones = np.ones(1000)
+    (x, y, z) = spatial_data(SpatialCloud(points, ones, ones, ones), RADAR)["ranges"]
+    assert x[0] < RADAR.position_m[0]
+    assert 2 < x[1] < 4
+    assert -2.5 < y[0] < -1 < 1 < y[1] < 2.5
+    assert -1.5 < z[0] < 0 < 2 < z[1] < 3.5
+    points[:, 2] = np.nan
+    line = spatial_data(SpatialCloud(points, ones, ones, ones), RADAR)
+    assert (line["ranges"][0], line["ranges"][2]) == (x, None)
 
 
 @pytest.mark.parametrize(
@@ -328,7 +343,7 @@ def test_sections_come_in_order_and_are_linked(tmp_path: Path, body: Body) -> No
     assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
     # R^4 times the power is 1 m^2.
     minus = "\N{MINUS SIGN}"
-    ghost_row = f"0.0 dBsm5.25 m{minus}1.50 m/s+20.0°"
+    ghost_row = f"Power [dBsm]Range [m]Velocity [m/s]Azimuth [°]body > left0.05.25{minus}1.50+20.0"
     shown = (f"{minus}26.9 dB", "\u2265 12.3 dB", ghost_row, "1 of 1 partsweak")
     for text in shown:
         assert text in page.text, text

@@ -12,6 +12,8 @@ _MASKED = 0.1  # fraction of the strongest cells
 _FRACTION = 1e-3
 _FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
 _MARGIN, _LEAST_BINS = 0.15, 8
+_ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
+_CENTRAL_PERCENT = 98
 
 
 def fitted_limits(
@@ -60,6 +62,47 @@ def fitted_limits(
     low, high = min(shown), max(shown)
     margin = max(_MARGIN * (high - low), (_LEAST_BINS * step - (high - low)) / 2)
     return max(low - margin, first), min(high + margin, last)
+
+
+def place_limits(values: NDArray[np.float64], own: float) -> tuple[float, float]:
+    """Return the limits of a coordinate that show points but a few outliers, and the radar.
+
+    Parameters
+    ----------
+    values : (point,) float64
+        Coordinate of each point along one axis [m].
+    own : float
+        Coordinate of the radar [m].
+
+    Returns
+    -------
+    low, high : float
+        Limits [m].
+    """
+    if not len(values):
+        return own - 1, own + 1
+    low, high = min(float(values.min()), own), max(float(values.max()), own)
+    margin = 0.2 * (high - low) + 0.05
+    edges = np.linspace(low - margin, high + margin, 601)
+    centres, counts = (edges[1:] + edges[:-1]) / 2, np.histogram(values, edges)[0]
+    return fitted_limits(counts, centres, include=own, handful=_ASTRAY * len(values))
+
+
+def central_limits(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the limits of most values of each column, without one in a hundred at either end.
+
+    Parameters
+    ----------
+    values : (point, column) float64
+        At least one row.
+
+    Returns
+    -------
+    (2, column) float64
+        Lower and upper limits.
+    """
+    half = (100 - _CENTRAL_PERCENT) / 2
+    return np.asarray(np.percentile(values, (half, 100 - half), axis=0))
 
 
 def above_floor(power: NDArray[np.floating]) -> NDArray[np.bool_]:

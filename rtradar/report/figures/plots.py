@@ -26,7 +26,13 @@ from rtradar.report.figures.canvas import (
     draw_view,
     field_unit,
 )
-from rtradar.report.figures.fitting import HANDFUL, above_floor, fitted_limits, masking_note
+from rtradar.report.figures.fitting import (
+    HANDFUL,
+    above_floor,
+    fitted_limits,
+    masking_note,
+    place_limits,
+)
 from rtradar.report.figures.maps import angle_label, angle_view, rdt_points
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
@@ -38,7 +44,6 @@ _COLUMNS = 600
 
 _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
-_ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
 _HIGHEST_IN = 6.5
 _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
 
@@ -347,7 +352,7 @@ class Plots:
             part = f"one in {every} of those" if every > 1 else "those"
             heading += f" ({len(points)} drawn: {part} at most 40 dB below the strongest)"
         place = self.radar.position_m
-        limits = [_of_values(points[:, axis], place[axis]) for axis in range(3)]
+        limits = [place_limits(points[:, axis], place[axis]) for axis in range(3)]
         width = limits[0][1] - limits[0][0]
         if ax is not None:
             panels, ups = [ax], ups[:1]
@@ -519,17 +524,6 @@ class Plots:
         dress(axes, title=title, note=colours, grid=False)
         add_colour_bar(image, [axes], unit.label("detected cells"))
         return axes
-
-
-def _of_values(values: NDArray[np.float64], own: float) -> tuple[float, float]:
-    """Limits that show values [m] but a few outliers, and the radar at its ``own`` place."""
-    if not len(values):
-        return own - 1, own + 1
-    low, high = min(float(values.min()), own), max(float(values.max()), own)
-    margin = 0.2 * (high - low) + 0.05
-    edges = np.linspace(low - margin, high + margin, 601)
-    centres, counts = (edges[1:] + edges[:-1]) / 2, np.histogram(values, edges)[0]
-    return fitted_limits(counts, centres, include=own, handful=_ASTRAY * len(values))
 
 
 def thinned(

@@ -78,17 +78,17 @@ def _ghosts(room: Mapping[str, Any], radar: Radar) -> str:
     rows = [
         (
             str(ghost["path"]),
-            minus(f"{level:.1f} {unit.name}"),
-            f"{ghost['range_m']:.2f} m",
-            minus(f"{ghost['velocity_mps']:+.2f} m/s"),
-            minus(f"{ghost['azimuth_deg']:+.1f}°"),
+            minus(f"{level:.1f}"),
+            f"{ghost['range_m']:.2f}",
+            minus(f"{ghost['velocity_mps']:+.2f}"),
+            minus(f"{ghost['azimuth_deg']:+.1f}"),
         )
         for ghost, level in zip(paths, levels, strict=True)
     ]
-    head = ("Path, out and back", "Power", "Range", "Velocity", "Azimuth")
+    units = f"Power [{unit.name}]", "Range [m]", "Velocity [m/s]", "Azimuth [°]"
     return (
         f"<h3>Ghosts at {ghosts['time_s']:.2f} s</h3>"
-        + _first(rows, head)
+        + _first(rows, ("Path, out and back", *units))
         + '<p class="note">A ghost is the person over a wall: it shows where the length of the '
         "path and the direction of its last leg put it, not where anybody is. Each is the mean of "
         "its parts, weighted by power.</p>"

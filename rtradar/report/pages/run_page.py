@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Body
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
+from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages import html
 from rtradar.report.pages.html import mapping_table, picture, table, write_page
 from rtradar.report.pages.labels import grouped, minus, with_unit
@@ -25,7 +26,6 @@ MOST_STEPS = 100
 """Largest number of moments that the linked views of the page show."""
 
 _STEPS_HZ = 20.0
-_CENTRAL_PERCENT = 98
 
 _FIGURE_ALONE = f"""<div class="scene tall" id="scene-figure"></div>
 {html.player()}
@@ -82,7 +82,7 @@ def write_report(
     parameters = summary.get("parameters", {})
     data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
     if spatial is not None:
-        data["spatial"] = spatial_data(spatial)
+        data["spatial"] = spatial_data(spatial, radar)
     scripts = ["plots.js"]
     if run_view is not None:
         run_view = run_view.thinned(MOST_STEPS, _STEPS_HZ)
@@ -148,12 +148,6 @@ def _sections(
     if cost:
         sections.append(("cost", "Cost", (cost,)))
     return sections
-
-
-def central_limits(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the limits (2, column) of most values (point, column), without outliers."""
-    half = (100 - _CENTRAL_PERCENT) / 2
-    return np.asarray(np.percentile(values, (half, 100 - half), axis=0))
 
 
 def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import FieldUnit, field_unit
+from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.html import Titles, player, write_page
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import packed_floats, posed_figure, rdt_data, spatial_data
@@ -189,7 +190,7 @@ class RunView:
             least, most = first - step / 2, first + step * (count - 0.5)
             points = self.rdt_points[:, column]
             if len(points):
-                points = np.percentile(points, (1, 99))
+                points = central_limits(points)
             inside = np.concatenate([values[self.seen], points])
             inside = inside[(inside >= least) & (inside <= most)]
             if not len(inside):
@@ -318,7 +319,7 @@ def view_data(run_view: RunView) -> dict[str, Any]:
         "map": run_view.range_doppler.packed() | {"box": run_view.shown_box()},
         "spectrogram": run_view.spectrogram.packed(),
         "rdt": shown | points,
-        "spatial": spatial_data(run_view.spatial),
+        "spatial": spatial_data(run_view.spatial, radar),
     }
 
 

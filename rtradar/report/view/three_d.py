@@ -15,6 +15,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import field_unit
+from rtradar.report.figures.fitting import place_limits
 
 FRAME_RATE_HZ = 20.0
 """Rate of the poses of the moving figure [Hz]."""
@@ -109,14 +110,20 @@ def rdt_data(points: ArrayLike) -> dict[str, Any]:
     return _thinned(points=places)
 
 
-def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
+def spatial_data(cloud: SpatialCloud, radar: Radar) -> dict[str, Any]:
     """Return the strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`, for JSON.
 
     The values are ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points``
-    (point, 3), ``velocity`` and ``time`` (point,).
+    (point, 3), ``velocity`` and ``time`` (point,); ``radar_m``, and the ``ranges`` of the axes that
+    show it and all points but outliers, as the pictures do [m].
     """
     cloud = cloud.strongest()
-    return {"measured": cloud.measured.tolist()} | _thinned(
+    measured, place = cloud.measured.tolist(), radar.position_m
+    ranges = [
+        place_limits(cloud.points[:, axis], place[axis]) if measured[axis] else None
+        for axis in range(3)
+    ]
+    return {"measured": measured, "radar_m": list(place), "ranges": ranges} | _thinned(
         points=cloud.points, velocity=cloud.velocity, time=cloud.time
     )
 
