@@ -44,7 +44,7 @@ _FINE, _FINE_FREQUENCY_HZ = 8, 14e9
 """Keyframes to 10 ms where the fraction bends, at that frequency; Fresnel zones are as narrow as
 the root of the wavelength."""
 
-_BEND = 0.02
+BEND = 0.02
 """Second difference over 10 ms that asks for finer keyframes: a cubic misses at most an eighth."""
 
 
@@ -53,7 +53,7 @@ class ZoneFractions:
 
     They are for frequencies (frequency,) [Hz]. ``wanted(time)`` says which parts (part,) bool are
     computed at a keyframe [s]; the others are 1. ``shadow_rays`` is the number of points on each
-    part to which rays are traced from each node of the array.
+    part to which rays are traced from each node of the array, ``bend`` as `BEND`.
     """
 
     def __init__(
@@ -64,9 +64,10 @@ class ZoneFractions:
         tracer: BodyTracer,
         wanted: Callable[[float], NDArray[np.bool_]] | None = None,
         shadow_rays: int = SHADOW_RAYS,
+        bend: float = BEND,
     ) -> None:
         self._radar, self._body, self._tracer, self._wanted = radar, body, tracer, wanted
-        self._shadow_rays = shadow_rays
+        self._shadow_rays, self._bend = shadow_rays, bend
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, TX_NODES, RX_NODES)
         self._step = keyframe_step(radar)
@@ -173,7 +174,7 @@ class ZoneFractions:
         """Which parts bend in an interval, from the keyframes around it; no nodes in between."""
         around = np.stack([self._keyframe(number + i) for i in (-1, 0, 1, 2)])
         bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
-        fine = (bend > _BEND) & (self._fine > 1 and number >= 0)
+        fine = (bend > self._bend) & (self._fine > 1 and number >= 0)
         return _Interval(fine, around[1:3].copy(), self._fine - 1)
 
     def _find_nodes(self, nodes: dict[int, set[int]], parts: NDArray[np.int64]) -> None:

@@ -13,6 +13,7 @@ wanders over the zones, and is exactly 1 in full view and 0 behind.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +102,7 @@ def zone_fractions(
     return out
 
 
+@lru_cache(maxsize=64)
 def bounds_of(shadow_rays: int) -> Bounds:
     """Return where wide cells begin and end along a meridian, counted in cells.
 
@@ -117,7 +119,9 @@ def bounds_of(shadow_rays: int) -> Bounds:
         )
     growths = [*((1, n) for n in range(1, CELLS + 1)), *((n, 1) for n in (2, 4, 8, CELLS))]
     graded = (_graded(*growth) for growth in growths)
-    return min(graded, key=lambda bounds: abs(len(bounds) - 1 - shadow_rays / MERIDIANS))
+    nearest = min(graded, key=lambda bounds: abs(len(bounds) - 1 - shadow_rays / MERIDIANS))
+    nearest.flags.writeable = False  # shared
+    return nearest
 
 
 def _graded(times: int, over: int) -> Bounds:

@@ -19,7 +19,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
-from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
+from rtradar.scatter.fresnel_zones.keyframes import BEND, ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.models.auto_selection import (
@@ -49,6 +49,10 @@ _INSTANTS_AT_ONCE = 32
 _POWER_RAYS = 64
 """Shadow rays to a part where only power matters: at edges they leave an error of 0.035 in the
 visible fraction (``validation/other_methods/fresnel.py``)."""
+
+_POWER_BEND = 0.1
+"""Bend that asks for finer keyframes where only power matters: cubics miss at most an eighth of it,
+0.0125 of a part's return."""
 
 _MARGIN = 0.7
 """Fraction of a complex tolerance that the error budget may use: it knows neither the far ends of
@@ -315,7 +319,8 @@ class Auto(BuiltInModel):
     def _zones(self) -> ZoneFractions:
         frequency = zone_nodes(self._radar)
         given = self._radar, self._body, frequency, self._tracer, self._at_edges
-        return ZoneFractions(*given, shadow_rays=self._shadow_rays)
+        bend = _POWER_BEND if self._complex_fraction is None else BEND
+        return ZoneFractions(*given, shadow_rays=self._shadow_rays, bend=bend)
 
     @cached_property
     def _physical_optics(self) -> EchoModel:
