@@ -4,11 +4,11 @@ Ctrl-C (SIGINT to the whole group, as from a terminal), SIGTERM and SIGKILL come
 ``run``, ``compare``, ``dataset build``, ``train``, ``export`` and ``view``, some with an output
 folder that holds an older result of the same command. Claimed is that every file is as it was
 before or as an undisturbed command leaves it. After Ctrl-C and SIGTERM there are no other files,
-the command ends within 2 s, with status 130 or 1, one line and no traceback, and no process is
-left. No command notices SIGKILL: after it the folder of a run holds old files or new ones. If the
-kill came between the renames of its files it holds both, its list says so, and a command that reads
-it refuses it in one line. A command that only reads changes nothing, and the next run removes what
-is neither.
+the command ends within 2 s, with status 130 and 1 respectively, one line and no traceback, and no
+process is left. No command notices SIGKILL: after it the folder of a run holds old files or new
+ones. If the kill came between the renames of its files it holds both, its list says so, and a
+command that reads it refuses it in one line. A command that only reads changes nothing, and the
+next run removes what is neither.
 
     python validation/robustness/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
