@@ -59,6 +59,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         commands = [
             ["run", "synthetic:kick", "--duration", "0.2", "--radar", str(radar)]
             + ["--fidelity", fidelity, "--out", str(folder / fidelity / str(threads))]
+            + ["--no-pictures"]
             + (traced if fidelity != "analytic" else [])
             for fidelity in ("analytic", "specular", "auto")
         ]
