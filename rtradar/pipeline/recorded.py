@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, Unpack
@@ -17,8 +16,8 @@ from rtradar.errors import InputError
 from rtradar.pipeline.memory import IN_A_FOLDER, bytes_of_maps, refuse_large
 from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.pictures import draw_found
-from rtradar.pipeline.output.summary import plain, summary_of_samples
-from rtradar.pipeline.output.writer import RUN_FILES, ReceivedFrame, RunWriter, write_clouds
+from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
+from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
@@ -69,7 +68,8 @@ def process_samples(
     Returns
     -------
     Result
-        It has no link budget, and no view of a body.
+        It has no link budget, and no view of a body. Where clutter is removed, the maps also hold
+        the middle frame as it was received, but not of an iterable, whose middle is known too late.
 
     Raises
     ------
@@ -96,60 +96,45 @@ def process_samples(
     maps = None
     if out is None:
         file = BytesIO()
-        clouds = _stream(blocks, processing, settings, file)
+        clouds = _stream(blocks, processing, file)
         with processing.stages.time("write"), open_maps(file) as maps:
             maps.load()
         summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
+        summary = finished(summary)
     else:
         with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
-            clouds = _stream(blocks, processing, settings, folder / "maps.h5")
+            clouds = _stream(blocks, processing, folder / "maps.h5")
             with processing.stages.time("write"):
                 write_clouds(folder, clouds)
             with processing.stages.time("pictures"):
                 pictures, _ = draw_found(folder, clouds, radar, settings)
             summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-            _write_pages(folder, radar, clouds, pictures, summary)
+            with processing.stages.time("report"):
+                write_report(
+                    folder / "report.html",
+                    radar=radar,
+                    summary=summary,
+                    pictures=pictures,
+                    rdt_points=clouds.rdt.points,
+                    spatial=clouds.spatial,
+                )
+            summary |= cost(processing, blocks.n_chirps, started)
+            summary = finished(summary, folder)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
-        summary=json.loads(json.dumps(summary, allow_nan=False, default=plain)),
+        summary=summary,
         radar=radar,
-        out=None if out is None else Path(out),
+        out=None if out is None else Path(out).absolute(),
         _in_memory=maps,
     )
 
 
-def _write_pages(
-    folder: Path,
-    radar: Radar,
-    clouds: Clouds,
-    pictures: Mapping[str, Path],
-    summary: dict[str, Any],
-) -> None:
-    """Write the report, and then the summary, which lists all files."""
-    write_report(
-        folder / "report.html",
-        radar=radar,
-        summary=summary,
-        pictures=pictures,
-        rdt_points=clouds.rdt.points,
-        spatial=clouds.spatial,
-    )
-    summary["files"] = RUN_FILES.list_of(folder)
-    text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
-    (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-
-
-def _stream(
-    blocks: _Blocks, processing: Processing, settings: RunSettings, file: Path | BinaryIO
-) -> Clouds:
+def _stream(blocks: _Blocks, processing: Processing, file: Path | BinaryIO) -> Clouds:
     """Stream samples into a file of maps; return their clouds."""
-    radar, received = processing.radar, None
-    if settings.clutter_removal != "none":
-        starts = radar.window_starts(blocks.known_chirps or radar.chirps_per_frame)
-        received = ReceivedFrame(radar, int(starts[len(starts) // 2]))
+    radar = processing.radar
     together = chirps_together(radar)
-    with RunWriter(file, processing, f"{_NAME}, {radar.name}", received) as writer:
+    with RunWriter(file, processing, f"{_NAME}, {radar.name}", blocks.frame_starts) as writer:
         # The same pieces as those of a run, so that the maps are the same to the last bit.
         at_once = min(writer.max_chirps, block_chirps(radar))
         range_spectra = processing.range_spectra(at_once)
@@ -163,18 +148,17 @@ def _stream(
 class _Blocks:
     """Blocks of `block_chirps` of checked samples, and the number of the first chirp of each.
 
-    ``known_chirps`` is how many there are in all, None where that is not known, and ``n_chirps``
-    how many there were so far.
+    ``frame_starts`` are the first cycles of the frames, none where the length is not known, and
+    ``n_chirps`` is how many chirps there were so far.
     """
 
     def __init__(self, samples: Block | Iterable[Block], radar: Radar, *, in_memory: bool) -> None:
         self._radar, self._in_memory = radar, in_memory
         self._cycle_rows = radar.n_tx // chirps_together(radar)
-        self.n_chirps, self.known_chirps = 0, None
+        self.n_chirps, self.frame_starts = 0, radar.window_starts(0)
         if hasattr(samples, "dtype"):
             rows = _rows(samples, radar)
-            self.known_chirps = len(rows) // self._cycle_rows * radar.n_tx
-            self._check_length(self.known_chirps)
+            self.frame_starts = self._checked(len(rows) // self._cycle_rows * radar.n_tx)
             self._pieces: Iterator[NDArray[Any]] = iter([rows])
         elif isinstance(samples, Iterable):
             self._pieces = (_rows(block, radar) for block in samples)
@@ -199,7 +183,7 @@ class _Blocks:
                     held, missing = [], most
         if most - missing >= self._cycle_rows:
             yield self._joined(held)
-        self._check_length(self.n_chirps)
+        self._checked(self.n_chirps)
 
     def _joined(self, held: list[NDArray[np.complex64]]) -> tuple[int, NDArray[np.complex64]]:
         block = held[0] if len(held) == 1 else np.concatenate(held)
@@ -215,15 +199,18 @@ class _Blocks:
         self._check_size(self.n_chirps)
         return first, block
 
-    def _check_length(self, n_chirps: int) -> None:
+    def _checked(self, n_chirps: int) -> NDArray[np.int64]:
+        """Return the first cycle of each frame of so many chirps."""
         radar = self._radar
-        if not len(radar.window_starts(n_chirps)):
+        starts = radar.window_starts(n_chirps)
+        if not len(starts):
             raise InputError(
                 f"IF samples: {n_chirps} chirps in whole cycles hold no frame of radar "
                 f"'{radar.name}', which has {radar.chirps_per_frame}; give a longer capture, or a "
                 "radar with a shorter frame_duration_s"
             )
         self._check_size(n_chirps)
+        return starts
 
     def _check_size(self, n_chirps: int) -> None:
         if self._in_memory:

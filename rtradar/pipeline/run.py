@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from io import BytesIO
 from pathlib import Path
@@ -16,14 +15,8 @@ from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.pictures import draw_pictures
 from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
-from rtradar.pipeline.output.summary import cost, plain, summary_of
-from rtradar.pipeline.output.writer import (
-    RUN_FILES,
-    ReceivedFrame,
-    RunWriter,
-    if_array,
-    write_clouds,
-)
+from rtradar.pipeline.output.summary import cost_of, finished, summary_of
+from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds
 from rtradar.pipeline.result import Result
@@ -116,11 +109,10 @@ def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSett
     with capture.stages.time("write"), open_maps(file) as maps:
         maps.load()
         _add_room(summary, capture, maps)
-    _, summary = _finished(summary, capture, started)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
-        summary=summary,
+        summary=finished(summary | cost_of(capture, started)),
         radar=capture.radar,
         link_budget=capture.link_budget,
         _in_memory=maps,
@@ -172,16 +164,15 @@ def run_into(
                     folder, summary, capture.radar, capture.processing.window_functions
                 ),
             )
-        summary |= {"pictures": pictures, "files": RUN_FILES.list_of(folder)}
-        text, summary = _finished(summary, capture, started)
-        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+        summary |= {"pictures": pictures} | cost_of(capture, started)
+        summary = finished(summary, folder)
     return Result(
         points=points,
         spatial=clouds.spatial,
         summary=summary,
         radar=capture.radar,
         link_budget=capture.link_budget,
-        out=out,
+        out=out.absolute(),
     )
 
 
@@ -197,22 +188,9 @@ def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
         summary["room"] = summary["room"] | room_findings(capture, maps)
 
 
-def _finished(
-    summary: dict[str, Any], capture: Capture, started_s: float
-) -> tuple[str, dict[str, Any]]:
-    """Add the cost of a run; return the text of ``summary.json`` and its values."""
-    summary |= cost(capture, started_s)
-    text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
-    return text, json.loads(text)
-
-
 def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds:
     """Stream a capture into a file of maps, and IF samples into an array; return its clouds."""
-    received = None
-    if capture.settings.clutter_removal != "none":
-        starts = capture.frame_starts
-        received = ReceivedFrame(capture.radar, int(starts[len(starts) // 2]))
-    with RunWriter(maps, capture.processing, capture.title, received) as writer:
+    with RunWriter(maps, capture.processing, capture.title, capture.frame_starts) as writer:
         capture.stream(writer, kept)
         return writer.finish()
 

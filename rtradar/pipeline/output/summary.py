@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
 import platform
 import time
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.output.writer import RUN_FILES
 from rtradar.pipeline.processing import Clouds, Processing
 from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.radar import Radar
@@ -23,14 +26,15 @@ _PACKAGES = (
 )  # fmt: skip
 
 
-def cost(capture: Capture, started_s: float) -> dict[str, Any]:
-    """Return time and memory since the run started, at ``started_s`` of `time.perf_counter`."""
-    return _cost(capture.processing, capture.n_chirps, started_s, capture.warmup_s)
+def cost_of(capture: Capture, started_s: float) -> dict[str, Any]:
+    """Return the cost of a run so far, see `cost`."""
+    return cost(capture.processing, capture.n_chirps, started_s, capture.warmup_s)
 
 
-def _cost(
+def cost(
     processing: Processing, n_chirps: int, started_s: float, warmup_s: float = 0.0
 ) -> dict[str, Any]:
+    """Return time and memory since ``started_s`` of `time.perf_counter`, for so many chirps."""
     wall_s = time.perf_counter() - started_s - warmup_s
     capture_s = n_chirps * processing.radar.chirp_interval_s
     return {
@@ -61,7 +65,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
-        **cost(capture, started_s),
+        **cost_of(capture, started_s),
         **_found(radar, capture.n_chirps, clouds),
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
@@ -102,7 +106,7 @@ def summary_of_samples(
         "parameters": of_processing | {"duration_s": capture_s, "radar": dataclasses.asdict(radar)},
         "seed": settings.seed,
         "versions": {"python": platform.python_version(), **_versions()},
-        **_cost(processing, n_chirps, started_s),
+        **cost(processing, n_chirps, started_s),
         **_found(radar, n_chirps, clouds),
         "limits": [],
     }
@@ -120,7 +124,18 @@ def _found(radar: Radar, n_chirps: int, clouds: Clouds) -> dict[str, Any]:
     }
 
 
-def plain(value: object) -> Any:
+def finished(summary: dict[str, Any], folder: Path | None = None) -> dict[str, Any]:
+    """Return a summary as JSON has it; with a folder, list the files there, and write it beside."""
+    if folder is not None:
+        summary = summary | {"files": RUN_FILES.list_of(folder)}
+    text = json.dumps(summary, indent=2, allow_nan=False, default=_plain)
+    if folder is not None:
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def _plain(value: object) -> Any:
     """Convert a NumPy scalar for JSON: seeds from ``np.arange``, figures of a model."""
     if isinstance(value, np.generic):
         return value.item()

@@ -60,9 +60,10 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
 class RunWriter:
     """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
-    A path, whose file is replaced, or an open file may be given. Of the frame ``received`` the map
-    is also kept as it was before clutter removal. So that memory stays low, `push` takes at most
-    ``max_chirps`` chirps.
+    A path, whose file is replaced, or an open file may be given. If clutter is removed, the map of
+    the middle one of ``frame_starts``, first cycles of the frames, is also kept as it was before;
+    of none if they are left out. So that memory stays low, `push` takes at most ``max_chirps``
+    chirps.
     """
 
     def __init__(
@@ -70,9 +71,9 @@ class RunWriter:
         file: Path | BinaryIO,
         processing: Processing,
         title: str,
-        received: ReceivedFrame | None = None,
+        frame_starts: Sequence[int] | NDArray[np.int64] = (),
     ) -> None:
-        self._processing, self._received = processing, received
+        self._processing = processing
         radar, removal = processing.radar, processing.removal
         self._clouds = CloudMaker(processing)
         self._spectrogram = SlidingSpectrogram(
@@ -91,6 +92,9 @@ class RunWriter:
             "slow_time": removal.description(self._range_time.window_cycles),
             "spectrogram_time": removal.description(window_cycles(radar)),
         }
+        self._received = None
+        if len(frame_starts) and removed["time"] != "none":
+            self._received = ReceivedFrame(radar, int(frame_starts[len(frame_starts) // 2]))
         self._store = MapStore(file, axes, {"title": title}, clutter_removal=removed)
 
     def __enter__(self) -> RunWriter:
