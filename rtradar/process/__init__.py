@@ -24,8 +24,8 @@ from rtradar.process.power_maps import power_map
 from rtradar.process.range_time import SlidingRangeTime, range_time
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
-from rtradar.process.steering import measured_angles
 from rtradar.process.window_functions import WindowFunctions
+from rtradar.radar.display import measured_angles
 from rtradar.system.registries import DETECTORS
 
 __all__ = [

@@ -73,24 +73,6 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     return lines
 
 
-def measured_angles(radar: Radar) -> tuple[str, ...]:
-    """Which of ``azimuth`` and ``elevation`` the radar measures, by two channels on a line.
-
-    Without a line along z, azimuth is the cone angle asin(y / r).
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar whose array counts.
-
-    Returns
-    -------
-    tuple of str
-    """
-    lines = {"azimuth": radar.tx_y * radar.rx_y, "elevation": radar.tx_z * radar.rx_z}
-    return tuple(name for name, channels in lines.items() if channels > 1)
-
-
 def _line(radar: Radar, axis: int) -> Line | None:
     tx_there, rx_there = np.arange(radar.n_tx) < radar.tx_y, np.arange(len(radar.rx)) < radar.rx_y
     if axis == 2:

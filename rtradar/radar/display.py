@@ -62,7 +62,7 @@ def settings_rows(radar: Radar) -> dict[str, str]:
 
 def limit_rows(radar: Radar) -> dict[str, str]:
     """Return the limits that follow from the settings, as texts with units by their labels."""
-    axes = measured_angles(radar)
+    axes = " and ".join(measured_angles(radar))
     beam, most = f"{radar.angle_resolution_deg:.3g}°", f"±{radar.max_angle_deg:.3g}°"
     return {
         "Maximum range": f"{radar.max_range_m:.4g} m",
@@ -76,10 +76,22 @@ def limit_rows(radar: Radar) -> dict[str, str]:
     }
 
 
-def measured_angles(radar: Radar) -> str:
-    """Name the angles that the array measures, or return an empty text if it measures none."""
+def measured_angles(radar: Radar) -> tuple[str, ...]:
+    """Which of ``azimuth`` and ``elevation`` the radar measures, by two channels on a line.
+
+    Without a line along z, azimuth is the cone angle asin(y / r).
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar whose array counts.
+
+    Returns
+    -------
+    tuple of str
+    """
     lines = {"azimuth": radar.tx_y * radar.rx_y, "elevation": radar.tx_z * radar.rx_z}
-    return " and ".join(name for name, elements in lines.items() if elements > 1)
+    return tuple(name for name, channels in lines.items() if channels > 1)
 
 
 def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:

@@ -23,13 +23,13 @@ from rtradar.process.angles import (
 )
 from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import (
-    measured_angles,
     range_walk,
     sine_grid,
     taper_weights,
     virtual_lines,
 )
 from rtradar.radar import Radar
+from rtradar.radar.display import measured_angles
 from rtradar.scatter.validity import folded_angle_deg
 
 Array = NDArray[np.float64]
