@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.pipeline.output.pictures import busiest_frame, removed, thinned
+from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_runs
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
@@ -23,6 +23,7 @@ from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bi
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.figures.fitting import above_floor
+from rtradar.report.figures.maps import thinned
 from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
@@ -235,9 +236,8 @@ def _draw(
     comparison.draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
 
     with h5py.File(_maps_of(results[reference])) as maps:
-        frame = busiest_frame(maps)
+        frame = int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
         velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
-        times = thinned(maps, "spectrogram", "spectrogram_time")[1]
         cleaned = removed(maps["range_doppler"])
         frame_title = f"{title}{cleaned}, window at {maps['time'][frame]:.2f} s"
         slow_title = title + removed(maps["spectrogram"])
@@ -251,7 +251,8 @@ def _draw(
             power = maps["range_doppler"][frame]
             levels[name] = by_range.level(power / radar.n_channels)
             shown.append(above_floor(power))
-            spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / range_bins
+            power, times = thinned(maps["spectrogram"], maps["spectrogram_time"][:])
+            spectrograms[name] = power.T / range_bins
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
     label, seen = by_range.label("mean of channels"), np.any(shown, axis=0)
     comparison.draw_maps(next(paths), levels, label, across, up, frame_title, seen)
@@ -337,8 +338,9 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
             cells.append([maps["range_doppler"][frame][union] for maps in (first, second)])
         power, its_power = (np.concatenate(column) for column in zip(*cells, strict=True))
         levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
-        names = "spectrogram", "spectrogram_time"
-        spectrogram, its = (thinned(maps, *names)[0] for maps in (first, second))
+        spectrogram, its = (
+            thinned(maps["spectrogram"], maps["spectrogram_time"][:])[0] for maps in (first, second)
+        )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
         return levels, both / either if either else 1.0, alike
 

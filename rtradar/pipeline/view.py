@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.output.pictures import thinned
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import FieldUnit, field_unit
+from rtradar.report.figures.maps import thinned
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import Snapshots, load_snapshots
 from rtradar.report.view.still import draw_still
@@ -271,7 +271,7 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     if not len(maps["spectrogram_time"]):
         none = np.zeros((1, len(velocity), 0), dtype=np.uint8)
         return Levels(level=none, low_db=0.0, step_db=1.0, label="", across=(0.0, 1.0), up=up)
-    found, times = thinned(maps, "spectrogram", "spectrogram_time")
+    found, times = thinned(maps["spectrogram"], maps["spectrogram_time"][:])
     # One echo is spread over as many range bins.
     power = _powers(found.T) / noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))

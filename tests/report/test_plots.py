@@ -198,10 +198,13 @@ def test_a_spectrogram_shows_an_echo_at_its_velocity(plots_of: Callable[..., Plo
 
 
 def test_what_a_radar_does_not_measure_is_no_picture(plots_of: Callable[..., Plots]) -> None:
-    with pytest.raises(rt.InputError, match="does not measure elevation"):
-        plots_of(RADAR).range_elevation()
+    plots = plots_of(RADAR)
+    none = dataclasses.replace(plots, maps=plots.maps.drop_vars("range_azimuth"))
+    for name in ("range_angle", "spatial"):
+        with pytest.raises(rt.InputError, match=f"{name}: radar 'custom' measures no angle"):
+            getattr(none, name)()
     with pytest.raises(rt.InputError, match="no z axis"):
-        plots_of(RADAR).rdt(ax=new_figure(3.0).add_subplot())
+        plots.rdt(ax=new_figure(3.0).add_subplot())
 
 
 def test_a_part_of_the_points_is_drawn_and_all_are_counted(

@@ -18,7 +18,6 @@ from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
 from rtradar.report.figures.plots import Plots
-from rtradar.report.figures.plots import thinned as average
 from rtradar.scatter.multipath.ghosts import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure
@@ -133,13 +132,3 @@ def removed(data: Any) -> str:
     """Return a second line of a title for an open dataset whose static clutter was removed."""
     how = data.attrs["clutter_removal"]
     return "" if how == "none" else f"\nstatic clutter removed: {how}"
-
-
-def busiest_frame(maps: Any) -> int:
-    """Return the index of the frame with the most detections in an open file of maps."""
-    return int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
-
-
-def thinned(maps: Any, name: str, axis: str) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-    """Return a map (time, ...) and its times [s], averaged to a few hundred steps."""
-    return average(maps[name], maps[axis][:])

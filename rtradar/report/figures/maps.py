@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,6 +14,9 @@ from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL
 from rtradar.report.figures.fitting import fitted_limits
 from rtradar.system.figure_style import DIVERGING
+
+_COLUMNS = 600
+"""Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""
 
 _NOISY = 0.02  # fraction of the detected ranges whose strongest angle may be one of noise
 
@@ -50,3 +54,30 @@ def rdt_points(axes: Any, points: NDArray[np.float64], *, fastest: float, s: flo
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
     colours = {"c": points[:, 2], "cmap": DIVERGING, "vmin": -fastest, "vmax": fastest}
     return axes.scatter(*points.T, s=s, **colours)
+
+
+def thinned(
+    data: Any, times: NDArray[np.float64]
+) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """Return a map (time, ...) and its times [s], averaged to a few hundred steps.
+
+    Parameters
+    ----------
+    data : (time, ...) xarray.DataArray or h5py.Dataset
+        Map, of which one step at a time is read.
+    times : (time,) float64
+        Times of the map [s].
+
+    Returns
+    -------
+    power : (step, ...) float
+        Mean of the map in each step.
+    times : (step,) float64
+        Mean time of each step [s].
+    """
+    every = max(1, math.ceil(len(data) / _COLUMNS))
+    if every == 1:  # in one go, for each access to a file takes its time
+        return np.asarray(data), times
+    steps = [slice(first, first + every) for first in range(0, len(data), every)]
+    power = np.stack([np.asarray(data[step]).mean(axis=0) for step in steps])
+    return power, np.array([times[step].mean() for step in steps])

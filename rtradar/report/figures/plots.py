@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.process import measured_angles
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import (
@@ -33,14 +32,11 @@ from rtradar.report.figures.fitting import (
     masking_note,
     place_limits,
 )
-from rtradar.report.figures.maps import angle_label, angle_view, rdt_points
+from rtradar.report.figures.maps import angle_label, angle_view, rdt_points, thinned
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_COLUMNS = 600
-"""Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""
 
 _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
@@ -231,50 +227,6 @@ class Plots:
         self._range_angle(names[0], time_s, upper)
         self._range_angle(names[1], time_s, lower, heading=False)
         return cast(Axes, upper)
-
-    def range_azimuth(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
-        """Draw power over range and azimuth of one frame.
-
-        Parameters
-        ----------
-        time_s : float, optional
-            Time of the frame, as for `range_doppler`.
-        ax : Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            Axes of the map.
-
-        Raises
-        ------
-        InputError
-            If the radar does not measure azimuth.
-        """
-        return self._range_angle("azimuth", time_s, ax)
-
-    def range_elevation(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
-        """Draw power over range and elevation of one frame.
-
-        Parameters
-        ----------
-        time_s : float, optional
-            Time of the frame, as for `range_doppler`.
-        ax : Axes, optional
-            Axes to draw on.
-
-        Returns
-        -------
-        Axes
-            Axes of the map.
-
-        Raises
-        ------
-        InputError
-            If the radar does not measure elevation.
-        """
-        return self._range_angle("elevation", time_s, ax)
 
     def rdt(self, ax: Axes | None = None) -> Axes:
         """Draw the range-Doppler-time cloud in three dimensions, coloured by velocity.
@@ -500,11 +452,6 @@ class Plots:
     def _range_angle(
         self, name: str, time_s: float | None, ax: Axes | None, heading: bool = True
     ) -> Axes:
-        if name not in self._angles:
-            raise InputError(
-                f"range_{name}: radar '{self.radar.name}' does not measure {name}; "
-                f"it measures {' and '.join(measured_angles(self.radar)) or 'no angle'}"
-            )
         frame, when = self.frame(time_s)
         axes = self._axes(ax)
         data, angles = self.maps[f"range_{name}"][frame], np.degrees(self.maps[name].values)
@@ -524,30 +471,3 @@ class Plots:
         dress(axes, title=title, note=colours, grid=False)
         add_colour_bar(image, [axes], unit.label("detected cells"))
         return axes
-
-
-def thinned(
-    data: Any, times: NDArray[np.float64]
-) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-    """Return a map (time, ...) and its times [s], averaged to a few hundred steps.
-
-    Parameters
-    ----------
-    data : (time, ...) xarray.DataArray or h5py.Dataset
-        Map, of which one step at a time is read.
-    times : (time,) float64
-        Times of the map [s].
-
-    Returns
-    -------
-    power : (step, ...) float
-        Mean of the map in each step.
-    times : (step,) float64
-        Mean time of each step [s].
-    """
-    every = max(1, math.ceil(len(data) / _COLUMNS))
-    if every == 1:  # in one go, for each access to a file takes its time
-        return np.asarray(data), times
-    steps = [slice(first, first + every) for first in range(0, len(data), every)]
-    power = np.stack([np.asarray(data[step]).mean(axis=0) for step in steps])
-    return power, np.array([times[step].mean() for step in steps])
