@@ -30,7 +30,7 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 """Quantities drawn at random: default range, smallest and largest allowed value."""
 
 MOST_SAMPLES = 1_000_000
-"""Largest number of samples of a data set; the plan of each takes some 2 kB of memory."""
+"""Largest number of samples of a data set, all of whose plans are in memory."""
 
 INTERVAL_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
 """Keys of the intervals in files."""
