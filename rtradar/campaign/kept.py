@@ -97,13 +97,14 @@ class MapKeeper:
             self._steps[name].append(np.asarray(values, dtype=ARRAYS[name].dtype))
 
     def maps(self) -> dict[str, NDArray[np.floating]]:
-        """Return the maps of all frames so far by name, with their axes; nothing if none is kept.
+        """Return the maps of all frames by name, with their axes; nothing if none is kept.
 
-        The axis of time is that of the frames, and so that of joints.
+        The axis of time is that of the frames, and so that of joints. To be called once: the frames
+        of a map go when it is joined, so that no two maps are held twice.
         """
         if not self._keep:
             return {}
-        maps = {name: np.concatenate(steps) for name, steps in self._steps.items()}
+        maps = {name: np.concatenate(self._steps.pop(name)) for name in list(self._steps)}
         return maps | _axes(self._processing.radar, maps)
 
     def finish(self) -> Clouds:

@@ -9,7 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -112,10 +112,10 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     too many.
     """
     intervals = [interval for actor in spec.actors for interval in _takes(spec, actor)]
-    # Reading takes a second for a long recording.
+    read = cache(load_motion)  # a recording of two activities is given twice
     hide = None if spec.recordings else True
     for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
-        motion = load_motion(recorded.path, skeleton=recorded.skeleton)
+        motion = read(recorded.path, skeleton=recorded.skeleton)
         count = len(intervals) + recorded.intervals.count(motion.duration_s)
         check_samples(count, len(spec.combinations))
         intervals += _intervals(spec, recorded, motion)
