@@ -57,13 +57,20 @@ def write(folder: Path, text: str) -> Path:
     return folder / "set.toml"
 
 
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("kept")
+
+
 @pytest.fixture
-def built(here: None, tmp_path: Path) -> rt.Collection:
-    build_dataset(write(tmp_path, KEEP + SPEC), tmp_path / "out")
-    return rt.Collection(tmp_path / "out")
+def built(here: None, folder: Path) -> rt.Collection:
+    """What the first test that asks for it builds."""
+    if not (folder / "out").exists():
+        build_dataset(write(folder, KEEP + SPEC), folder / "out")
+    return rt.Collection(folder / "out")
 
 
-def test_maps_are_those_of_a_run(built: rt.Collection, tmp_path: Path) -> None:
+def test_maps_are_those_of_a_run(built: rt.Collection, folder: Path, tmp_path: Path) -> None:
     maps, told = built.maps(0), built[0].provenance
     motion = rt.synthetic_motion(
         built[0].label,
@@ -73,7 +80,7 @@ def test_maps_are_those_of_a_run(built: rt.Collection, tmp_path: Path) -> None:
     )
     (plan,) = (
         plan
-        for plan in plan_samples(read_spec(tmp_path / "set.toml"))
+        for plan in plan_samples(read_spec(folder / "set.toml"))
         if plan.identity == built.ids[0]
     )
     rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", **vars(plan.run_settings()))
@@ -102,12 +109,12 @@ def test_everything_kept_can_be_batched(built: rt.Collection) -> None:
 
 
 def test_a_second_build_gives_the_same_bytes_and_mends_what_is_damaged(
-    built: rt.Collection, tmp_path: Path
+    built: rt.Collection, folder: Path
 ) -> None:
-    paths = sorted((tmp_path / "out").glob("*.npz"))
+    paths = built.paths
     before = [path.read_bytes() for path in paths]
     paths[1].write_bytes(before[1][:-100_000])
-    assert build_dataset(tmp_path / "set.toml", tmp_path / "out")["made"] == 1
+    assert build_dataset(folder / "set.toml", folder / "out")["made"] == 1
     assert [path.read_bytes() for path in paths] == before
 
 
