@@ -16,7 +16,7 @@ from rtradar.scene.objects import Wall
 from rtradar.scene.scene import Scene
 from rtradar.system.checks import printable
 from rtradar.system.figure_labels import Label, around, place_labels
-from rtradar.system.figure_style import STYLE, axes_for, dress, new_figure, png_of, theme_of
+from rtradar.system.figure_style import STYLE, dress, figure_for, new_figure, png_of, theme_of
 
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
@@ -51,7 +51,7 @@ def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
     (x, y), limits = _place_and_limits(scene, radar)
     person = scene.person_position_m
-    axes = axes_for(ax, height_of_plan(limits))
+    axes = figure_for(height_of_plan(limits)).add_subplot() if ax is None else ax
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
     draw_radar(axes, (x, y))

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rtradar.system.figure_style import STYLE, theme_of
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -89,8 +91,6 @@ def place_labels(
     list of str
         Texts for which there was no place.
     """
-    from rtradar.system.figure_style import STYLE, theme_of
-
     figure: Any = axes.get_figure(root=True)
     figure.draw_without_rendering()  # settles where the axes are
     theme, inside, pixels = theme_of(axes), axes.get_window_extent(), figure.dpi / 72

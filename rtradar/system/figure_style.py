@@ -1,8 +1,8 @@
 """The one style of all pictures: size, fonts, grid and colours, in a light and a dark variant.
 
 Nothing here changes Matplotlib's global settings, for pictures of a run may be drawn in several
-threads, and the user's own figures keep their style. A picture is drawn on axes of `axes_for`, in
-the colours of `theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
+threads, and the user's own figures keep their style. A picture is drawn on axes in the colours of
+`theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
 
 Pictures are `WIDTH_IN` wide, but for the still of a view and tables of many columns. Shown 420
 pixels wide, a letter of the smallest font is 8 pixels high.
@@ -28,13 +28,10 @@ STYLE: Mapping[str, Any] = {
     "axes.titlelocation": "left",
     "axes.labelsize": 9.5,
     "xtick.labelsize": 9.0,
-    "ytick.labelsize": 9.0,
     "legend.fontsize": 8.5,
     "font.size": 8.5,
     "grid.linewidth": 0.6,
     "grid.alpha": 0.5,
-    "lines.linewidth": 1.5,
-    "image.cmap": "viridis",
 }
 """Sizes and fonts [pt], by the names of Matplotlib's settings; ``font.size`` is that of notes."""
 
@@ -89,18 +86,14 @@ DARK = Theme(
 )
 """Colours on a dark page."""
 
-THEMES: Mapping[str, Theme] = {"light": LIGHT, "dark": DARK}
 
-
-def new_figure(height_in: float, theme: str = "light", width_in: float = WIDTH_IN) -> Figure:
+def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     """Make an empty figure without a window, which pyplot does not know.
 
     Parameters
     ----------
     height_in : float
         Height of the figure [inch].
-    theme : str
-        Name of the colours, ``light`` or ``dark``.
     width_in : float
         Width of the figure [inch].
 
@@ -111,8 +104,8 @@ def new_figure(height_in: float, theme: str = "light", width_in: float = WIDTH_I
     """
     from matplotlib.figure import Figure
 
-    size, colour = (width_in, height_in), THEMES[theme].page
-    return Figure(figsize=size, dpi=STYLE["figure.dpi"], facecolor=colour, layout="constrained")
+    size, dpi = (width_in, height_in), STYLE["figure.dpi"]
+    return Figure(figsize=size, dpi=dpi, facecolor=LIGHT.page, layout="constrained")
 
 
 def save_figure(figure: Any, file: Path | BinaryIO) -> None:
@@ -172,26 +165,6 @@ def figure_for(height_in: float) -> Figure:
     import matplotlib.pyplot as plt
 
     return plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-
-
-def axes_for(ax: Axes | None, height_in: float = 4.0, **options: Any) -> Axes:
-    """Return the axes to draw on: those given, or the only ones of a new figure of pyplot.
-
-    Parameters
-    ----------
-    ax : Axes, optional
-        Axes of the user's own figure.
-    height_in : float
-        Height of a new figure [inch].
-    **options
-        Options of `matplotlib.figure.Figure.add_subplot`, such as ``projection``.
-
-    Returns
-    -------
-    Axes
-        Axes that `dress` is applied to once they are drawn on.
-    """
-    return figure_for(height_in).add_subplot(**options) if ax is None else ax
 
 
 def write_heading(figure: Any, title: str) -> None:
@@ -262,7 +235,7 @@ def dress(
     for name in "xyz" if is_3d else "xy":
         axis = getattr(axes, f"{name}axis")
         axis.label.set(fontsize=STYLE["axes.labelsize"], color=theme.text)
-        size = STYLE[f"{'x' if name == 'x' else 'y'}tick.labelsize"]
+        size = STYLE["xtick.labelsize"]
         axis.set_tick_params(labelsize=size, color=theme.text, labelcolor=theme.text)
         axis.get_offset_text().set_color(theme.text)
     for spine in axes.spines.values():

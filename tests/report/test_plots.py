@@ -152,7 +152,9 @@ def test_a_notebook_shows_what_is_drawn_without_axes(plots_of: Callable[..., Plo
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_colours_follow_the_background(plots_of: Callable[..., Plots], name: str) -> None:
-    own = new_figure(4.0, "dark").add_subplot(projection="3d" if name == "rdt" else None)
+    figure = new_figure(4.0)
+    figure.set_facecolor(DARK.page)
+    own = figure.add_subplot(projection="3d" if name == "rdt" else None)
     getattr(plots_of(RADAR), name)(ax=own)
     assert theme_of(own) is DARK
     assert {label.get_color() for label in own.get_xticklabels()} == {DARK.text}

@@ -182,7 +182,7 @@ def _draw_map(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
         axes.scatter(velocity[own], snapshots.range_m[step, own], linewidths=0.7, **style)
     across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
-    title = "Range-Doppler map of this window, and where echoes are"
+    title = "Range-Doppler map, and where echoes are"
     dress(axes, title=title, grid=False)
     add_colour_bar(image, [axes], run_view.range_doppler.label)
 
