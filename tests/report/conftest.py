@@ -124,18 +124,20 @@ class Browser:
 
     def open(self, address: str, scheme: str = "light", width: int = SIZE[0]) -> None:
         self._deadline = time.monotonic() + TIMEOUT_S
-        size = {"width": width, "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
-        self.call("Emulation.setDeviceMetricsOverride", **size)
-        self.call(
-            "Emulation.setEmulatedMedia",
-            features=[{"name": "prefers-color-scheme", "value": scheme}],
-        )
+        self.look(scheme, width)
         self.call(
             "Page.navigate", url="about:blank"
         )  # for the same file with another #t is no new page
         self.events.clear()
         self.call("Page.navigate", url=address)
         self.wait("document.documentElement?.dataset.ready === 'true'")
+
+    def look(self, scheme: str, width: int = SIZE[0]) -> None:
+        """Choose the colour scheme and the width of the window; an open page follows."""
+        size = {"width": width, "height": SIZE[1], "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
+        chosen = {"name": "prefers-color-scheme", "value": scheme}
+        self.call("Emulation.setEmulatedMedia", features=[chosen])
 
     def place(self, element: str) -> tuple[float, float, float, float]:
         """Scroll to an element; its left, top, width and height in the window."""

@@ -16,7 +16,9 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.report.pages.run_page import write_report
 
-pytestmark = [pytest.mark.slow, pytest.mark.drawn]
+pytestmark = pytest.mark.slow
+
+FIGURE = "document.getElementById('scene-figure')"
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> str:
         scale=0.1, size=(800, 3)
     )
     rdt = np.stack([time_s, 4 + rng.normal(size=800) / 4, 2 * rng.normal(size=800)], axis=1)
-    matplotlib.image.imsave(folder / "map.png", rng.uniform(size=(20, 30)))
+    matplotlib.image.imsave(folder / "map.png", rng.uniform(size=(20, 1500)))
     write_report(
         folder / "report.html",
         body=body,
@@ -51,11 +53,12 @@ def coloured(picture: NDArray[np.float64]) -> int:
     return int((np.ptp(picture, axis=2) > 0.25).sum())
 
 
-def test_opens_without_an_error_or_a_request(browser: Any, report: str) -> None:
-    browser.open(report)
+def test_at_rest(browser: Any, report: str) -> None:
+    """It opens without an error or a request, is drawn in both schemes, and moves."""
+    browser.open(f"{report}#t=0")
     assert not browser.faults()
     asked = browser.requests()
-    assert asked[0] == report
+    assert asked[0].startswith(report)
     assert not [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
     # Plotly offers to send the data to its own site unless it is told not to.
     buttons = browser.evaluate(
@@ -68,27 +71,22 @@ def test_opens_without_an_error_or_a_request(browser: Any, report: str) -> None:
         == "synthetic:<script>walk</script>"
     )
     assert browser.evaluate(
-        "[...document.images].every((image) => image.complete && image.naturalWidth === 30)"
+        "[...document.images].every((image) => image.complete && image.naturalWidth === 1500)"
     )
+    for scheme in ("light", "dark"):
+        browser.look(scheme)
+        shade = browser.picture("scene-figure")[-1, 0].mean()
+        assert (shade > 0.9) == (scheme == "light")
+        for view in ("scene-figure", "scene-rdt", "scene-spatial"):
+            assert browser.evaluate(f"document.getElementById('{view}').dataset.drawn") == "true"
+            # A colour bar alone, without anything in 3D, has up to 5000: so only the left of the
+            # picture counts.
+            picture = browser.picture(view)
+            assert coloured(picture[:, : int(0.75 * picture.shape[1])]) > 500, view
+    browser.look("light")
 
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_3d_views_are_drawn(browser: Any, report: str, scheme: str) -> None:
-    browser.open(f"{report}#t=0.3", scheme)
-    shade = browser.picture("scene-figure")[-1, 0].mean()
-    assert (shade > 0.9) == (scheme == "light")
-    for view in ("scene-figure", "scene-rdt", "scene-spatial"):
-        assert browser.evaluate(f"document.getElementById('{view}').dataset.drawn") == "true"
-        # A colour bar alone, without anything in 3D, has up to 5000: so only the left of the
-        # picture counts.
-        picture = browser.picture(view)
-        assert coloured(picture[:, : int(0.75 * picture.shape[1])]) > 500, view
-
-
-def test_the_figure_stands_elsewhere_at_another_moment(browser: Any, report: str) -> None:
-    def middle(moment: float) -> float:
+    def middle() -> float:
         """Mean column of the body, which the walk carries toward the radar, to the left."""
-        browser.open(f"{report}#t={moment}")
         picture = browser.picture("scene-figure")
         # Yellow to green, as parts of much power are; antennas are red and blue, points pink.
         body = (
@@ -100,19 +98,46 @@ def test_the_figure_stands_elsewhere_at_another_moment(browser: Any, report: str
         assert len(columns) > 200
         return float(columns.mean())
 
-    assert middle(0.0) > middle(1.0) + 50
+    first = middle()
+    browser.set("moment", 20)
+    browser.wait(f"{FIGURE}.dataset.frame === '20'")
+    assert first > middle() + 50
+    browser.look("light", 420)
+    browser.wait("document.documentElement.scrollWidth <= 420")
+    assert not browser.faults()
 
 
-def test_plays_pauses_and_follows_the_slider(browser: Any, report: str) -> None:
+def test_playing(browser: Any, report: str) -> None:
+    """Without a moment it plays, turns and comes nearer under the mouse, pauses and is moved."""
+
     def frame() -> int:
-        return int(
-            browser.evaluate("Number(document.getElementById('scene-figure').dataset.frame)")
-        )
+        return int(browser.evaluate(f"Number({FIGURE}.dataset.frame)"))
 
-    browser.open(report)
-    browser.place("scene-figure")
+    def eye(view: str) -> NDArray[np.float64]:
+        scene = f"document.getElementById('{view}')._fullLayout.scene._scene"
+        return np.array(browser.evaluate(f"Object.values({scene}.getCamera().eye)"))
+
+    def turned(view: str) -> float:
+        """Angle by which a view turns under the mouse, and stays turned [deg]."""
+        before = eye(view)[:2]
+        browser.drag(view, 200)
+        time.sleep(1.0)
+        after = eye(view)[:2]
+        cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
+        return float(np.degrees(np.arccos(cosine)))
+
+    browser.open(report, width=640)  # a small view is drawn more quickly
+    x, y, width, height = browser.place("scene-figure")
     first = frame()
-    browser.wait(f"Number(document.getElementById('scene-figure').dataset.frame) !== {first}")
+    browser.wait(f"Number({FIGURE}.dataset.frame) !== {first}")
+    assert turned("scene-figure") > 15
+    before = np.linalg.norm(eye("scene-figure"))
+    wheel = {"x": x + width / 2, "y": y + height / 2, "deltaX": 0, "deltaY": -120}
+    for _ in range(3):
+        browser.call("Input.dispatchMouseEvent", type="mouseWheel", **wheel)
+        time.sleep(0.1)
+    time.sleep(1.0)
+    assert np.linalg.norm(eye("scene-figure")) < 0.95 * before
     browser.evaluate("document.getElementById('play').click()")
     assert browser.evaluate("document.getElementById('play').textContent") == "Play"
     time.sleep(0.3)
@@ -121,42 +146,7 @@ def test_plays_pauses_and_follows_the_slider(browser: Any, report: str) -> None:
     assert frame() == held
     wanted = 3 if held != 3 else 5
     browser.set("moment", wanted)
-    browser.wait(f"document.getElementById('scene-figure').dataset.frame === '{wanted}'")
-    assert browser.evaluate("document.getElementById('clock').textContent").startswith(
-        f"{wanted / 20:.2f} / 1.00 s"
-    )
-
-
-@pytest.mark.parametrize(("view", "moment"), [("scene-rdt", "#t=0"), ("scene-figure", "")])
-def test_turns_under_the_mouse(browser: Any, report: str, view: str, moment: str) -> None:
-    # Without a moment the figure is playing, and must turn all the same, and stay turned.
-    browser.open(report + moment)
-    eye = (
-        f"Object.values(document.getElementById('{view}')._fullLayout.scene._scene.getCamera().eye)"
-    )
-    before = np.array(browser.evaluate(eye))
-    browser.drag(view, 200)
-    time.sleep(1.0)
-    after = np.array(browser.evaluate(eye))
-    cosine = float(before[:2] @ after[:2] / np.linalg.norm(before[:2]) / np.linalg.norm(after[:2]))
-    assert np.degrees(np.arccos(cosine)) > 15
-
-
-def test_the_wheel_brings_nearer_while_playing(browser: Any, report: str) -> None:
-    browser.open(report)
-    scene = "document.getElementById('scene-figure')._fullLayout.scene._scene"
-    eye = f"Math.hypot(...Object.values({scene}.getCamera().eye))"
-    before = browser.evaluate(eye)
-    x, y, width, height = browser.place("scene-figure")
-    for _ in range(3):
-        browser.call(
-            "Input.dispatchMouseEvent",
-            type="mouseWheel",
-            x=x + width / 2,
-            y=y + height / 2,
-            deltaX=0,
-            deltaY=-120,
-        )
-        time.sleep(0.1)
-    time.sleep(1.0)
-    assert browser.evaluate(eye) < 0.95 * before
+    browser.wait(f"{FIGURE}.dataset.frame === '{wanted}'")
+    clock = browser.evaluate("document.getElementById('clock').textContent")
+    assert clock.startswith(f"{wanted / 20:.2f} / 1.00 s")
+    assert turned("scene-rdt") > 15

@@ -12,18 +12,19 @@ import rtradar as rt
 from rtradar.pipeline.view import load_run_view
 from rtradar.report.pages.comparison import comparison_data
 
-pytestmark = [pytest.mark.slow, pytest.mark.drawn]
+pytestmark = pytest.mark.slow
 
 MODELS = ("analytic-paper", "analytic")
 
 
 @pytest.fixture(scope="module")
-def folder(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(
+    chromium: Any,
+    beside_a_wall: tuple[rt.Radar, rt.Scene],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
     out = tmp_path_factory.mktemp("compared")
-    motion, radar = (
-        rt.synthetic_motion("walk", seed=0, duration_s=0.4),
-        rt.Radar.preset("paper-12ghz"),
-    )
+    motion, (radar, _) = rt.synthetic_motion("walk", seed=0, duration_s=0.4), beside_a_wall
     rt.compare(motion, radar, out=out, fidelities=MODELS, overwrite=True)
     return out
 

@@ -15,7 +15,7 @@ from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import RunView
 from rtradar.scene import Furniture, material
 
-pytestmark = [pytest.mark.slow, pytest.mark.drawn]
+pytestmark = pytest.mark.slow
 
 FIGURE = "document.getElementById('scene-figure')"
 
@@ -57,8 +57,11 @@ def centres(browser: Any) -> Any:
     return places.reshape(21, -1, 3).mean(axis=1)
 
 
-def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, RunView]) -> None:
-    address, _ = seen
+def test_opens_without_an_error_or_a_request_and_moves(
+    browser: Any, seen: tuple[str, RunView], beside_a_wall: tuple[rt.Radar, rt.Scene]
+) -> None:
+    (address, linked), (radar, _) = seen, beside_a_wall
+    snapshots = linked.snapshots
     browser.open(f"{address}#t=0.1")
     assert not browser.faults()
     asked = browser.requests()
@@ -69,14 +72,7 @@ def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, RunV
         assert browser.evaluate(f"document.getElementById('scene-{name}').dataset.drawn") == "true"
         picture = browser.picture(f"scene-{name}")
         assert (picture.min(axis=2) < 0.8).sum() > 1000, name
-
-
-def test_the_slider_moves_every_view(
-    browser: Any, seen: tuple[str, RunView], beside_a_wall: tuple[rt.Radar, rt.Scene]
-) -> None:
-    (address, linked), (radar, _) = seen, beside_a_wall
-    snapshots = linked.snapshots
-    browser.open(f"{address}#t=0.1")
+    # The slider moves every view.
     pictures = []
     for step in (2, len(snapshots.times) - 2):
         go(browser, step)
@@ -134,7 +130,32 @@ def test_the_slider_moves_every_view(
     assert not browser.faults()
 
 
-def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, RunView]) -> None:
+def save(browser: Any, tmp_path: Path) -> None:
+    """Save what is seen, and look for all four views in it."""
+    browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    browser.evaluate("document.getElementById('save').click()")
+    saved: list[Path] = []
+    while not saved:
+        browser.evaluate(
+            "new Promise((done) => setTimeout(done, 200))"
+        )  # within the browser's own deadline
+        saved = list(tmp_path.glob("*.png"))
+    picture = matplotlib.image.imread(saved[0])
+    width = browser.evaluate("document.querySelector('.linked').getBoundingClientRect().width")
+    assert picture.shape[1] == pytest.approx(2 * width, abs=2)
+    rows, columns = picture.shape[0] // 2, picture.shape[1] // 2
+    for quarter in (
+        picture[:rows, :columns],
+        picture[:rows, columns:],
+        picture[rows:, :columns],
+        picture[rows:, columns:],
+    ):
+        assert (quarter[..., :3].min(axis=2) < 0.8).sum() > 3000
+
+
+def test_colours_are_of_part_power_or_velocity_and_are_saved(
+    browser: Any, seen: tuple[str, RunView], tmp_path: Path
+) -> None:
     address, linked = seen
     snapshots, step = linked.snapshots, 3
     browser.open(f"{address}#t=0.1")
@@ -155,6 +176,7 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Ru
     browser.wait("document.documentElement.dataset.colour === 'part'")
     assert len(set(values(browser, "figure", 0, "intensity"))) == 6
     assert not browser.evaluate("document.getElementById('groups').hidden")
+    save(browser, tmp_path)
     for paths, counts in {"none": (0, 0), "direct": (3 * len(own), 0)}.items():
         browser.set("paths", paths, "change")
         browser.wait(
@@ -164,40 +186,16 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Ru
     assert not browser.faults()
 
 
-def test_saves_a_picture_of_what_is_seen(
-    browser: Any, seen: tuple[str, RunView], tmp_path: Path
-) -> None:
-    address, _ = seen
-    browser.open(f"{address}#t=0.1")
-    browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
-    browser.evaluate("document.getElementById('save').click()")
-    saved: list[Path] = []
-    while not saved:
-        browser.evaluate(
-            "new Promise((done) => setTimeout(done, 200))"
-        )  # within the browser's own deadline
-        saved = list(tmp_path.glob("*.png"))
-    picture = matplotlib.image.imread(saved[0])
-    width = browser.evaluate("document.querySelector('.linked').getBoundingClientRect().width")
-    assert picture.shape[1] == pytest.approx(2 * width, abs=2)
-    rows, columns = picture.shape[0] // 2, picture.shape[1] // 2
-    for quarter in (
-        picture[:rows, :columns],
-        picture[:rows, columns:],
-        picture[rows:, :columns],
-        picture[rows:, columns:],
-    ):
-        assert (quarter[..., :3].min(axis=2) < 0.8).sum() > 3000
-    assert not browser.faults()
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("page", ["view.html", "report.html"])
 def test_nothing_overflows_a_narrow_window(
-    browser: Any, seen: tuple[str, RunView], scheme: str
+    browser: Any, seen: tuple[str, RunView], page: str
 ) -> None:
-    for page in ("view.html", "report.html"):
-        browser.open(seen[0].replace("view.html", page) + "#t=0.1", scheme, width=420)
+    browser.open(seen[0].replace("view.html", page) + "#t=0.1", width=420)
+    tables = "[...document.querySelectorAll('.wide')].filter((e) => e.scrollWidth > e.clientWidth)"
+    for scheme in ("light", "dark"):
+        browser.look(scheme, 420)
         assert browser.evaluate("document.documentElement.scrollWidth") <= 420
+        assert browser.evaluate(f"{tables}.length") == 0
         back = browser.evaluate("getComputedStyle(document.body).backgroundColor")
         assert (sum(map(int, back[4:-1].split(","))) > 3 * 128) == (scheme == "light")
         assert not browser.faults()
