@@ -32,7 +32,8 @@ from rtradar.system.output_folder import new_folder
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 _CHUNK_BYTES = 4_000_000  # about what is read at a time
 _MOST_A_CHUNK = 256
-_COUNTS = {"points": "n_points", "spatial": "n_spatial"}
+_COUNTS = {"points": ("n_points", "RDT cloud"), "spatial": ("n_spatial", "spatial cloud")}
+"""Name of the number of points of a cloud, and what the cloud is called."""
 _COORDINATES = {"coordinate": ["time", "range", "velocity"], "axis": ["x", "y", "z"]}
 _UNITS = re.compile(r"_(s|m|deg|db)$")
 
@@ -102,7 +103,7 @@ def _write_columns(group: Any, collection: Collection) -> None:
     table = collection.to_pandas().drop(columns="folder")  # a place on this machine alone
     _put(group, "sample", table.index.to_numpy(), ["sample"], long_name="id of the sample")
     for name in table.columns:
-        if not _NAME.fullmatch(str(name)) or name in (*ARRAYS, *_COUNTS.values(), "sample"):
+        if not _NAME.fullmatch(str(name)) or name in (*ARRAYS, *dict(_COUNTS.values()), "sample"):
             raise InputError(f"provenance holds {brief(name)}, which can name no array")
         values = [None if value is None or value != value else value for value in table[name]]
         attrs: dict[str, Any] = {}
@@ -135,8 +136,9 @@ def _write_arrays(group: Any, collection: Collection) -> None:
         shapes = np.array([read_shape(path, name) for path in collection.paths])
         shape = tuple(shapes.max(axis=0).tolist())
         if name in _COUNTS:
-            said = f"number of points of {name}, which the others follow as NaN"
-            _put(group, _COUNTS[name], shapes[:, 0], ["sample"], long_name=said)
+            count, cloud = _COUNTS[name]
+            said = f"number of points of the {cloud}; what follows them is NaN"
+            _put(group, count, shapes[:, 0], ["sample"], long_name=said)
         _stream(group, name, shape, ("sample", *ARRAYS[name].dims), collection)
     for name in axes:
         first = read_sample(collection.paths[0], name)
