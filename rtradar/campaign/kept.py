@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.motion import Motion
-from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing
 from rtradar.process import (
@@ -27,9 +26,6 @@ from rtradar.settings import RunOptions, RunSettings
 
 KEPT = tuple(kind for kind in KINDS if kind not in ("clouds", "spatial"))
 """Kinds that a specification may keep."""
-
-JOINTS = NODES
-"""Names of the joints, those of the body's 22 nodes, whatever skeleton the recording has."""
 
 
 class Capture(NamedTuple):

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar import __version__
-from rtradar.campaign.kept import JOINTS, capture_of
+from rtradar.campaign.kept import capture_of
 from rtradar.campaign.spec import DRAWN, RUN_KEYS, Actor, Combination, Recorded, Spec, check_samples
 from rtradar.clouds.sample_files import FORMAT, Sample
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
+from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
@@ -274,7 +275,7 @@ def make_sample(plan: SamplePlan) -> Made:
         "limits": sorted(limits),
     }
     if "joints" in maps:
-        found["joint_names"] = list(JOINTS)
+        found["joint_names"] = list(NODES)  # of the body, whatever skeleton the recording has
     places = clouds.spatial.points
     if len(places) > SPATIAL_POINTS:
         random = np.random.default_rng(stream(values["seed"], _SPATIAL_STREAM))

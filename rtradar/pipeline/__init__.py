@@ -4,7 +4,7 @@ from rtradar.pipeline.compare import Comparison, compare
 from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.run import clouds_of, run
+from rtradar.pipeline.run import run
 from rtradar.pipeline.simulation import Simulation, simulate
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "Comparison",
     "Result",
     "Simulation",
-    "clouds_of",
     "compare",
     "process_samples",
     "run",

@@ -18,7 +18,7 @@ from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
 from rtradar.pipeline.prepare import prepare
-from rtradar.pipeline.processing import CloudMaker, Clouds
+from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.view import run_view_of
@@ -193,35 +193,3 @@ def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds
     with RunWriter(maps, capture.processing, capture.title, capture.frame_starts) as writer:
         capture.stream(writer, kept)
         return writer.finish()
-
-
-def clouds_of(
-    motion: Motion, radar: Radar, scene: Scene | None = None, **options: Unpack[RunOptions]
-) -> tuple[Clouds, float]:
-    """Compute the clouds that `run` gives, without files, pictures and progress bar.
-
-    Parameters
-    ----------
-    motion, radar, scene
-        The same as for `run`.
-    **options
-        Settings, the fields of `rtradar.RunSettings`; ``variant`` is ``cpu`` if left out.
-
-    Returns
-    -------
-    clouds : Clouds
-        Clouds of a run with these settings. On the CPU they are the same to the byte on every
-        machine.
-    warmup_s : float
-        Time of what a process does once, such as compiling [s].
-
-    Raises
-    ------
-    InputError, BackendError
-        As in `run`.
-    """
-    options.setdefault("variant", "cpu")  # workers share the cores
-    capture = prepare(motion, radar, scene or Scene(), RunSettings(**options))
-    maker = CloudMaker(capture.processing)
-    capture.stream(maker, progress=False)
-    return maker.finish(), capture.warmup_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -12,6 +13,7 @@ from torch.utils.data import DataLoader
 
 import rtradar as rt
 from rtradar.campaign import build_dataset
+from rtradar.campaign.kept import capture_of
 from rtradar.campaign.samples import make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.sample_files import check_size
@@ -96,6 +98,24 @@ def test_maps_are_those_of_a_run(built: rt.Collection, folder: Path, tmp_path: P
     root = maps["joints"].sel(joint="root").mean("time")
     assert float(root.sel(axis="x")) == pytest.approx(0.5, abs=0.1)
     assert 0.7 < float(root.sel(axis="z")) < 1.2
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"fidelity": "specular", "heading_deg": 20.0, "clutter_removal": "mean", "seed": 3}],
+)
+def test_clouds_are_those_of_a_run(folder: Path, options: dict[str, Any]) -> None:
+    write(folder, KEEP + SPEC)
+    radar = rt.Radar.load(folder / "small.toml")
+    motion = rt.synthetic_motion("walk", duration_s=0.5)
+    taken: Any = {"variant": "cpu", "fidelity": "analytic", "start_s": 0.1, "duration_s": 0.2}
+    taken |= options
+    result = rt.run(motion, radar, **taken)
+    clouds = capture_of(motion, radar, rt.Scene(), (), **taken).clouds
+    np.testing.assert_array_equal(clouds.rdt.points, result.points)
+    np.testing.assert_array_equal(clouds.spatial.points, result.spatial.points)
+    assert len(clouds.rdt.points)
+    assert len(clouds.spatial.points)
 
 
 def test_everything_kept_can_be_batched(built: rt.Collection) -> None:

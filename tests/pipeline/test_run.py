@@ -16,7 +16,6 @@ import zarr
 import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.pipeline import clouds_of
 from rtradar.scatter import MODELS
 
 RADAR = rt.Radar(
@@ -66,19 +65,6 @@ def test_only_the_noise_depends_on_the_seed(tmp_path: Path) -> None:
     _, other = run(tmp_path / "c", seed=2)
     np.testing.assert_array_equal(first, again)
     assert not np.isclose(first, other).any(axis=None)
-
-
-@pytest.mark.parametrize(
-    "options",
-    [{}, {"fidelity": "specular", "heading_deg": 20.0, "clutter_removal": "mean", "seed": 3}],
-)
-def test_clouds_alone_are_those_of_a_run(tmp_path: Path, options: dict[str, Any]) -> None:
-    taken = {"fidelity": "analytic", "start_s": 0.1, "duration_s": 0.2, **options}
-    result = rt.run(MOTION, RADAR, out=tmp_path, variant="cpu", **taken)
-    clouds, _ = clouds_of(MOTION, RADAR, **taken)
-    np.testing.assert_array_equal(clouds.rdt.points, result.points)
-    with np.load(tmp_path / "cloud_xyz.npz") as spatial:
-        np.testing.assert_array_equal(clouds.spatial.points, spatial["points"])
 
 
 def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:

@@ -181,17 +181,15 @@ def gaps(take: Path) -> list[Row]:
 
 
 def clouds(amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
-    from rtradar.pipeline import clouds_of
-
     radar = rt.Radar.preset("paper-12ghz")
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     found = {}
     for name, motion, seed in (("AMC", amc, 0), ("C3D", c3d, 0), ("AMC again", amc, 1)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rt.ValidityWarning)  # feet faster than 7 m/s
-            found[name] = clouds_of(motion, radar, start_s=11.0, duration_s=1.5, seed=seed)[
-                0
-            ].rdt.points
+            found[name] = rt.run(
+                motion, radar, variant="cpu", start_s=11.0, duration_s=1.5, seed=seed
+            ).points
     rows = [
         reported(
             "cloud of a kick", f"{name} from AMC", "bins", chamfer(found[name], found["AMC"], bins)
