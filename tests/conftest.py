@@ -124,11 +124,9 @@ def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture(scope="session")
-def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
-    """A small radar, and a scene with one metal wall on its left: few echoes on each path."""
-    from rtradar.scene import Wall, material
-
-    radar = rt.Radar(
+def small() -> rt.Radar:
+    """A radar of few samples, with a line of antennas along y."""
+    return rt.Radar(
         name="small",
         tx_y=2,
         tx_z=0,
@@ -138,6 +136,13 @@ def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
         samples_per_chirp=128,
         frame_duration_s=0.05,
     )
+
+
+@pytest.fixture(scope="session")
+def beside_a_wall(small: rt.Radar) -> tuple[rt.Radar, rt.Scene]:
+    """The small radar, and a scene with one metal wall on its left: few echoes on each path."""
+    from rtradar.scene import Wall, material
+
     left = Wall(
         name="left",
         corner_m=(-4.4, 2.7, 0.0),
@@ -146,7 +151,7 @@ def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
         material=material("metal"),
         thickness_m=0.01,
     )
-    return radar, rt.Scene(name="one wall", walls=(left,))
+    return small, rt.Scene(name="one wall", walls=(left,))
 
 
 @pytest.fixture(scope="session")

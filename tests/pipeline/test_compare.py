@@ -14,27 +14,16 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
 
-pytestmark = pytest.mark.drawn
-
-RADAR = rt.Radar(
-    name="small",
-    tx_y=2,
-    tx_z=0,
-    rx_y=4,
-    rx_z=0,
-    chirp_duration_s=250e-6,
-    samples_per_chirp=128,
-    frame_duration_s=0.05,
-)
-MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 MODELS = ("analytic-paper", "analytic", "specular")
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory: pytest.TempPathFactory) -> rt.Comparison:
+def compared(
+    kick: rt.Motion, small: rt.Radar, tmp_path_factory: pytest.TempPathFactory
+) -> rt.Comparison:
     return rt.compare(
-        MOTION,
-        RADAR,
+        kick,
+        small,
         out=tmp_path_factory.mktemp("compare") / "out",
         fidelities=MODELS,
         duration_s=0.3,
@@ -42,6 +31,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> rt.Comparison:
     )
 
 
+@pytest.mark.drawn
 def test_the_reference_differs_in_nothing_from_itself(compared: rt.Comparison) -> None:
     found = compared.summary["fidelities"]["specular"]
     assert compared.summary["reference"] == "specular"
@@ -96,6 +86,7 @@ def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
     assert np.quantile(difference, 0.95) < 1e-2
 
 
+@pytest.mark.drawn
 def test_files_and_table(compared: rt.Comparison) -> None:
     pictures = {
         f"compare_{name}.png"
@@ -127,10 +118,10 @@ def test_files_and_table(compared: rt.Comparison) -> None:
     ],
 )
 def test_models_that_cannot_be_compared(
-    fidelities: tuple[str, ...], says: str, tmp_path: Path
+    kick: rt.Motion, small: rt.Radar, fidelities: tuple[str, ...], says: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=says):
-        rt.compare(MOTION, RADAR, out=tmp_path / "out", fidelities=fidelities)
+        rt.compare(kick, small, out=tmp_path / "out", fidelities=fidelities)
     assert not (tmp_path / "out").exists()
 
 

@@ -17,32 +17,25 @@ from rtradar.errors import InputError
 from rtradar.pipeline import memory
 from rtradar.settings import RunOptions
 
-RADAR = rt.Radar(
-    name="small",
-    tx_y=2,
-    tx_z=0,
-    rx_y=4,
-    rx_z=0,
-    chirp_duration_s=250e-6,
-    samples_per_chirp=128,
-    frame_duration_s=0.05,
-)
 OPTIONS: RunOptions = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
-MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 
 
 @pytest.fixture(scope="module")
-def in_memory(tmp_path_factory: pytest.TempPathFactory) -> rt.Result:
+def in_memory(
+    kick: rt.Motion, small: rt.Radar, tmp_path_factory: pytest.TempPathFactory
+) -> rt.Result:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("empty"))
-        result = rt.run(MOTION, RADAR, **OPTIONS)
+        result = rt.run(kick, small, **OPTIONS)
         assert not list(Path().iterdir())
     return result
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> rt.Result:
-    return rt.run(MOTION, RADAR, out=tmp_path_factory.mktemp("run") / "out", **OPTIONS)
+def written(
+    kick: rt.Motion, small: rt.Radar, tmp_path_factory: pytest.TempPathFactory
+) -> rt.Result:
+    return rt.run(kick, small, out=tmp_path_factory.mktemp("run") / "out", **OPTIONS)
 
 
 def test_maps_in_memory_are_those_of_the_file(in_memory: rt.Result, written: rt.Result) -> None:
@@ -115,21 +108,23 @@ def test_maps_of_a_folder_that_is_gone_are_refused_in_one_line(
 
 
 def test_maps_too_large_for_memory_are_refused_before_any_work(
-    in_memory: rt.Result, monkeypatch: pytest.MonkeyPatch
+    kick: rt.Motion, small: rt.Radar, in_memory: rt.Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = sum(in_memory.maps[name].nbytes for name in in_memory.maps.data_vars)
-    known = memory.bytes_of_maps(RADAR, in_memory.summary["chirps"])
+    known = memory.bytes_of_maps(small, in_memory.summary["chirps"])
     assert 0.8 * size < known < 1.2 * size
     monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1_000_000_000)
     # No array of so many frames is ever made.
-    long = dataclasses.replace(MOTION, rate_hz=1e-3, first_frame_s=0.0, length_s=None)
+    long = dataclasses.replace(kick, rate_hz=1e-3, first_frame_s=0.0, length_s=None)
     with pytest.raises(InputError, match=r"would take [\d.]+ GB .* 1\.0 GB are allowed; .* out="):
-        rt.run(long, RADAR)
+        rt.run(long, small)
 
 
-def test_a_radar_of_one_channel_has_no_angles_and_does_without() -> None:
-    radar = dataclasses.replace(RADAR, tx_y=1, rx_y=1, chirp_duration_s=500e-6)
-    result = rt.run(MOTION, radar, fidelity="analytic", duration_s=0.2, snr_db=math.inf)
+def test_a_radar_of_one_channel_has_no_angles_and_does_without(
+    kick: rt.Motion, small: rt.Radar
+) -> None:
+    radar = dataclasses.replace(small, tx_y=1, rx_y=1, chirp_duration_s=500e-6)
+    result = rt.run(kick, radar, fidelity="analytic", duration_s=0.2, snr_db=math.inf)
     assert "range_azimuth" not in result.maps
     assert "no noise" in repr(result)
     assert "data:image/png" in result._repr_html_()
@@ -137,9 +132,9 @@ def test_a_radar_of_one_channel_has_no_angles_and_does_without() -> None:
     assert memory.bytes_of_maps(radar, result.summary["chirps"]) == pytest.approx(size, rel=0.1)
 
 
-def test_if_samples_are_not_kept_without_a_folder() -> None:
+def test_if_samples_are_not_kept_without_a_folder(kick: rt.Motion, small: rt.Radar) -> None:
     with pytest.raises(InputError, match="save_if = True keeps IF samples in a folder"):
-        rt.run(MOTION, RADAR, save_if=True)
+        rt.run(kick, small, save_if=True)
 
 
 def test_every_public_name_is_listed() -> None:

@@ -16,23 +16,12 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline import memory
 from rtradar.settings import SimulationOptions
 
-RADAR = rt.Radar(
-    name="small",
-    tx_y=2,
-    tx_z=0,
-    rx_y=4,
-    rx_z=0,
-    chirp_duration_s=250e-6,
-    samples_per_chirp=128,
-    frame_duration_s=0.05,
-)
-MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 OPTIONS: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "seed": 3}
 
 
 @pytest.fixture(scope="module")
-def samples() -> xr.DataArray:
-    return rt.simulate(MOTION, RADAR, **OPTIONS).samples
+def samples(kick: rt.Motion, small: rt.Radar) -> xr.DataArray:
+    return rt.simulate(kick, small, **OPTIONS).samples
 
 
 def assert_same(found: rt.Result, expected: rt.Result) -> None:
@@ -43,12 +32,14 @@ def assert_same(found: rt.Result, expected: rt.Result) -> None:
 
 
 @pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
-def test_samples_of_a_simulation_give_the_maps_of_a_run(multiplexing: str) -> None:
-    radar = dataclasses.replace(RADAR, multiplexing=multiplexing)
-    found = rt.simulate(MOTION, radar, **OPTIONS).samples
+def test_samples_of_a_simulation_give_the_maps_of_a_run(
+    kick: rt.Motion, small: rt.Radar, multiplexing: str
+) -> None:
+    radar = dataclasses.replace(small, multiplexing=multiplexing)
+    found = rt.simulate(kick, radar, **OPTIONS).samples
     removal = "mean" if multiplexing == "tdm" else "none"
     processed = rt.process_samples(found, radar, clutter_removal=removal, seed=3)
-    ran = rt.run(MOTION, radar, clutter_removal=removal, **OPTIONS)
+    ran = rt.run(kick, radar, clutter_removal=removal, **OPTIONS)
     assert_same(processed, ran)
     if removal != "none":  # of a stream, the middle is known too late
         streamed = rt.process_samples(iter([found]), radar, clutter_removal=removal, seed=3)
@@ -74,8 +65,10 @@ def reused(samples: xr.DataArray) -> Iterator[np.ndarray[Any, Any]]:
         yield buffer[: len(part)]
 
 
-def test_other_shapes_and_blocks_give_the_same(samples: xr.DataArray) -> None:
-    expected = rt.process_samples(samples, RADAR)
+def test_other_shapes_and_blocks_give_the_same(
+    kick: rt.Motion, small: rt.Radar, samples: xr.DataArray
+) -> None:
+    expected = rt.process_samples(samples, small)
     values = samples.values
     cycles = xr.DataArray(values.reshape(-1, 2, 4, 128), dims=("cycle", "tx", "rx", "sample"))
     for same in (
@@ -84,19 +77,19 @@ def test_other_shapes_and_blocks_give_the_same(samples: xr.DataArray) -> None:
         cycles.transpose("sample", "rx", "cycle", "tx"),
         np.concatenate([values, values[:1]]),  # half a cycle
         reused(samples),
-        rt.simulate(MOTION, RADAR, **OPTIONS).blocks(),
+        rt.simulate(kick, small, **OPTIONS).blocks(),
     ):
-        assert_same(rt.process_samples(same, RADAR), expected)
+        assert_same(rt.process_samples(same, small), expected)
 
 
 def test_a_folder_holds_maps_clouds_and_pictures(
-    samples: xr.DataArray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    small: rt.Radar, samples: xr.DataArray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path)
-    written = rt.process_samples(samples, RADAR, "out", pfa=1e-4)
+    written = rt.process_samples(samples, small, "out", pfa=1e-4)
     monkeypatch.chdir("elsewhere")
-    assert_same(written, rt.process_samples(samples, RADAR, pfa=1e-4))
+    assert_same(written, rt.process_samples(samples, small, pfa=1e-4))
     assert set(written.summary["files"]) >= {
         *("maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"),
         *(
@@ -131,26 +124,26 @@ def broken(samples: xr.DataArray, value: complex) -> np.ndarray[Any, Any]:
     ],
 )
 def test_samples_that_are_none_of_the_radar_are_refused_and_leave_nothing(
-    samples: xr.DataArray, wrong: Any, says: str, tmp_path: Path
+    small: rt.Radar, samples: xr.DataArray, wrong: Any, says: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=says) as caught:
-        rt.process_samples(wrong(samples), RADAR, out=tmp_path / "out")
+        rt.process_samples(wrong(samples), small, out=tmp_path / "out")
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
 
 
 def test_maps_too_large_for_memory_are_refused(
-    samples: xr.DataArray, monkeypatch: pytest.MonkeyPatch
+    small: rt.Radar, samples: xr.DataArray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e5)
     for given in (samples, iter([samples])):
         with pytest.raises(InputError, match=r"maps of .* chirps of radar 'small' would take"):
-            rt.process_samples(given, RADAR)
+            rt.process_samples(given, small)
 
 
-def test_noise_alone_gives_empty_clouds_and_says_so() -> None:
+def test_noise_alone_gives_empty_clouds_and_says_so(small: rt.Radar) -> None:
     noise = np.random.default_rng(0).standard_normal((600, 4, 256)).view(np.complex128)
     with pytest.warns(ValidityWarning, match="nothing was detected"):
-        result = rt.process_samples(noise, RADAR, pfa=1e-12)
+        result = rt.process_samples(noise, small, pfa=1e-12)
     assert result.points.shape == (0, 3)
     assert len(repr(result).splitlines()) <= 10

@@ -17,112 +17,89 @@ import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.scatter import MODELS
+from rtradar.settings import RunOptions
 
-RADAR = rt.Radar(
-    name="small",
-    tx_y=2,
-    tx_z=0,
-    rx_y=4,
-    rx_z=0,
-    chirp_duration_s=250e-6,
-    samples_per_chirp=128,
-    frame_duration_s=0.05,
-)
-MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
+SHORT: RunOptions = {"fidelity": "analytic", "duration_s": 0.3}
 
 
-def run(out: Path, **options: Any) -> tuple[rt.Result, np.ndarray[Any, Any]]:
-    """A run of 0.3 s and its IF samples."""
-    result = rt.run(
-        MOTION,
-        RADAR,
-        out=out,
-        **({"fidelity": "analytic", "duration_s": 0.3, "save_if": True} | options),
-    )
-    return result, np.asarray(zarr.open_array(out / "if.zarr", mode="r")[:])
-
-
-def test_noise_has_the_power_that_is_asked_for(tmp_path: Path) -> None:
-    quiet, echo = run(tmp_path / "quiet", snr_db=math.inf)
-    noisy, samples = run(tmp_path / "noisy", snr_db=10.0)
-    assert quiet.summary["noise_power_m2"] == 0
-    assert noisy.summary["echo_power_m2"] == quiet.summary["echo_power_m2"]
-    assert noisy.summary["noise_power_m2"] == pytest.approx(noisy.summary["echo_power_m2"] / 10)
-    noise = samples - echo
+def test_noise_has_the_power_that_is_asked_for(kick: rt.Motion, small: rt.Radar) -> None:
+    quiet = rt.simulate(kick, small, **SHORT, snr_db=math.inf)
+    noisy = rt.simulate(kick, small, **SHORT, snr_db=10.0)
+    assert quiet.noise_power_m2 == 0
+    assert noisy.link_budget.power == quiet.link_budget.power
+    assert noisy.noise_power_m2 == pytest.approx(noisy.link_budget.power / 10)
+    echo = quiet.samples.values
+    noise = noisy.samples.values - echo
     # |n|^2 of a complex Gaussian has the standard deviation of its mean: five of them, and
     # float32's rounding.
     found = float(np.mean(np.abs(noise) ** 2))
-    assert found == pytest.approx(
-        noisy.summary["noise_power_m2"], rel=5 / math.sqrt(noise.size) + 1e-5
-    )
+    assert found == pytest.approx(noisy.noise_power_m2, rel=5 / math.sqrt(noise.size) + 1e-5)
     # The IF's power is the sum of the echoes' but for interference between 21 parts, twice here.
-    assert 1 / 4 < np.mean(np.abs(echo) ** 2) / quiet.summary["echo_power_m2"] < 4
+    assert 1 / 4 < np.mean(np.abs(echo) ** 2) / quiet.link_budget.power < 4
 
 
-def test_only_the_noise_depends_on_the_seed(tmp_path: Path) -> None:
-    _, first = run(tmp_path / "a", seed=1)
-    _, again = run(tmp_path / "b", seed=1)
-    _, other = run(tmp_path / "c", seed=2)
+def test_only_the_noise_depends_on_the_seed(kick: rt.Motion, small: rt.Radar) -> None:
+    first, again, other = (
+        rt.simulate(kick, small, **SHORT, seed=seed).samples.values for seed in (1, 1, 2)
+    )
     np.testing.assert_array_equal(first, again)
     assert not np.isclose(first, other).any(axis=None)
 
 
-def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:
+def test_a_longer_capture_begins_with_the_shorter_one(kick: rt.Motion, small: rt.Radar) -> None:
     # The interval's place depends on its length (its mean is at the origin), so the body does not
     # move here.
     still = rt.Motion(
         name="still",
-        joints=MOTION.joints,
-        parents=MOTION.parents,
-        offsets=MOTION.offsets,
-        root_positions=np.repeat(MOTION.root_positions[:1], 101, axis=0),
-        rotations=np.repeat(MOTION.rotations[:1], 101, axis=0),
+        joints=kick.joints,
+        parents=kick.parents,
+        offsets=kick.offsets,
+        root_positions=np.repeat(kick.root_positions[:1], 101, axis=0),
+        rotations=np.repeat(kick.rotations[:1], 101, axis=0),
         rate_hz=100.0,
     )
-    maps = []
-    for duration in (0.2, 0.3):
-        rt.run(
-            still,
-            RADAR,
-            out=tmp_path / "out",
-            fidelity="specular",
-            duration_s=duration,
-            snr_db=math.inf,
-        )
-        with h5py.File(tmp_path / "out" / "maps.h5") as file:
-            maps.append(file["range_doppler"][:])
+    maps = [
+        rt.run(still, small, fidelity="specular", duration_s=duration, snr_db=math.inf)
+        .maps["range_doppler"]
+        .values
+        for duration in (0.2, 0.3)
+    ]
     assert len(maps[1]) > len(maps[0]) > 3
     np.testing.assert_array_equal(maps[1][: len(maps[0])], maps[0])
 
 
-def test_without_spreading_the_echo_is_the_cross_section(tmp_path: Path) -> None:
-    with_loss, _ = run(tmp_path / "a")
-    without, _ = run(tmp_path / "b", spreading=False)
-    ratio = without.summary["echo_power_m2"] / with_loss.summary["echo_power_m2"]
-    assert (
-        4.0**4 < ratio < 4.3**4
-    )  # the radar is 4.1 m from the upright person, whose near side counts most
-
-
-def test_a_person_who_turns_is_another_echo(tmp_path: Path) -> None:
-    facing, _ = run(tmp_path / "a")
-    aside, _ = run(tmp_path / "b", heading_deg=90.0)
-    assert facing.summary["part_power_m2"]["left foot"] != pytest.approx(
-        aside.summary["part_power_m2"]["left foot"], rel=0.1
+def test_without_spreading_the_echo_is_the_cross_section(kick: rt.Motion, small: rt.Radar) -> None:
+    without, with_loss = (
+        rt.simulate(kick, small, **SHORT, spreading=spreading).link_budget.power
+        for spreading in (False, True)
     )
+    # The radar is 4.1 m from the upright person, whose near side counts most.
+    assert 4.0**4 < without / with_loss < 4.3**4
+
+
+def test_a_person_who_turns_is_another_echo(kick: rt.Motion, small: rt.Radar) -> None:
+    facing, aside = (
+        rt.simulate(kick, small, **SHORT, heading_deg=heading).link_budget.part_power
+        for heading in (0.0, 90.0)
+    )
+    assert facing["left foot"] != pytest.approx(aside["left foot"], rel=0.1)
 
 
 @pytest.mark.drawn
-def test_noise_alone_leaves_an_empty_cloud_and_says_so(tmp_path: Path) -> None:
+def test_noise_alone_leaves_an_empty_cloud_and_says_so(
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path
+) -> None:
     with pytest.warns(ValidityWarning, match="nothing was detected"):
-        result, _ = run(tmp_path / "out", snr_db=-90.0, pfa=1e-12)
+        result = rt.run(kick, small, out=tmp_path / "out", **SHORT, snr_db=-90.0, pfa=1e-12)
     assert result.points.shape == (0, 3)
     assert result.summary["rdt_points"] == 0
     assert (tmp_path / "out" / "cloud_rdt.png").exists()
 
 
-def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
-    result, _ = run(tmp_path / "out", snr_db=math.inf)
+def test_the_summary_is_json_that_anyone_reads(
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path
+) -> None:
+    result = rt.run(kick, small, out=tmp_path / "out", **SHORT, snr_db=math.inf)
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == result.summary
     # Nothing is traced in the closed form.
     assert result.summary["variant"] is None
@@ -130,13 +107,10 @@ def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
     assert sum(result.summary["stages"].values()) < result.summary["wall_s"]
 
 
-def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
-    result, _ = run(
-        tmp_path / "out",
-        seed=np.int64(3),
-        snr_db=np.int32(15),
-        duration_s=np.float32(0.25),
-        keep_all=np.True_,
+def test_scalars_of_numpy_do_as_well(kick: rt.Motion, small: rt.Radar, tmp_path: Path) -> None:
+    options: Any = {"duration_s": np.float32(0.25), "keep_all": np.True_, "seed": np.int64(3)}
+    result = rt.run(
+        kick, small, out=tmp_path / "out", fidelity="analytic", snr_db=np.int32(15), **options
     )
     assert result.summary["seed"] == 3
     assert {name: result.summary["parameters"][name] for name in ("snr_db", "keep_all")} == {
@@ -167,22 +141,24 @@ def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
     ],
 )
 def test_bad_values_are_refused_and_leave_nothing(
-    tmp_path: Path, options: dict[str, Any], says: str
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path, options: dict[str, Any], says: str
 ) -> None:
     with pytest.raises(InputError, match=says):
-        run(tmp_path / "out", **options)
+        rt.run(kick, small, out=tmp_path / "out", **{**SHORT, "save_if": True, **options})
     assert not (tmp_path / "out").exists()
 
 
-def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(tmp_path: Path) -> None:
+def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path
+) -> None:
     faint = dataclasses.replace(
-        RADAR, transmit_power_dbm=-200.0, noise_figure_db=100.0, tx_antenna=Antenna(gain_dbi=-100)
+        small, transmit_power_dbm=-200.0, noise_figure_db=100.0, tx_antenna=Antenna(gain_dbi=-100)
     )
     with pytest.raises(
         InputError, match="more than 200 dB above the echo; look at transmit_power_dbm"
     ):
         rt.run(
-            MOTION,
+            kick,
             faint,
             out=tmp_path / "out",
             fidelity="analytic",
@@ -192,10 +168,12 @@ def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(tmp_
     assert not (tmp_path / "out").exists()
 
 
-def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(tmp_path: Path) -> None:
-    rare = dataclasses.replace(RADAR, frame_hop_s=1e6)
+def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path
+) -> None:
+    rare = dataclasses.replace(small, frame_hop_s=1e6)
     result = rt.run(
-        MOTION, rare, out=tmp_path / "out", fidelity="analytic", duration_s=0.13, save_if=True
+        kick, rare, out=tmp_path / "out", fidelity="analytic", duration_s=0.13, save_if=True
     )
     assert result.summary["windows"] == 1
     array = zarr.open_array(tmp_path / "out" / "if.zarr", mode="r")
@@ -208,7 +186,7 @@ def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(tmp_path: 
     [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})],
 )
 def test_a_radar_without_a_line_has_no_angles_along_it(
-    lines: dict[str, int], there: set[str], tmp_path: Path
+    kick: rt.Motion, lines: dict[str, int], there: set[str], tmp_path: Path
 ) -> None:
     radar = rt.Radar(
         tx_z=0,
@@ -218,7 +196,7 @@ def test_a_radar_without_a_line_has_no_angles_along_it(
         frame_duration_s=0.05,
         **lines,
     )
-    rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
+    rt.run(kick, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
     with h5py.File(tmp_path / "maps.h5") as maps:
         assert {"range_azimuth", "range_elevation"} & set(maps) == there
     assert (tmp_path / "range_angle.png").exists() == bool(there)
@@ -226,7 +204,9 @@ def test_a_radar_without_a_line_has_no_angles_along_it(
     assert (tmp_path / "report.html").exists()
 
 
-def test_a_capture_shorter_than_the_spectrograms_window_has_none(tmp_path: Path) -> None:
+def test_a_capture_shorter_than_the_spectrograms_window_has_none(
+    kick: rt.Motion, tmp_path: Path
+) -> None:
     radar = rt.Radar(
         tx_y=2,
         tx_z=0,
@@ -236,7 +216,7 @@ def test_a_capture_shorter_than_the_spectrograms_window_has_none(tmp_path: Path)
         samples_per_chirp=128,
         frame_duration_s=0.05,
     )
-    rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)  # 100 cycles of 128
+    rt.run(kick, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)  # 100 cycles of 128
     with h5py.File(tmp_path / "maps.h5") as maps:
         assert maps["spectrogram"].shape == (0, 128)
     assert not (tmp_path / "spectrogram.png").exists()

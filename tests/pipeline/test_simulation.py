@@ -15,25 +15,16 @@ from rtradar.errors import InputError
 from rtradar.pipeline import memory
 from rtradar.settings import SimulationOptions
 
-RADAR = rt.Radar(
-    name="small",
-    tx_y=2,
-    tx_z=0,
-    rx_y=4,
-    rx_z=0,
-    chirp_duration_s=250e-6,
-    samples_per_chirp=128,
-    frame_duration_s=0.05,
-)
-MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 OPTIONS: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "snr_db": 10.0}
 
 
 @pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
-def test_samples_and_blocks_are_what_a_run_keeps(multiplexing: str, tmp_path: Path) -> None:
-    radar = dataclasses.replace(RADAR, multiplexing=multiplexing)
-    capture = rt.simulate(MOTION, radar, **OPTIONS)
-    rt.run(MOTION, radar, out=tmp_path / "out", save_if=True, **OPTIONS)
+def test_samples_and_blocks_are_what_a_run_keeps(
+    kick: rt.Motion, small: rt.Radar, multiplexing: str, tmp_path: Path
+) -> None:
+    radar = dataclasses.replace(small, multiplexing=multiplexing)
+    capture = rt.simulate(kick, radar, **OPTIONS)
+    rt.run(kick, radar, out=tmp_path / "out", save_if=True, **OPTIONS)
     kept = zarr.open_array(tmp_path / "out" / "if.zarr", mode="r")[:]
     assert capture.samples.dtype == np.complex64
     assert capture.samples.shape == capture.shape
@@ -43,25 +34,27 @@ def test_samples_and_blocks_are_what_a_run_keeps(multiplexing: str, tmp_path: Pa
     xr.testing.assert_identical(xr.concat(blocks, "chirp"), capture.samples)
 
 
-def test_samples_have_the_times_and_transmitters_of_their_chirps() -> None:
-    samples = rt.simulate(MOTION, RADAR, **OPTIONS).samples
+def test_samples_have_the_times_and_transmitters_of_their_chirps(
+    kick: rt.Motion, small: rt.Radar
+) -> None:
+    samples = rt.simulate(kick, small, **OPTIONS).samples
     assert samples.dims == ("chirp", "rx", "sample")
-    np.testing.assert_array_equal(samples.time, RADAR.chirp_times(len(samples)))
+    np.testing.assert_array_equal(samples.time, small.chirp_times(len(samples)))
     assert samples.tx[:5].values.tolist() == [0, 1, 0, 1, 0]
-    assert float(samples.fast_time[1]) == 1 / RADAR.sample_rate_hz
+    assert float(samples.fast_time[1]) == 1 / small.sample_rate_hz
     assert (samples.attrs["units"], samples.time.attrs["units"]) == ("m", "s")
 
 
 def test_samples_too_large_for_memory_are_refused_and_blocks_are_not(
-    monkeypatch: pytest.MonkeyPatch,
+    kick: rt.Motion, small: rt.Radar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e5)
-    capture = rt.simulate(MOTION, RADAR, **OPTIONS)
+    capture = rt.simulate(kick, small, **OPTIONS)
     with pytest.raises(InputError, match=r"IF samples of 0.23 s .* block by block, blocks\(\), or"):
         _ = capture.samples
     assert next(capture.blocks()).shape == (100, 4, 128)
 
 
-def test_a_simulation_says_what_it_will_give() -> None:
-    text = repr(rt.simulate(MOTION, RADAR, **OPTIONS))
+def test_a_simulation_says_what_it_will_give(kick: rt.Motion, small: rt.Radar) -> None:
+    text = repr(rt.simulate(kick, small, **OPTIONS))
     assert "samples: chirp 920, rx 4, sample 128" in text
