@@ -35,7 +35,8 @@ def matching_files(where: str, pattern: str, folder: Path) -> list[tuple[str, di
             f"{where}file = {brief(pattern)}: {_MOST_WILD} wildcards are allowed, "
             "one of them **; give fewer"
         )
-    parts = [part if part == "**" else re.sub(r"\*+", "*", part) for part in pattern.split("/")]
+    *folders, last = pattern.split("/")
+    parts = [part if part == "**" else _single(part) for part in folders] + [_single(last)]
     expression, found = _expression(parts), []
     for path in sorted(folder.glob(FIELD.sub("*", "/".join(parts)).replace("[", "[[]"))):
         name = path.relative_to(folder).as_posix()
@@ -73,7 +74,12 @@ def _expression(parts: list[str]) -> re.Pattern[str]:
         return "".join([fixed[0], *held, pieces[-1], fixed[-1]])
 
     folders = ["(?:[^/]+/)*" if part == "**" else f"{one(part)}/" for part in parts[:-1]]
-    return re.compile("".join(folders) + one(parts[-1].replace("**", "*")))
+    return re.compile("".join(folders) + one(parts[-1]))
+
+
+def _single(part: str) -> str:
+    """Return a name with one star where there are several, which mean the same."""
+    return re.sub(r"\*+", "*", part)
 
 
 def _is_file(folder: Path, name: str) -> bool:

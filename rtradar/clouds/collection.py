@@ -248,9 +248,9 @@ class Collection:
             If torch is missing, the kind is unknown or not kept, its arrays have several sizes, or
             the number of points is not positive.
         """
-        if kind not in KINDS:
+        if kind not in list(KINDS):  # whatever it is
             raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
-        if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+        if isinstance(points, bool) or not isinstance(points, int | np.integer) or points < 1:
             raise InputError(f"points = {brief(points)}; it must be a whole number from 1 on")
         try:
             from rtradar.clouds.torch_dataset import SampleDataset

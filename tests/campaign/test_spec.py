@@ -341,6 +341,8 @@ def test_patterns_find_recordings_subjects_and_activities(tmp_path: Path) -> Non
         ("**/{label}.bvh", "a/b/walk.bvh", {"label": "walk"}),
         ("a[1]*.bvh", "a[1]b.bvh", {}),
         ("a[1]*.bvh", "a1b.bvh", None),
+        ("r/**", "r/walk.bvh", {}),
+        ("r/**", "r/deep/walk.bvh", None),
     ],
 )
 def test_a_field_ends_where_the_text_behind_it_begins(

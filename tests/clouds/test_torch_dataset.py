@@ -86,6 +86,9 @@ def test_what_cannot_be_is_refused_in_one_line(
     collection = write_collection(tmp_path)
     with pytest.raises(InputError, match="kind = 'pictures' is unknown; allowed: clouds, spatial"):
         collection.torch("pictures")
+    with pytest.raises(InputError, match=r"kind = \[\] is unknown"):
+        collection.torch([])  # type: ignore[arg-type]
+    assert collection.torch(points=np.int64(3))[1][0].shape == (3, 3)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="points = 0; it must be a whole number from 1 on"):
         collection.torch(points=0)
     monkeypatch.delitem(sys.modules, "rtradar.clouds.torch_dataset")
