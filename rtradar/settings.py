@@ -166,6 +166,18 @@ class RunSettings:
         return listed | {"snr_db": "inf" if self.snr_db == math.inf else self.snr_db}
 
 
+def settings_of(caller: str, taken: type, options: Mapping[str, Any]) -> RunSettings:
+    """Return the settings that a function is given; InputError if one is none of those it takes.
+
+    ``taken`` is a class of options, such as `ProcessingOptions`.
+    """
+    for name in options:
+        if name not in taken.__annotations__:
+            allowed = ", ".join(taken.__annotations__)
+            raise InputError(f"{caller} has no option '{name}'; allowed: {allowed}")
+    return RunSettings(**options)
+
+
 def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
     if isinstance(snr_db, str):
         if snr_db != "physical":

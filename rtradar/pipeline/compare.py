@@ -28,7 +28,7 @@ from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings, check_fidelities
+from rtradar.settings import RunOptions, check_fidelities, settings_of
 from rtradar.system.output_folder import atomic_folder
 
 _MEASURES = (
@@ -130,7 +130,7 @@ def compare(
     check_fidelities(names)
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
-    settings = RunSettings(**options)
+    settings = settings_of("compare", RunOptions, options)
     kind = files_of_runs("compare.json", _FILES, list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}

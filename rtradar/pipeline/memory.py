@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rtradar.errors import InputError
@@ -37,11 +35,11 @@ def refuse_large_maps(motion: Motion, radar: Radar, settings: RunSettings) -> No
     interval_s = max(motion.duration_s - settings.start_s, 0.0)
     if settings.duration_s is not None:
         interval_s = min(interval_s, settings.duration_s)
-    n_bytes = bytes_of_maps(radar, math.floor(interval_s / radar.chirp_interval_s))
+    n_bytes = bytes_of_maps(radar, interval_s / radar.chirp_interval_s)
     refuse_large(f"maps of {interval_s:g} s of radar '{radar.name}'", n_bytes, IN_A_FOLDER)
 
 
-def bytes_of_maps(radar: Radar, n_chirps: int) -> float:
+def bytes_of_maps(radar: Radar, n_chirps: float) -> float:
     """Estimate the size of the maps of so many chirps [byte], without that of the spectrogram."""
     frames = max(n_chirps / radar.n_tx - radar.cycles_per_frame, 0) / radar.hop_cycles + 1
     steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S

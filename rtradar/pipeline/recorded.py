@@ -23,7 +23,7 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.settings import ProcessingOptions, RunSettings
+from rtradar.settings import ProcessingOptions, settings_of
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.output_folder import atomic_folder
 
@@ -88,7 +88,7 @@ def process_samples(
     >>> result.maps["spectrogram"].attrs["units"]
     'm2'
     """
-    settings = RunSettings(**options)
+    settings = settings_of("process_samples", ProcessingOptions, options)
     forget_peak_memory()
     started = time.perf_counter()
     blocks = _Blocks(samples, radar, in_memory=out is None)

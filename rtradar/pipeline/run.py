@@ -26,7 +26,7 @@ from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings
+from rtradar.settings import RunOptions, RunSettings, settings_of
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
 
@@ -88,7 +88,7 @@ def run(
     >>> result.summary["windows"], result.out
     (3, None)
     """
-    settings = RunSettings(**options)
+    settings = settings_of("run", RunOptions, options)
     if out is None:
         return _run_in_memory(motion, radar, scene or Scene(), settings)
     return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite, pictures)

@@ -18,7 +18,7 @@ from rtradar.pipeline.processing import block_chirps
 from rtradar.radar import Radar
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunSettings, SimulationOptions
+from rtradar.settings import SimulationOptions, settings_of
 from rtradar.signal.multiplexing import chirps_together
 
 if TYPE_CHECKING:
@@ -62,7 +62,8 @@ def simulate(
     >>> sum(len(block) for block in capture.blocks())
     2400
     """
-    return Simulation(prepare(motion, radar, scene or Scene(), RunSettings(**options)))
+    settings = settings_of("simulate", SimulationOptions, options)
+    return Simulation(prepare(motion, radar, scene or Scene(), settings))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -132,6 +132,17 @@ def test_samples_that_are_none_of_the_radar_are_refused_and_leave_nothing(
     assert not list(tmp_path.iterdir())
 
 
+def test_options_of_another_function_are_refused(
+    kick: rt.Motion, small: rt.Radar, samples: xr.DataArray
+) -> None:
+    with pytest.raises(InputError, match="process_samples has no option 'snr_db'; allowed: seed"):
+        rt.process_samples(samples, small, snr_db=10.0)  # type: ignore[call-arg]
+    with pytest.raises(InputError, match="simulate has no option 'pfa'; allowed: seed, fidelity"):
+        rt.simulate(kick, small, pfa=1e-4)  # type: ignore[call-arg]
+    with pytest.raises(InputError, match="run has no option 'fidelty'"):
+        rt.run(kick, small, fidelty="analytic")  # type: ignore[call-arg]
+
+
 def test_maps_too_large_for_memory_are_refused(
     small: rt.Radar, samples: xr.DataArray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
