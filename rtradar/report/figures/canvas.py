@@ -154,11 +154,12 @@ def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArra
 
 
 def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any) -> None:
-    """Put a colour bar beside axes that are dressed, with this label, as high as they are."""
+    """Put a colour bar beside axes that are dressed, with this label.
+
+    In a figure whose axes have equal scales, it is as high as they are if ``compressed`` is its
+    layout.
+    """
     figure: Any = axes[0].get_figure(root=True)
-    if axes[0].get_aspect() != "auto" and figure.get_constrained_layout():
-        # Equal scales make axes smaller than the room that the layout gives them, not so the bar.
-        figure.set_layout_engine("compressed")
     options = {"extend": "min" if isinstance(image, AxesImage) else "neither"} | options
     bounds = [one.get_position(original=True) for one in axes]
     height = max(one.y1 for one in bounds) - min(one.y0 for one in bounds)

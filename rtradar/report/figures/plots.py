@@ -215,12 +215,7 @@ class Plots:
         InputError
             If the radar measures no angle.
         """
-        names = self._angles
-        if not names:
-            raise InputError(
-                f"range_angle: radar '{self.radar.name}' measures no angle; "
-                "it needs more receivers on a line"
-            )
+        names = self._measured("range_angle")
         if ax is not None or len(names) == 1:
             return self._range_angle(names[0], time_s, ax)
         upper, lower = self.new_figure(7.0).subplots(2, 1)
@@ -286,12 +281,7 @@ class Plots:
         InputError
             If the radar measures no angle.
         """
-        if not self._angles:
-            raise InputError(
-                f"spatial: radar '{self.radar.name}' measures no angle; "
-                "it needs more receivers on a line"
-            )
-        ups = [1 if name == "azimuth" else 2 for name in self._angles]
+        ups = [1 if name == "azimuth" else 2 for name in self._measured("spatial")]
         cloud = self._strongest
         every = math.ceil(max(len(cloud.points), 1) / _DOTS)
         points, velocity = cloud.points[::every], cloud.velocity[::every]
@@ -324,6 +314,7 @@ class Plots:
                 high = 4.3 * sum(ratios) + 0.7 * (len(ups) - 1)
                 options |= {"nrows": len(ups), "height_ratios": ratios}
             figure = self.new_figure(min(high, 10.0) + 1.9)
+            figure.set_layout_engine("compressed")  # for the colour bar
             panels = list(figure.subplots(**options).flat)
         for axes, up in zip(panels, ups, strict=True):
             dots = axes.scatter(points[:, 0], points[:, up], s=2.5, linewidths=0, **colours)
@@ -391,6 +382,14 @@ class Plots:
     @property
     def _angles(self) -> list[str]:
         return [name for name in ("azimuth", "elevation") if f"range_{name}" in self.maps]
+
+    def _measured(self, picture: str) -> list[str]:
+        if not self._angles:
+            raise InputError(
+                f"{picture}: radar '{self.radar.name}' measures no angle; "
+                "it needs more receivers on a line"
+            )
+        return self._angles
 
     @property
     def _x_label(self) -> str:
@@ -466,8 +465,7 @@ class Plots:
             axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=40
         )
         axes.set(xlabel=angle_label(name, self.radar), ylabel="Range [m]")
-        what = f"Range-{name}"
-        title = self._title(f"{what}, {when}", data) if heading else what
+        title = self._title(f"Range-{name}, {when}", data) if heading else f"Range-{name}"
         dress(axes, title=title, note=colours, grid=False)
         add_colour_bar(image, [axes], unit.label("detected cells"))
         return axes

@@ -261,6 +261,7 @@ def _draw_matrix(
 ) -> None:
     size = 2.6 + 0.85 * len(names)
     figure = new_figure(size, width_in=max(WIDTH_IN, size + 0.9))
+    figure.set_layout_engine("compressed")
     axes = figure.subplots()
     image = axes.imshow(percent, cmap="Blues", vmin=0, vmax=100)
     for row, line in enumerate(cells):
