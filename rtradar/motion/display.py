@@ -14,16 +14,17 @@ if TYPE_CHECKING:
 
 def rows(motion: Motion) -> dict[str, str]:
     """Return what the motion is, as texts with units by their labels."""
-    frames, roots = len(motion.root_positions), poses(motion, 5000)[1][:, 0]
+    joints = poses(motion, 5000)[1]
+    roots, height_m = joints[:, 0], float(np.median(np.ptp(joints[..., 2], axis=1)))
     low, high = roots.min(axis=0), roots.max(axis=0)
     path_m = float(np.linalg.norm(np.diff(roots[:, :2], axis=0), axis=1).sum())
     girth = "" if motion.girth == 1 else f", {motion.girth:.3g} times as thick as the nominal body"
     first, last = motion.joints[0], motion.joints[-1]
     return {
         "Duration": f"{motion.duration_s:.4g} s",
-        "Frames": f"{frames:,} at {motion.rate_hz:.5g} Hz",
+        "Frames": f"{len(motion.root_positions):,} at {motion.rate_hz:.5g} Hz",
         "Joints": f"{len(motion.joints)}, from {first} to {last}",
-        "Height": f"{height_m(motion):.3g} m from the lowest to the highest joint{girth}",
+        "Height": f"{height_m:.3g} m from the lowest to the highest joint{girth}",
         "Place": "root at "
         + ", ".join(
             f"{axis} {_span(least, most)}"
@@ -32,11 +33,6 @@ def rows(motion: Motion) -> dict[str, str]:
         + " m",
         "Path": f"{path_m:.3g} m over the floor",
     }
-
-
-def height_m(motion: Motion) -> float:
-    """Return the median height of the pose [m], from its lowest to its highest joint."""
-    return float(np.median(np.ptp(poses(motion, 200)[1][..., 2], axis=1)))
 
 
 def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

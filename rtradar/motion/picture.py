@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from rtradar.motion.display import poses
 from rtradar.motion.motion import Motion
@@ -34,7 +35,7 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     span = np.ptp(joints, axis=0)
     across = int(span[1] > span[0])  # the body is seen where it is wider
     if ax is not None:
-        handles = _draw(ax, motion, (across, 2), motion.name)
+        handles = _draw(ax, motion, path, (across, 2))
         ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
         dress(ax, title=motion.name)
         return ax
@@ -43,9 +44,10 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     heights = [max(scale * height, 0.9) for height in tall]
     figure = figure_for(sum(heights) + 2.0)
     side, above = figure.subplots(2, 1, height_ratios=heights)
-    title = "As the radar sees it" if across else "From the side"
-    handles = _draw(side, motion, (across, 2), title)
-    _draw(above, motion, (across, 1 - across), "From above")
+    handles = _draw(side, motion, path, (across, 2))
+    _draw(above, motion, path, (across, 1 - across))
+    dress(side, title="As the radar sees it" if across else "From the side")
+    dress(above, title="From above")
     theme = theme_of(side)
     style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
     write_heading(figure, f"Motion {motion.name}")
@@ -62,11 +64,15 @@ def picture_from_the_side(motion: Motion) -> bytes:
     return png_of(figure)
 
 
-def _draw(axes: Axes, motion: Motion, seen: tuple[int, int], title: str) -> list[Line2D]:
-    """Draw skeletons and the path of the root in two coordinates; return a line for each time."""
+def _draw(
+    axes: Axes, motion: Motion, path: NDArray[np.float64], seen: tuple[int, int]
+) -> list[Line2D]:
+    """Draw skeletons and the root's ``path`` in two coordinates; return a line for each time.
+
+    ``path`` (pose, joint, 3) are the joints [m], of which the first is the root.
+    """
     theme, view = theme_of(axes), list(seen)
     times, joints = poses(motion, _POSES)
-    path = poses(motion, _PATH_POSES)[1][:, 0, view]
     children = [joint for joint, parent in enumerate(motion.parents) if parent >= 0]
     parents = [motion.parents[joint] for joint in children]
     bones = np.stack([joints[:, parents], joints[:, children]], axis=2)[..., view]
@@ -75,7 +81,7 @@ def _draw(axes: Axes, motion: Motion, seen: tuple[int, int], title: str) -> list
     colours = colormaps["viridis"](np.linspace(*ends, len(times)))
     if seen[1] == 2:
         axes.axhline(0.0, color=theme.wall, linewidth=1)
-    axes.plot(*path.T, color=theme.faint, linewidth=1.2, linestyle="--")
+    axes.plot(*path[:, 0, view].T, color=theme.faint, linewidth=1.2, linestyle="--")
     for lines, colour in zip(bones, colours, strict=True):
         axes.add_collection(LineCollection(list(lines), colors=[colour], linewidths=1.8))
     axes.autoscale_view()
@@ -84,7 +90,6 @@ def _draw(axes: Axes, motion: Motion, seen: tuple[int, int], title: str) -> list
     if seen[0] == 1:  # y is at the left of the radar
         axes.invert_xaxis()
     axes.set_aspect("equal", adjustable="datalim")
-    dress(axes, title=title)
     return [
         Line2D([], [], color=colour, label=f"{time:.2f} s")
         for time, colour in zip(times, colours, strict=True)
