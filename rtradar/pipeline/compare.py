@@ -259,10 +259,8 @@ def _draw(
     unit = unit_of(spectrograms.values())
     levels = {name: unit.level(power) for name, power in spectrograms.items()}
     across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
-    label, seen = (
-        unit.label("one channel"),
-        above_floor(np.sum(list(spectrograms.values()), axis=0)),
-    )
+    seen = above_floor(np.sum(list(spectrograms.values()), axis=0))
+    label = unit.label("one channel")
     comparison.draw_maps(next(paths), levels, label, across, up, slow_title, seen)
     comparison.draw_rdt_clouds(
         next(paths), {name: result.points for name, result in results.items()}, title

@@ -21,6 +21,7 @@ from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.report.pages.html import grade, limits_table
+from rtradar.report.pages.inline import InlinePage
 from rtradar.report.pages.labels import quantity
 from rtradar.report.pages.run_page import write_report
 from rtradar.report.view.three_d import (
@@ -360,3 +361,13 @@ def test_measured_samples_have_no_body(tmp_path: Path) -> None:
         *("rdt", "limits", "parameters")
     ]
     assert "4.0 to 4.5 m" in page.text
+
+
+def test_an_inline_page_is_saved_whole_or_refused(tmp_path: Path) -> None:
+    page = InlinePage("<p>é</p>")
+    page.save(tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text(encoding="utf-8") == page.html
+    with pytest.raises(rt.InputError, match="cannot write"):
+        page.save(tmp_path)
+    with pytest.raises(rt.InputError, match="missing"):
+        page.save(tmp_path / "missing" / "page.html")

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 
+from rtradar.system.files import atomic_file
+
 
 @dataclass(frozen=True, repr=False)
 class InlinePage:
@@ -29,8 +31,14 @@ class InlinePage:
         ----------
         path : path
             File that is written.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written; an existing file is then unchanged.
         """
-        Path(path).write_text(self.html, encoding="utf-8")
+        with atomic_file(path) as file:
+            file.write(self.html.encode())
 
     def __repr__(self) -> str:
         return f"InlinePage of {len(self.html) / 1e6:.1f} MB; save(path) writes it"
