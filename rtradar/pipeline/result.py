@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -70,8 +70,8 @@ class Result:
     radar: Radar
     link_budget: LinkBudget | None = None
     out: Path | None = None
-    _in_memory: xr.Dataset | None = field(default=None)
-    _capture: Capture | None = field(default=None)
+    _in_memory: xr.Dataset | None = None
+    _capture: Capture | None = None
 
     @cached_property
     def maps(self) -> xr.Dataset:
