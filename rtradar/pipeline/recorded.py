@@ -23,7 +23,7 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.settings import ProcessingOptions, settings_of
+from rtradar.settings import ProcessingOptions, RunSettings, settings_of
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.output_folder import atomic_folder
 
@@ -103,23 +103,7 @@ def process_samples(
         summary = finished(summary)
     else:
         with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
-            clouds = _stream(blocks, processing, folder / "maps.h5")
-            with processing.stages.time("write"):
-                write_clouds(folder, clouds)
-            with processing.stages.time("pictures"):
-                pictures, _ = draw_found(folder, clouds, radar, settings)
-            summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-            with processing.stages.time("report"):
-                write_report(
-                    folder / "report.html",
-                    radar=radar,
-                    summary=summary,
-                    pictures=pictures,
-                    rdt_points=clouds.rdt.points,
-                    spatial=clouds.spatial,
-                )
-            summary |= cost(processing, blocks.n_chirps, started)
-            summary = finished(summary, folder)
+            clouds, summary = _write(folder, blocks, processing, settings, started)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
@@ -128,6 +112,30 @@ def process_samples(
         out=None if out is None else Path(out).absolute(),
         _in_memory=maps,
     )
+
+
+def _write(
+    folder: Path, blocks: _Blocks, processing: Processing, settings: RunSettings, started: float
+) -> tuple[Clouds, dict[str, Any]]:
+    """Write maps, clouds, pictures, report and summary; return the clouds and the summary."""
+    radar = processing.radar
+    clouds = _stream(blocks, processing, folder / "maps.h5")
+    with processing.stages.time("write"):
+        write_clouds(folder, clouds)
+    with processing.stages.time("pictures"):
+        pictures, _ = draw_found(folder, clouds, radar, settings)
+    summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
+    with processing.stages.time("report"):
+        write_report(
+            folder / "report.html",
+            radar=radar,
+            summary=summary,
+            pictures=pictures,
+            rdt_points=clouds.rdt.points,
+            spatial=clouds.spatial,
+        )
+    summary |= cost(processing, blocks.n_chirps, started)
+    return clouds, finished(summary, folder)
 
 
 def _stream(blocks: _Blocks, processing: Processing, file: Path | BinaryIO) -> Clouds:
