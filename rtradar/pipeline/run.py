@@ -154,7 +154,6 @@ def run_into(
         with capture.stages.time("report"):
             write_report(
                 folder / "report.html",
-                body=capture.body,
                 radar=capture.radar,
                 summary=summary,
                 pictures=drawn,

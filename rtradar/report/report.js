@@ -1,4 +1,4 @@
-// The page of a run: the linked views, or the moving figure alone where the maps are not given, and the clouds by themselves.
+// The page of a run: the linked views of body and maps, where there is a body, and the clouds by themselves.
 
 /** The radar beside its cloud, at coordinates named as the axes of the view. */
 const radarMark = (type, place) => ({
@@ -21,24 +21,8 @@ async function plan() {
   });
 }
 
-/** The moving figure, each part in the colour of its mean power where it is known. */
-async function figureAlone() {
-  const paint = figure.power_db
-    ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar(figure.power_label) }
-    : { color: "#4c8fd6" };
-  const [x, y, z] = figure.ranges;
-  const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? `<br>%{intensity:.1f} ${figure.power_unit}` : ""), ...pointsTraces()], {
-    aspectmode: "data", domain,
-    xaxis: metres("x [m]", x), yaxis: metres("y [m]", y), zaxis: metres("z [m]", z),
-    camera: { eye: { x: -0.45, y: -1.65, z: 0.5 }, center: { x: -0.12, y: 0, z: -0.1 } },
-  }, 1.9, themeFigure);
-  const points = node.data.length - 1;
-  await player(node, (frame) => move(node, placesAt(frame, points))).ready;
-}
-
 async function main() {
   if (data.echoes) await drawLinked();
-  else if (data.figure) await figureAlone();
   if (data.rdt.count && !data.echoes) {
     const points = floats(data.rdt.points);
     const [time, range, velocity] = [0, 1, 2].map((k) => component(points, k));

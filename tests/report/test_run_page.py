@@ -25,10 +25,10 @@ from rtradar.report.pages.inline import InlinePage
 from rtradar.report.pages.labels import quantity
 from rtradar.report.pages.run_page import write_report
 from rtradar.report.view.three_d import (
-    MOST_FRAMES,
     MOST_POINTS,
-    figure_data,
+    posed_figure,
     rdt_data,
+    semi_axis_poses,
     spatial_data,
 )
 
@@ -90,13 +90,13 @@ def summary() -> dict[str, Any]:
     }
 
 
-def write(path: Path, body: Body, **changes: Any) -> Elements:
+def write(path: Path, **changes: Any) -> Elements:
     given: dict[str, Any] = {
         "summary": summary(),
         "pictures": {},
         "rdt_points": np.array([[0.1, 4.0, -1.0]]),
     } | changes
-    write_report(path, body=body, radar=RADAR, **given)
+    write_report(path, radar=RADAR, **given)
     return Elements(path.read_text(encoding="utf-8"))
 
 
@@ -104,10 +104,10 @@ def floats(text: str) -> NDArray[np.float32]:
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-def test_no_text_from_outside_becomes_markup(tmp_path: Path, body: Body) -> None:
+def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
     image = tmp_path / "map.png"
     matplotlib.image.imsave(image, np.zeros((3, 5)))
-    page = write(tmp_path / "r.html", body, pictures={EVIL: image})
+    page = write(tmp_path / "r.html", pictures={EVIL: image})
     tags = [tag for tag, _ in page.elements]
     # The data, plotly.js and the viewer; the one picture.
     assert (tags.count("script"), tags.count("img")) == (3, 1)
@@ -117,10 +117,10 @@ def test_no_text_from_outside_becomes_markup(tmp_path: Path, body: Body) -> None
     assert "<2.4>" in page.text
 
 
-def test_refers_to_nothing_outside(tmp_path: Path, body: Body) -> None:
+def test_refers_to_nothing_outside(tmp_path: Path) -> None:
     image = tmp_path / "map.png"
     matplotlib.image.imsave(image, np.zeros((3, 5)))
-    page = write(tmp_path / "r.html", body, pictures={"A map": image})
+    page = write(tmp_path / "r.html", pictures={"A map": image})
     for tag, attributes in page.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
         if tag == "a":  # the list of contents
@@ -136,8 +136,8 @@ def test_refers_to_nothing_outside(tmp_path: Path, body: Body) -> None:
     assert (shown["width"], shown["height"]) == ("5", "3")
 
 
-def test_the_policy_allows_these_scripts_alone(tmp_path: Path, body: Body) -> None:
-    page = write(tmp_path / "r.html", body)
+def test_the_policy_allows_these_scripts_alone(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html")
     policy = next(
         a["content"] or ""
         for t, a in page.elements
@@ -153,8 +153,8 @@ def test_the_policy_allows_these_scripts_alone(tmp_path: Path, body: Body) -> No
     assert rules["script-src"] == expected
 
 
-def test_shows_the_numbers_that_it_was_given(tmp_path: Path, body: Body) -> None:
-    page = write(tmp_path / "r.html", body)
+def test_shows_the_numbers_that_it_was_given(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html")
     text = re.sub(r"\s+", " ", page.text)
     for shown in (
         "12.5% of the echo power from",
@@ -169,24 +169,29 @@ def test_shows_the_numbers_that_it_was_given(tmp_path: Path, body: Body) -> None
         assert shown in text, shown
 
 
-def test_says_so_where_there_is_nothing(tmp_path: Path, body: Body) -> None:
-    page = write(tmp_path / "r.html", body, summary={}, rdt_points=np.zeros((0, 3)))
+def test_says_so_where_there_is_nothing(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html", summary={}, rdt_points=np.zeros((0, 3)))
     assert "Nothing was detected" in page.text
     assert "Nothing came near the end" in page.text
     assert "scene-rdt" not in [attributes.get("id") for _, attributes in page.elements]
 
 
-def test_the_same_gives_the_same_file(tmp_path: Path, body: Body) -> None:
-    write(tmp_path / "a.html", body)
-    write(tmp_path / "b.html", body)
+def test_the_same_gives_the_same_file(tmp_path: Path) -> None:
+    write(tmp_path / "a.html")
+    write(tmp_path / "b.html")
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 
 
+def figure(body: Body) -> Any:
+    """Body and radar at 11 times in half a second, as a page holds them."""
+    times = np.arange(11) / 20
+    poses = semi_axis_poses(body, times)
+    return json.loads(json.dumps(posed_figure(body.part_names, times, poses, RADAR)))
+
+
 def test_poses_give_back_the_ellipsoids(body: Body) -> None:
-    data = json.loads(json.dumps(figure_data(body, RADAR)))
-    times = data["times"]
-    # 20 a second, both ends included.
-    np.testing.assert_allclose(times, np.arange(11) / 20, atol=1e-4)
+    data = figure(body)
+    np.testing.assert_allclose(data["times"], np.arange(11) / 20, atol=1e-4)
     poses = floats(data["poses"]).reshape(11, 21, 4, 3)
     sphere = floats(data["vertices"]).reshape(-1, 3)
     now = body.ellipsoids(0.25)
@@ -202,7 +207,7 @@ def test_poses_give_back_the_ellipsoids(body: Body) -> None:
 
 
 def test_the_box_holds_body_and_radar(body: Body) -> None:
-    data = figure_data(body, RADAR)
+    data = figure(body)
     low, high = np.array(data["ranges"]).T
     sphere = floats(data["vertices"]).reshape(-1, 3)
     for pose in floats(data["poses"]).reshape(-1, 4, 3):
@@ -211,20 +216,6 @@ def test_the_box_holds_body_and_radar(body: Body) -> None:
         assert (vertices.min(axis=0) > low - [0, 0, 0.1]).all()
     for antennas in (RADAR.tx, RADAR.rx):
         assert ((antennas > low) & (antennas < high)).all()
-
-
-def test_long_recordings_have_fewer_poses() -> None:
-    long = Body.from_motion(place(rt.synthetic_motion("jumping_jack", seed=0, duration_s=25.0)))
-    data = figure_data(long, RADAR)
-    assert len(data["times"]) == MOST_FRAMES
-    assert data["times"][-1] == pytest.approx(long.duration_s, abs=1e-4)
-
-
-def test_colours_reach_30_db_below_the_strongest(body: Body) -> None:
-    power = dict.fromkeys(body.part_names, 0.0) | {"head": 1e-3, "neck": 1e-4}
-    shown = dict(zip(body.part_names, figure_data(body, RADAR, power)["power_db"], strict=True))
-    assert (shown["head"], shown["neck"], shown["left foot"]) == (0.0, -10.0, -30.0)
-    assert figure_data(body, RADAR, dict.fromkeys(body.part_names, 0.0))["power_db"] is None
 
 
 def test_large_clouds_are_thinned_and_counted() -> None:
@@ -262,11 +253,11 @@ def test_refuses_what_is_no_cloud(points: NDArray[np.float64], said: str) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_refuses_what_is_no_png(tmp_path: Path, body: Body) -> None:
+def test_refuses_what_is_no_png(tmp_path: Path) -> None:
     (tmp_path / "x.png").write_bytes(b"GIF89a")
     for name, said in (("x.png", "no PNG"), ("y.png", "No such file")):
         with pytest.raises(rt.InputError, match=said):
-            write(tmp_path / "r.html", body, pictures={"A map": tmp_path / name})
+            write(tmp_path / "r.html", pictures={"A map": tmp_path / name})
 
 
 @pytest.mark.parametrize(
@@ -319,7 +310,7 @@ def test_a_limit_is_a_warning_where_it_matters(share: float, kind: str) -> None:
     assert grade({"name": "beyond_range", "share": share, "message": "m"}) == kind
 
 
-def test_sections_come_in_order_and_are_linked(tmp_path: Path, body: Body) -> None:
+def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
     image = tmp_path / "map.png"
     matplotlib.image.imsave(image, np.zeros((3, 5)))
     ghost = {"path": "body > left", "range_m": 5.25, "velocity_mps": -1.5, "azimuth_deg": 20.0}

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body import Body
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.fitting import central_limits
@@ -20,19 +19,13 @@ from rtradar.report.pages.html import mapping_table, picture, table, write_page
 from rtradar.report.pages.labels import grouped, minus, with_unit
 from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
 from rtradar.report.view.run_view import RunView, linked_views, view_data
-from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
+from rtradar.report.view.three_d import rdt_data, spatial_data
 
 MOST_STEPS = 100
 """Largest number of moments that the linked views of the page show."""
 
 _STEPS_HZ = 20.0
 
-_FIGURE_ALONE = f"""<div class="scene tall" id="scene-figure"></div>
-{html.player()}
-<p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone.
-Drag to turn, scroll to come nearer. World axes: x from the radar to the person, y to the left seen
-from the radar, z up.</p>
-"""
 _MORE_VIEWS = """<p class="note">The same for every frame, on a page of its own:
 <code>rtradar view DIR</code>, where DIR is the folder of this page.</p>"""
 
@@ -44,7 +37,6 @@ def write_report(
     summary: Mapping[str, Any],
     pictures: Mapping[str, Path],
     rdt_points: ArrayLike,
-    body: Body | None = None,
     spatial: SpatialCloud | None = None,
     run_view: RunView | None = None,
 ) -> None:
@@ -65,13 +57,11 @@ def write_report(
         PNG files in the order of the page.
     rdt_points : (point, 3)
         Time [s], range [m] and velocity [m/s] of each point.
-    body : Body, optional
-        Body at its position before the radar, shown alone where there is no ``run_view``. Without
-        both, as for measured samples, the page has no moving figure.
     spatial : SpatialCloud, optional
         Spatial cloud, shown as a whole.
     run_view : RunView, optional
         Data of the views that one slider moves, which the page shows at up to `MOST_STEPS` moments.
+        Without it, as for samples that were measured, the page has no moving body.
 
     Raises
     ------
@@ -88,11 +78,6 @@ def write_report(
         run_view = run_view.thinned(MOST_STEPS, _STEPS_HZ)
         data |= view_data(run_view) | {"name": Path(path).stem}
         scripts += ["figure.js", "linked.js"]
-    elif body is not None:
-        spreading = bool(parameters.get("spreading", True))
-        power = summary.get("part_power_m2")
-        data["figure"] = figure_data(body, radar, power, spreading=spreading)
-        scripts.append("figure.js")
     sections = _sections(summary, radar, data, pictures, run_view)
     links = {name: title for name, title, _ in sections}
     fidelity, scene = (str(summary.get("fidelity", "")), str(parameters.get("scene", "")))
@@ -130,9 +115,7 @@ def _sections(
     if run_view is not None:
         text = linked_views(run_view) + _MORE_VIEWS
         sections.append(("figure", "The moving body, its echoes and its maps", (text,)))
-    elif "figure" in data:
-        sections.append(("figure", "The recording before the radar", (_FIGURE_ALONE,)))
-    if run_view is None:
+    else:
         sections.append(("rdt", "Range-Doppler-time cloud", (_rdt(data),)))
     if "spatial" in data:
         sections.append(("spatial", "Spatial cloud", (_spatial(data["spatial"]),)))

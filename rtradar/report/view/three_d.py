@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,47 +14,13 @@ from rtradar.body import Body, unit_sphere
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import field_unit
 from rtradar.report.figures.fitting import place_limits
-
-FRAME_RATE_HZ = 20.0
-"""Rate of the poses of the moving figure [Hz]."""
-
-MOST_FRAMES = 400
-"""Largest number of poses, 20 s at the full rate; longer recordings have a lower rate."""
 
 MOST_POINTS = 20_000
 """Largest number of points of a cloud that a browser still rotates smoothly."""
 
 _SUBDIVISIONS = 2
-_DYNAMIC_RANGE_DB = 30.0
 _MARGIN_M = 0.4
-
-
-def figure_data(
-    body: Body,
-    radar: Radar,
-    part_power_m2: Mapping[str, float] | None = None,
-    *,
-    spreading: bool = True,
-) -> dict[str, Any]:
-    """Return the recording as poses of ellipsoids, with the radar, as plain values for JSON.
-
-    To those of `posed_figure` are added, from the mean echo power of each part [m^2], ``power_db``
-    of each part, at most 30 dB below the strongest, or None, its ``power_label``, ``power_unit``.
-    """
-    intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
-    times = np.linspace(0.0, body.duration_s, intervals + 1)
-    figure = posed_figure(body.part_names, times, semi_axis_poses(body, times), radar)
-    power = np.array([(part_power_m2 or {}).get(part, 0.0) for part in body.part_names])
-    strongest = float(power.max())
-    unit = field_unit(radar, spreading=spreading, strongest_m2=strongest)
-    levels = unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10)))
-    return figure | {
-        "power_db": levels.round(2).tolist() if strongest > 0 else None,
-        "power_label": unit.label("mean of the part"),
-        "power_unit": unit.name,
-    }
 
 
 def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
