@@ -55,6 +55,10 @@ def test_at_rest(browser: Any, report: tuple[str, int]) -> None:
     )
     shown = "[...document.images].filter((image) => image.complete && image.naturalWidth > 0)"
     assert browser.evaluate(f"{shown}.length") == pictures
+    sections = browser.evaluate(
+        "[...document.querySelectorAll('section[id]')].map((one) => one.id)"
+    )
+    assert sections == ["figure", "spatial", "maps", "limits", "parameters", "cost"]
     for scheme in ("light", "dark"):
         browser.look(scheme)
         shade = browser.picture("scene-figure")[-1, 0].mean()
@@ -121,7 +125,8 @@ def test_playing(browser: Any, report: tuple[str, int]) -> None:
     browser.set("moment", wanted)
     browser.wait(f"{FIGURE}.dataset.frame === '{wanted}'")
     clock = browser.evaluate("document.getElementById('clock').textContent")
-    times = browser.evaluate("figure.times")
+    written = "JSON.parse(document.getElementById('report-data').textContent)"
+    times = browser.evaluate(f"{written}.figure.times")
     np.testing.assert_allclose(np.diff(times), 1 / 20, atol=1e-3)
     assert clock.startswith(f"{times[wanted]:.2f} / {times[-1]:.2f} s")
     assert turned("scene-rdt") > 15

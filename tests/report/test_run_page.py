@@ -327,10 +327,8 @@ def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
         },
         "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
     }
-    page = write(
-        tmp_path / "r.html", body, summary=summary() | {"room": room}, pictures={"A map": image}
-    )
-    names = ["figure", "rdt", "maps", "room", "limits", "parameters", "cost"]
+    page = write(tmp_path / "r.html", summary=summary() | {"room": room}, pictures={"A map": image})
+    names = ["rdt", "maps", "room", "limits", "parameters", "cost"]
     assert [a["id"] for tag, a in page.elements if tag == "section"] == names
     assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
     # R^4 times the power is 1 m^2.
