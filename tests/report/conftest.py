@@ -86,18 +86,24 @@ class Browser:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
 
-    def call(self, method: str, **params: object) -> dict[str, Any]:
+    def send(self, method: str, **params: object) -> int:
+        """Ask for something without waiting until it is done."""
         self._last += 1
         message = {"id": self._last, "method": method, "params": params} | (
             {"sessionId": self._session} if self._session else {}
         )
         os.write(self._commands, json.dumps(message).encode() + b"\0")
+        return self._last
+
+    def call(self, method: str, **params: object) -> dict[str, Any]:
+        wanted = self.send(method, **params)
         while True:
             answer = self._next()
-            if answer.get("id") == self._last:
+            if answer.get("id") == wanted:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return dict(answer["result"])
-            self.events.append(answer)
+            if "method" in answer:  # what was sent without waiting is answered here
+                self.events.append(answer)
 
     def _next(self) -> dict[str, Any]:
         while b"\0" not in self._buffer:
