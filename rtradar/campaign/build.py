@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tqdm import tqdm
 
 from rtradar import __version__
-from rtradar.campaign.cluster import dask_client
+from rtradar.campaign.cluster import dask_client, refuse_in_worker
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.sample_files import check_size, is_whole, sample_path, write_sample
@@ -104,6 +104,7 @@ def build_dataset(
     CampaignError
         If workers or their scheduler were lost.
     """
+    refuse_in_worker()
     plans = plan_samples(read_spec(spec))
     folder = out.resolve()
     try:

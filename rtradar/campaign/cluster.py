@@ -79,16 +79,29 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         silent = (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker")
         os.environ["PYTHONWARNINGS"] = ",".join(filter(None, silent))
         with _interrupts_blocked():
-            local = LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                memory_limit=0,  # a worker paused for lack of memory would never report it
-                dashboard_address="127.0.0.1:0",
-                silence_logs=logging.CRITICAL,
-            )
+            try:
+                local = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=True,
+                    memory_limit=0,  # a worker paused for lack of memory would never report it
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+            except RuntimeError:
+                raise InputError(
+                    "the workers of the data set did not start; in a script, which they import, "
+                    "put what builds it under: if __name__ == '__main__':"
+                ) from None
         with local as cluster, Client(cluster, set_as_default=False) as client:
             yield client
+
+
+def refuse_in_worker() -> None:
+    """Exit where a worker imports the user's script, which would build there once more."""
+    imported = sys.modules.get("__mp_main__")
+    if imported is not None and imported is not sys.modules["__main__"]:
+        raise SystemExit(1)
 
 
 @contextmanager

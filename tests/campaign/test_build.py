@@ -359,3 +359,21 @@ def test_a_scheduler_that_is_lost_is_said_in_one_line(tmp_path: Path) -> None:
     finally:
         scheduler.kill()
         scheduler.wait()
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
+    """Workers import the script, and would build there once more."""
+    spec = '[windows]\nduration_s = 0.2\n[each]\nradar = ["paper-12ghz"]\nscene = ["free-space"]\n'
+    spec += 'fidelity = ["analytic"]\n[[synthetic]]\nlabel = "walk"\ncount = 1\n'
+    (tmp_path / "spec.toml").write_text(spec)
+    script = tmp_path / "script.py"
+    script.write_text(
+        "from pathlib import Path\nfrom rtradar.campaign import build_dataset\n"
+        f"here = Path({str(tmp_path)!r})\n"
+        "build_dataset(here / 'spec.toml', here / 'out', workers=1)\n"
+    )
+    ended = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+    said = ended.stderr.splitlines()
+    assert ended.returncode == 1
+    assert "put what builds it under: if __name__ == '__main__':" in said[-1]
+    assert sum(line.startswith("Traceback") for line in said) == 1  # of the script itself

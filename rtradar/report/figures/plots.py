@@ -33,6 +33,7 @@ from rtradar.report.figures.fitting import (
     place_limits,
 )
 from rtradar.report.figures.maps import angle_label, angle_view, rdt_points, thinned
+from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
 
 if TYPE_CHECKING:
@@ -361,11 +362,8 @@ class Plots:
             frame = int(self._found.moving.argmax())
             return frame, f"window of most energy, at {times[frame]:.2f} s"
         half = self.radar.frame_duration_s / 2
-        if not times[0] - half <= time_s <= times[-1] + half:
-            raise InputError(
-                f"time_s = {time_s}; the frames are from {times[0]:.3f} to {times[-1]:.3f} s"
-            )
-        frame = int(np.abs(times - time_s).argmin())
+        wanted_s = check_number("plot", "time_s", time_s, times[0] - half, times[-1] + half)
+        frame = int(np.abs(times - wanted_s).argmin())
         return frame, f"window at {times[frame]:.2f} s"
 
     # -- what the pictures share -------------------------------------------------------------------
