@@ -92,7 +92,10 @@ DATA_SET_KEYS = {
     },
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {
-        "label": ("`walk`, `kick`, `punch` or `jumping_jack`; each at most once", "must be given"),
+        "label": (
+            "`walk`, `kick`, `punch`, `jumping_jack` or `stand`; each at most once",
+            "must be given",
+        ),
         "count": ("number of takes; `count` or `seeds` is needed", ""),
         "seeds": ("list of the seeds of the takes", ""),
         "subjects": (

@@ -131,7 +131,7 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "motion",
         "MOTION",
-        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch or :jumping_jack",
+        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch, :jumping_jack or :stand",
     )
     command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
     command.option(

@@ -189,7 +189,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (SMALL.replace("count = 3", 'seeds = ["a"]'), "seeds = 'a'; it must be a whole number"),
         (
             SMALL.replace("walk", "dance"),
-            "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack",
+            "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack, stand",
         ),
         (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' is given twice"),
         (

@@ -144,7 +144,7 @@ def test_a_file_is_closed_when_an_error_is_told(asf_files: tuple[Path, Path], na
         pytest.fail("no error")
 
 
-@pytest.mark.parametrize("activity", ["kick", "punch", "jumping_jack"])
+@pytest.mark.parametrize("activity", ["kick", "punch", "jumping_jack", "stand"])
 def test_a_short_take_is_the_beginning_of_a_long_one(activity: str) -> None:
     short, long = (synthetic_motion(activity, seed=5, duration_s=seconds) for seconds in (0.6, 3.0))
     arms = [

@@ -1,4 +1,4 @@
-"""Synthetic actors: a person of any size walks, kicks, punches or does jumping jacks."""
+"""Synthetic actors: a person of any size walks, kicks, punches, does jumping jacks or stands."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from rtradar.motion.synthetic.figure import (
     rotations,
 )
 from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.stance import stand
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
 
@@ -38,6 +39,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "kick": _repeating(kick),
     "punch": _repeating(punch),
     "jumping_jack": jumping_jack,
+    "stand": _repeating(stand),
 }
 """Activities of the actors, by name."""
 
@@ -71,11 +73,12 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
 
     Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
-    turns round within 1.5 m of the middle. The others repeat with short rests.
+    turns round within 1.5 m of the middle. Who stands sways by millimetres
+    (`rtradar.motion.synthetic.stance`). The others repeat with short rests.
 
     Parameters
     ----------
-    activity : {"walk", "kick", "punch", "jumping_jack"}
+    activity : {"walk", "kick", "punch", "jumping_jack", "stand"}
         What the person does.
     seed : int
         Number of the subject, which has its own phase, and a few percent of tempo, amplitude and
@@ -90,8 +93,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         - ``tempo``: speed of the movement; 1 is a walk of about 1.2 m/s.
         - ``side``: side of the leg or hand that strikes, or of the foot that steps first, "left" or
           "right"; left.
-        - ``amplitude``: factor of step length, kick height, extension of the arm and width of the
-          jumps; 1.
+        - ``amplitude``: factor of step length, kick height, extension of the arm, width of the
+          jumps and sway; 1.
         - ``rate_hz``: number of frames per second of the result [Hz]; 120.
         - ``take``: number of the take; another take of the same subject begins elsewhere in the
           movement; 0.

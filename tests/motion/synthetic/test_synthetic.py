@@ -214,6 +214,29 @@ def test_jumping_jack_flies_freely(seed: int) -> None:
     assert 3.5 < speeds(motion, "l_hand").max() < 7.5
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_who_stands_sways_by_millimetres(seed: int) -> None:
+    """Winter et al. 1998: an inverted pendulum; Prieto et al. 1996: 4 and 2 mm, slowly."""
+    motion = synthetic_motion("stand", seed, duration_s=200.0, rate_hz=30.0)
+    root, head = (motion.positions[:, NODE(node)] * 1e3 for node in ("root", "head"))
+    forward, sideways, _ = root.std(axis=0)
+    assert 3.0 < forward < 5.0
+    assert 1.3 < sideways < 2.7
+    # The head, nearly twice as high, sways with it.
+    assert np.corrcoef(root[:, 0], head[:, 0])[0, 1] > 0.999
+    assert 1.4 < head[:, 0].std() / forward < 2.0
+    power = np.abs(np.fft.rfft(np.hanning(len(root)) * (root[:, 0] - root[:, 0].mean()))) ** 2
+    frequency = np.fft.rfftfreq(len(root), 1 / motion.rate_hz)
+    slow = power[frequency < 0.5].sum() / power.sum()
+    assert 0.9 < slow < 0.999
+    assert max(speeds(motion, "l_toe").max(), speeds(motion, "r_toe").max()) < 1e-6
+    # Straight legs and hanging arms.
+    height = motion.positions.mean(axis=0)[:, 2]
+    assert height[NODE("l_wrist")] < height[NODE("l_hip")]
+    leg = motion.positions[:, NODE("l_hip")] - motion.positions[:, NODE("l_ankle")]
+    assert np.linalg.norm(leg, axis=1).min() > 0.99 * 0.491 * 1.75
+
+
 def test_seed_is_the_subject() -> None:
     first, again, other = (synthetic_motion("walk", seed).positions for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
