@@ -33,7 +33,7 @@ FIRST_PAGE = {
     "Motion": ("load_motion", "synthetic_motion", "Motion"),
     "Radar": ("Radar", "Antenna"),
     "Scene": ("Scene",),
-    "Run": ("run", "simulate", "process_samples", "compare", "RunSettings"),
+    "Run": ("run", "simulate", "process_samples", "compare", "RunSettings", "Breathing"),
     "Results": ("Result", "Simulation", "Comparison"),
     "Pieces of a run": ("Body", "Ellipsoids", "Echoes", "scattering_length"),
     "Extensions": ("register_reader", "register_radar", "register_model", "register_detector"),

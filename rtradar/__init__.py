@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rtradar.radar import Radar, register_radar
     from rtradar.scatter import register_model, scattering_length
     from rtradar.scene import Scene
-    from rtradar.settings import RunSettings
+    from rtradar.settings import Breathing, RunSettings
 
 __version__ = "0.2.0"
 
@@ -50,7 +50,7 @@ _NAMES = {
     "radar": "Radar register_radar",
     "scatter": "register_model scattering_length",
     "scene": "Scene",
-    "settings": "RunSettings",
+    "settings": "Breathing RunSettings",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = ("classify", "exchange", "process", "rcs", "signal")
@@ -59,6 +59,7 @@ __all__ = [
     "Antenna",
     "BackendError",
     "Body",
+    "Breathing",
     "Collection",
     "Comparison",
     "Echoes",

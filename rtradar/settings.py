@@ -19,6 +19,46 @@ MAX_SNR_DB = 200.0
 """The largest ratio of echo and noise power, either way [dB]: float32 samples hold no more."""
 
 
+@dataclass(frozen=True)
+class Breathing:
+    """Breathing of a person: the chest moves forward and back as a sine of time.
+
+    The front of the chest moves by ``amplitude_mm * sin(2 pi rate_hz t + phase)``, with t from the
+    start of the interval that is simulated. In quiet breathing the chest walls of adults move by 4
+    to 12 mm from end to end (A. De Groote et al., Chest wall motion during tidal breathing, J.
+    Appl. Physiol. 83 (1997) 1531-1537), an amplitude of 2 to 6 mm, and less under clothes or in
+    shallow breath, 12 to 20 times a minute at rest, 0.2 to 0.33 Hz, and faster after exercise.
+
+    Parameters
+    ----------
+    amplitude_mm : float
+        Amplitude of the front of the chest, half of its way from end to end [mm], 0 to 50.
+    rate_hz : float
+        Breaths per second [Hz], 0 to 5.
+    phase_deg : float
+        Phase at the start [degree]; at 0 the person begins to breathe in.
+
+    Raises
+    ------
+    InputError
+        Where a value is out of range.
+    """
+
+    amplitude_mm: float
+    rate_hz: float
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, most in (("amplitude_mm", 50.0), ("rate_hz", 5.0)):
+            if not 0 <= getattr(self, name) <= most:
+                raise InputError(
+                    f"breathing: {name} = {getattr(self, name)}; allowed is 0 to {most:g} "
+                    "(--breathing AMPLITUDE_MM,RATE_HZ)"
+                )
+        if not math.isfinite(self.phase_deg):
+            raise InputError(f"breathing: phase_deg = {self.phase_deg}; it must be finite")
+
+
 class _Seed(TypedDict, total=False):
     seed: int
 
@@ -35,6 +75,7 @@ class SimulationOptions(_Seed, total=False):
     spreading: bool
     model_options: Mapping[str, Any] | None
     body_material: str
+    breathing: Breathing | None
     order: int
     keep_all: bool
     noise_power_m2: float | None
@@ -94,6 +135,9 @@ class RunSettings:
         Filter that removes static clutter before Doppler. See `rtradar.process.clutter`.
     body_material : {"perfect-conductor", "skin"}
         Material of the person's surface.
+    breathing : Breathing, optional
+        Amplitude [mm] and rate [Hz] of the breath that moves the person's chest; without it the
+        person holds their breath.
     order : int
         Largest number of reflections at walls, floors and ceilings on the way of an echo, 0 to 3.
     keep_all : bool
@@ -127,6 +171,7 @@ class RunSettings:
     model_options: Mapping[str, Any] | None = field(default_factory=dict)
     clutter_removal: str = "none"
     body_material: str = "perfect-conductor"
+    breathing: Breathing | None = None
     order: int = 1
     keep_all: bool = False
     save_if: bool = False

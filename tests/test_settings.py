@@ -10,7 +10,7 @@ from typing import Any, get_type_hints
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.settings import RunOptions, RunSettings
+from rtradar.settings import Breathing, RunOptions, RunSettings
 
 
 def test_the_options_of_run_are_the_fields_of_its_settings() -> None:
@@ -34,6 +34,12 @@ def test_values_without_a_meaning_are_refused_in_one_line(
     with pytest.raises(InputError, match=message) as caught:
         RunSettings(**options)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("values", [(-1.0, 0.3), (51.0, 0.3), (1.0, 6.0), (math.nan, 0.3)])
+def test_a_breath_that_no_one_takes_is_refused(values: tuple[float, float]) -> None:
+    with pytest.raises(InputError, match=r"breathing: (amplitude_mm|rate_hz) = .* allowed is 0 to"):
+        Breathing(*values)
 
 
 def test_settings_cannot_be_changed_and_keep_a_copy_of_the_model_options() -> None:

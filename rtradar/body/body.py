@@ -14,6 +14,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.motion import pose_ellipsoids
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.settings import Breathing
 
 _SAME = 1e-4
 """Distance of two parts, relative to the least semi-axis, at which rays find the same surface."""
@@ -44,6 +45,10 @@ PART_NAMES: tuple[str, ...] = tuple(_PARTS[node][0] for node in NODES[1:])
 
 PART_RADII_M: tuple[float, ...] = tuple(_PARTS[node][1] for node in NODES[1:])
 """Semi-axes a = b of each part of a body of girth 1."""
+
+
+_CHEST = [PART_NAMES.index(f"{place} torso") for place in ("middle", "upper")]
+"""Parts that breath moves."""
 
 
 class Poses(NamedTuple):
@@ -157,6 +162,11 @@ class Body:
         On the 22 nodes of `rtradar.motion.skeleton.NODES`; `from_motion` takes any other.
     semi_axes : (part, 3) float64
         a, b across the bone and c along it [m].
+    breathing : Breathing, optional
+        Breath, which moves the upper and the middle torso forward and back, across the bone and the
+        line of the shoulders, by ``amplitude_mm * sin(2 pi rate_hz t + phase_deg)``. The parts move
+        as a whole: of the front that is the motion of a chest wall; behind, where a real back
+        hardly moves, it is too much.
 
     Raises
     ------
@@ -166,6 +176,7 @@ class Body:
 
     motion: Motion
     semi_axes: NDArray[np.float64]
+    breathing: Breathing | None = None
 
     def __post_init__(self) -> None:
         if self.motion.joints != NODES:
@@ -186,7 +197,7 @@ class Body:
         object.__setattr__(self, "semi_axes", axes)
 
     @classmethod
-    def from_motion(cls, motion: Motion) -> Body:
+    def from_motion(cls, motion: Motion, breathing: Breathing | None = None) -> Body:
         """Put ellipsoids on a skeleton: c is half the bone, a = b are `PART_RADII_M`.
 
         Parameters
@@ -194,6 +205,8 @@ class Body:
         motion : Motion
             Motion of any known kind of skeleton (`rtradar.motion.skeleton.to_nodes`); its ``girth``
             multiplies the radii.
+        breathing : Breathing, optional
+            Breath of the person.
 
         Returns
         -------
@@ -207,7 +220,7 @@ class Body:
         nodes = to_nodes(motion)
         radii = np.array(PART_RADII_M) * nodes.girth
         lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
-        return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1))
+        return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1), breathing)
 
     @property
     def part_names(self) -> tuple[str, ...]:
@@ -243,6 +256,13 @@ class Body:
         centres, frames = np.empty(shape), np.empty((*shape, 3))
         parents = np.array(self.motion.parents)
         pose_ellipsoids(positions, quaternions, parents, self._rest_frames, centres, frames)
+        if self.breathing is not None:
+            left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
+            ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
+            ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
+            turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(times, np.float64)
+            breath = np.sin(turned + np.radians(self.breathing.phase_deg))
+            centres[:, _CHEST] += 1e-3 * self.breathing.amplitude_mm * breath[:, None, None] * ahead
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:

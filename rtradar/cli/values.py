@@ -11,7 +11,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from rtradar.errors import InputError
+
 if TYPE_CHECKING:
+    from rtradar.settings import Breathing
+
     # argparse gives it no public name.
     Subcommands = argparse._SubParsersAction["OneLineParser"]
 
@@ -163,6 +167,18 @@ def window(text: str) -> str | tuple[str, float]:
     """Read a window function: a name, or a name and its parameter."""
     name, colon, value = text.partition(":")
     return (name, number(value)) if colon else name
+
+
+@_named("amplitude [mm] and rate [Hz], such as 3,0.25")
+def breathing(text: str) -> Breathing:
+    """Read the amplitude [mm] and the rate [Hz] of a person's breath."""
+    from rtradar.settings import Breathing
+
+    amplitude_mm, rate_hz = (number(part) for part in text.split(","))
+    try:
+        return Breathing(amplitude_mm, rate_hz)
+    except InputError as wrong:
+        raise argparse.ArgumentTypeError(str(wrong)) from None
 
 
 @_named("number of seconds, not negative")

@@ -89,7 +89,8 @@ def _placed(motion: Motion, scene: Scene, settings: RunSettings) -> Body:
     start_s, duration_s = settings.start_s, settings.duration_s
     heading_deg = settings.heading_deg + scene.heading_deg
     placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg)
-    return Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
+    placed = placed.shifted([*scene.person_position_m, 0.0])
+    return Body.from_motion(placed, settings.breathing)
 
 
 def _frames(motion: Motion, radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:

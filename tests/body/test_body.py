@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from rtradar.body import PART_NAMES, Body, Ellipsoids
 from rtradar.errors import InputError
-from rtradar.motion import ACTIVITIES, synthetic_motion
+from rtradar.motion import ACTIVITIES, place, synthetic_motion
 from rtradar.motion.skeleton import NODES
+from rtradar.settings import Breathing
 
 RADII = {
     "hip": 0.07,
@@ -172,3 +173,23 @@ def _renamed(motion):  # type: ignore[no-untyped-def]
     import dataclasses
 
     return dataclasses.replace(motion, joints=tuple(f"x{k}" for k in range(len(NODES))))
+
+
+def test_breath_moves_the_front_of_the_chest_and_nothing_else() -> None:
+    motion = place(synthetic_motion("stand", duration_s=3.0), heading_deg=30.0)
+    breathing = Breathing(4.0, 0.4, phase_deg=20.0)
+    times = np.linspace(0.0, 3.0, 40)
+    still, poses = Body.from_motion(motion).at(times), Body.from_motion(motion, breathing).at(times)
+    moved = poses.centres - still.centres
+    chest = [PART_NAMES.index("upper torso"), PART_NAMES.index("middle torso")]
+    # Who stands faces -x, 30 degrees turned, and leans forward by 2.5 degrees.
+    lean = np.radians(2.5)
+    ahead = [-np.cos(np.pi / 6) * np.cos(lean), -np.sin(np.pi / 6) * np.cos(lean), -np.sin(lean)]
+    expected = 4e-3 * np.sin(2 * np.pi * 0.4 * times + np.radians(20.0))
+    for part in chest:
+        np.testing.assert_allclose(moved[:, part], expected[:, None] * ahead, atol=6e-5)
+        np.testing.assert_allclose(
+            np.linalg.norm(moved[:, part], axis=1), np.abs(expected), rtol=1e-9
+        )
+    assert not np.delete(moved, chest, axis=1).any()
+    np.testing.assert_array_equal(poses.frames, still.frames)

@@ -34,6 +34,7 @@ _LABELS = {
     "spreading": "Spreading loss over the path",
     "clutter_removal": "Static clutter removed",
     "body_material": "Material of the body",
+    "breathing": "Breathing",
     "order": "Most reflections off walls",
     "keep_all": "Echoes below the noise kept",
     "save_if": "IF samples saved",
