@@ -57,6 +57,8 @@ def test_defaults_of_the_page_for_beginners_are_those_of_the_settings() -> None:
             compared += 1
             if isinstance(default, bool):
                 assert text == ("on" if default else "off"), flag
+            elif default is None:
+                assert not text, flag
             else:
                 assert type(default)(text) == default, flag
     assert compared > 10
