@@ -263,6 +263,40 @@ def door() -> Mesh:
     )
 
 
+def door_leaf() -> Mesh:
+    """Leaf of a door, 0.9 by 2.0 m and 0.04 m thick; its hinge is the z axis, it lies along +y."""
+    return boxes(
+        [
+            (-0.02, 0.02, 0.0, 0.9, 0.0, 2.0),
+            (0.02, 0.06, 0.82, 0.84, 1.04, 1.06),
+            (0.06, 0.08, 0.71, 0.84, 1.04, 1.06),
+        ]
+    )
+
+
+def fan() -> Mesh:
+    """Three blades of 0.3 m on a hub that turns about the x axis, pitched by 20 degrees.
+
+    A blade is a plate 0.1 m wide and 4 mm thick, from 0.05 m to 0.3 m off the axis, and the hub a
+    drum of 12 sides: closed bodies that touch nowhere.
+    """
+    inner, outer, half, thick, pitch = 0.05, 0.3, 0.05, 0.002, np.radians(20.0)
+    blade, faces = boxes([(-thick, thick, -half, half, inner, outer)])
+    cosine, sine = np.round((np.cos(pitch), np.sin(pitch)), 12)
+    pitched = blade @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    parts = []
+    for third in range(3):
+        cosine, sine = np.round((np.cos(2 * np.pi * third / 3), np.sin(2 * np.pi * third / 3)), 12)
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+        parts.append((pitched @ turn.T, faces))
+    hub, hub_faces = turned([(0.0, -0.03), (0.04, -0.03), (0.04, 0.03), (0.0, 0.03)], 12)
+    parts.append((hub[:, [2, 0, 1]], hub_faces))
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    every = [own + start for (_, own), start in zip(parts, starts[:-1], strict=True)]
+    places = np.concatenate([vertices for vertices, _ in parts])
+    return np.round(places, 9), np.concatenate(every)
+
+
 def radiator() -> Mesh:
     """Radiator 1.0 m wide and 0.6 m high, 0.12 m above the floor; the wall is the plane x = 0."""
     ribs: list[Box] = [
@@ -308,6 +342,8 @@ MAKERS: dict[str, Callable[[], Mesh]] = {
     "desk": desk,
     "dihedral": dihedral,
     "door": door,
+    "door-leaf": door_leaf,
+    "fan": fan,
     "lamp": lamp,
     "radiator": radiator,
     "shelf": shelf,

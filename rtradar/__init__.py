@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
     from rtradar.scatter import register_model, scattering_length
-    from rtradar.scene import Scene
+    from rtradar.scene import FollowingPath, Object, Scene, Swinging, Turning
     from rtradar.settings import Breathing, RunSettings
 
 __version__ = "0.2.0"
@@ -49,7 +49,7 @@ _NAMES = {
     "process": "register_detector",
     "radar": "Radar register_radar",
     "scatter": "register_model scattering_length",
-    "scene": "Scene",
+    "scene": "FollowingPath Object Scene Swinging Turning",
     "settings": "Breathing RunSettings",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
@@ -65,13 +65,17 @@ __all__ = [
     "Echoes",
     "Ellipsoids",
     "ExtensionError",
+    "FollowingPath",
     "InputError",
     "Motion",
+    "Object",
     "Radar",
     "Result",
     "RunSettings",
     "Scene",
     "Simulation",
+    "Swinging",
+    "Turning",
     "ValidityWarning",
     "classify",
     "compare",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,11 @@ _MOST_ROWS = 9
 def brief_rows(scene: Scene) -> dict[str, str]:
     """Return the rows of a scene's ``repr``."""
     rows = room_rows(scene)
-    for kind, parts in (("Walls", scene.walls), ("Furniture", scene.furniture)):
+    kinds: list[tuple[str, Sequence[Wall | Furniture]]]
+    kinds = [("Walls", scene.walls), ("Furniture", scene.furniture)]
+    # Few scenes have objects: the others need not say so.
+    kinds += [("Objects", scene.objects)] if scene.objects else []
+    for kind, parts in kinds:
         rows[kind] = f"{len(parts)}: {_names(parts)}" if parts else "none"
     if scene.materials:
         rows["Materials"] = ", ".join(material.name for material in scene.materials)
@@ -34,13 +38,15 @@ def tables(scene: Scene) -> dict[str, dict[str, str]]:
         for wall in scene.walls
     }
     furniture = {piece.name: _piece(piece) for piece in scene.furniture}
+    objects = {piece.name: _piece(piece) for piece in scene.objects}
     found = {"": room_rows(scene)}
-    for kind, rows in (("Walls", walls), ("Furniture", furniture)):
+    for kind, rows in (("Walls", walls), ("Furniture", furniture), ("Objects", objects)):
+        count = len(rows)
         if len(rows) > _MOST_ROWS:
-            left_out = len(rows) - _MOST_ROWS
+            left_out = count - _MOST_ROWS
             rows = {**dict(list(rows.items())[:_MOST_ROWS]), "...": f"and {left_out} more"}
         if rows:
-            found[f"{kind} ({len(scene.walls if kind == 'Walls' else scene.furniture)})"] = rows
+            found[f"{kind} ({count})"] = rows
     return found
 
 

@@ -7,10 +7,10 @@ or of metal where ``sheet`` says that it is a thin sheet.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,7 +219,7 @@ def room_walls(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Furniture:
     """A mesh in a scene.
 
@@ -251,32 +251,35 @@ class Furniture:
     """
 
     name: str
-    mesh: str | Path
+    mesh: Any  # str or Path; an `Object` may have a mesh itself
     material: Material
+    _: KW_ONLY
     position_m: Vector
     yaw_deg: float = 0.0
     scale: float = 1.0
     metres_per_unit: float | None = None
     sheet: bool = False
 
+    _kind: ClassVar[str] = "furniture"
+
     def __post_init__(self) -> None:
-        check_text("furniture", "name", self.name)
-        where = f"furniture '{self.name}'"
+        check_text(self._kind, "name", self.name)
+        where = self._where
         position = check_vector(where, "position_m", self.position_m, 3)
         object.__setattr__(self, "position_m", position)
         _check(self, where, FURNITURE_LIMITS)
         if not isinstance(self.sheet, bool):
             raise InputError(f"{where}: sheet = {brief(self.sheet)}; it must be true or false")
-        if self._built_in:
-            if self.mesh not in mesh_names():
-                raise InputError(
-                    f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
-                    f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
-                )
+        if self._built_in and self.mesh not in mesh_names():
+            raise InputError(
+                f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
+                f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
+            )
+        if self._settled:
             if self.metres_per_unit is not None or self.sheet:
                 raise InputError(
                     f"{where}: metres_per_unit and sheet belong to a file of one's own; "
-                    f"'{self.mesh}' has both settled"
+                    f"{brief(self.mesh)} has both settled"
                 )
         elif self.metres_per_unit is None:
             raise InputError(
@@ -285,13 +288,28 @@ class Furniture:
             )
 
     @property
+    def _where(self) -> str:
+        return f"{self._kind} '{self.name}'"
+
+    @property
     def _built_in(self) -> bool:
         return isinstance(self.mesh, str) and not Path(self.mesh).suffix
+
+    @property
+    def _settled(self) -> bool:
+        """Whether the mesh itself says its unit, and whether it is a sheet."""
+        return self._built_in
 
     @property
     def path(self) -> Path:
         """File of the mesh."""
         return shipped_folder("meshes") / f"{self.mesh}.ply" if self._built_in else Path(self.mesh)
+
+    @property
+    def yaw(self) -> NDArray[np.float64]:
+        """Rotation (3, 3) about the vertical from the mesh's own axes to the world's."""
+        cosine, sine = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
+        return np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
 
     def triangles(self) -> Triangles:
         """Read the mesh, and move it to its position in the scene.
@@ -307,9 +325,15 @@ class Furniture:
             Where the file cannot be read or used, the mesh is open without being a sheet, or has an
             impossible size.
         """
-        where = f"furniture '{self.name}'"
-        read = read_mesh(self.path)
-        if not (read.closed or self.sheet or self._built_in):
+        own = self._own_triangles()
+        vertices = own.vertices @ self.yaw.T + np.array(self.position_m)
+        vertices.setflags(write=False)
+        return Triangles(vertices, own.faces, own.closed)
+
+    def _own_triangles(self) -> Triangles:
+        """Mesh in its own axes, scaled to metres, once it is checked."""
+        where, read = self._where, self._read()
+        if not (read.closed or self.sheet or self._settled):
             raise InputError(
                 f"{where}: mesh '{self.mesh}' is not closed; close its holes, or say sheet = true "
                 "if it is a thin sheet"
@@ -330,11 +354,10 @@ class Furniture:
                 f"{where}: its mesh measures {size:.3g} m; allowed are {SMALLEST_M:g} to "
                 f"{LARGEST_M:g} m: see to metres_per_unit and scale"
             )
-        cosine, sine = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
-        rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
-        vertices = vertices @ rotation.T + np.array(self.position_m)
-        vertices.setflags(write=False)
         return Triangles(vertices, read.faces, read.closed)
+
+    def _read(self) -> Triangles:
+        return read_mesh(self.path)
 
 
 def _check(thing: Any, where: str, limits: Limits) -> None:

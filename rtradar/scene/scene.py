@@ -17,6 +17,7 @@ from rtradar.radar import Radar
 from rtradar.scene import display
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
+from rtradar.scene.moving import Object, motion_of
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
 from rtradar.system.checks import (
     Table,
@@ -37,7 +38,7 @@ from rtradar.system.registries import scene_files
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Piece = TypeVar("Piece", Wall, Furniture)
+Piece = TypeVar("Piece", Wall, Furniture, Object)
 
 KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     table: (tuple(needed.split()), tuple(others.split()))
@@ -49,6 +50,11 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("a side of a room", "material thickness_m", "roughness_m"),
         ("[[walls]]", "name corner_m edge_u_m edge_v_m material thickness_m", "roughness_m"),
         ("[[furniture]]", "name mesh material position_m", "yaw_deg scale metres_per_unit sheet"),
+        (
+            "[[objects]]",
+            "name mesh material motion",
+            "position_m pivot_m yaw_deg scale metres_per_unit sheet",
+        ),
         ("[materials.NAME]", "source low_hz high_hz a", "b c d"),
     )
 }
@@ -74,6 +80,8 @@ class Scene:
         Walls of the scene; the floor and the ceiling are among them.
     furniture : tuple of Furniture
         Meshes in the room.
+    objects : tuple of Object
+        Rigid meshes that move.
     radar_position_m : tuple of float, optional
         Position of the radar in this scene, world [m]; its axes stay parallel to the world's. The
         radar keeps its own position where this is left out.
@@ -99,6 +107,7 @@ class Scene:
     description: str = "nothing but the person"
     walls: tuple[Wall, ...] = ()
     furniture: tuple[Furniture, ...] = ()
+    objects: tuple[Object, ...] = ()
     radar_position_m: Vector | None = None
     person_position_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0
@@ -108,9 +117,9 @@ class Scene:
             if not isinstance(getattr(self, key), str):
                 raise InputError(f"scene: {key} = {brief(getattr(self, key))}; it must be a string")
         where = f"scene '{self.name}'"
-        for key, kind in (("walls", Wall), ("furniture", Furniture)):
+        for key, kind in (("walls", Wall), ("furniture", Furniture), ("objects", Object)):
             pieces = tuple(getattr(self, key))
-            if not all(isinstance(piece, kind) for piece in pieces):
+            if not all(type(piece) is kind for piece in pieces):
                 raise InputError(f"{where}: {key} must be a tuple of {kind.__name__}")
             names = [piece.name for piece in pieces]
             twice = sorted({name for name in names if names.count(name) > 1})
@@ -177,7 +186,7 @@ class Scene:
         table = read_toml(path, "scene", "give a TOML file or the name of a scene")
         try:
             scene = cls(**_fields(table, path))
-            for piece in scene.furniture:
+            for piece in (*scene.furniture, *scene.objects):
                 piece.triangles()  # refuses a mesh that cannot be used
         except InputError as error:
             raise InputError(f"scene file '{path}': {error}") from None
@@ -211,12 +220,17 @@ class Scene:
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """Materials of the walls and the furniture, each once."""
+        """Materials of walls, furniture and objects, each once."""
         return tuple(dict.fromkeys(part.material for part in self._parts))
 
     @property
     def _parts(self) -> tuple[Wall | Furniture, ...]:
-        return *self.walls, *self.furniture
+        return *self.walls, *self.furniture, *self.objects
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is around the person: no wall, no furniture, and no object."""
+        return not self._parts
 
     def place(self, radar: Radar) -> Radar:
         """Move a radar to its position in this scene.
@@ -252,7 +266,7 @@ class Scene:
                     f"scene '{self.name}': the radar at {placed.position_m} m has antennas inside "
                     f"wall '{wall.name}'; move it"
                 )
-        for piece in self.furniture:
+        for piece in (*self.furniture, *self.objects):
             triangles = piece.triangles()
             low, high = triangles.vertices.min(axis=0), triangles.vertices.max(axis=0)
             # Only antennas near the box of the mesh are compared with every triangle.
@@ -281,7 +295,7 @@ def _named(name: str) -> Path:
 def _fields(table: Table, path: Path) -> dict[str, Any]:
     """Turn the table of the file at ``path`` into the fields of a `Scene`."""
     texts = KEYS["top"][1]
-    tables = ("radar", "person", "materials", "room", "walls", "furniture")
+    tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects")
     check_keys("", table, (), (*texts, *tables))
     for key in texts:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
@@ -293,6 +307,7 @@ def _fields(table: Table, path: Path) -> dict[str, Any]:
         **{key: table[key] for key in texts if key in table},
         "walls": (*room, *_pieces("walls", Wall, table, materials, path.parent)),
         "furniture": _pieces("furniture", Furniture, table, materials, path.parent),
+        "objects": _pieces("objects", Object, table, materials, path.parent),
     }
     if "radar" in table:
         radar = table_at("radar", table)
@@ -341,7 +356,11 @@ def _pieces(
     found = []
     for where, entry in tables_at(key, table):
         check_keys(where, entry, *KEYS[f"[[{key}]]"])
-        own = {"mesh": _mesh(where, entry["mesh"], folder)} if "mesh" in entry else {}
+        own: dict[str, Any] = {}
+        if "mesh" in entry:
+            own["mesh"] = _mesh(where, entry["mesh"], folder)
+        if "motion" in entry:
+            own["motion"] = motion_of(where, entry["motion"])
         chosen = _material(where, entry["material"], materials)
         with _prefixed(where):
             found.append(kind(**{**entry, **own, "material": chosen}))

@@ -1,57 +1,46 @@
-"""Ask Mitsuba whether furniture is between two points of a room.
+"""Ask Mitsuba whether furniture or a moving object is between two points of a room.
 
-Furniture only: walls are rectangles, and few, so they are done in closed form in float64. Mitsuba
-works in float32, so its scene is centred on the furniture, and rays start where they enter the ball
-around it.
+Walls are rectangles, and few, so they are done in closed form in float64. Mitsuba works in float32,
+so each scene of its is centred on what it holds, and rays start where they enter the ball around
+it. A moving object has a scene in its own axes: to pose it, rays are taken there.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.scene import Scene
+from rtradar.scene import Scene, Triangles
 from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import any_met, ball_around
+
+Array = NDArray[np.float64]
 
 CLEAR_M = 1e-3
 """Length by which both ends of a leg are drawn in [m], so that a surface does not occlude its own
 points: a thousand times the error of float32 some 10 m from the middle."""
 
 
-class RoomTracer:
-    """The furniture of a scene, in a scene of its own for Mitsuba, ``mi`` with its variant set."""
+class _Solid:
+    """Meshes in one scene of Mitsuba, centred on them."""
 
-    def __init__(self, mi: Any, scene: Scene) -> None:
+    def __init__(self, mi: Any, pieces: Sequence[Triangles]) -> None:
         self._mi = mi
-        self._scene: Any = None
-        self._centre, self._ball = np.zeros(3), 0.0
-        pieces = [piece.triangles() for piece in scene.furniture]
-        if pieces:
-            counts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
-            vertices = np.concatenate([piece.vertices for piece in pieces])
-            faces = np.concatenate(
-                [piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)]
-            )
-            self._centre, self._ball = ball_around(vertices)
-            mesh = triangle_mesh(mi, vertices - self._centre, faces)
-            self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
-
-    def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
-        """Whether furniture is between two points, ``origins`` and ``targets (..., 3)``, world [m].
-
-        Both are drawn in by `CLEAR_M`, so either may be on a surface. The answer is False without
-        furniture, and where two points are at most twice `CLEAR_M` apart.
-        """
-        origins, targets = np.broadcast_arrays(
-            np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
+        counts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+        vertices = np.concatenate([piece.vertices for piece in pieces])
+        faces = np.concatenate(
+            [piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)]
         )
-        out = np.zeros(origins.shape[:-1], dtype=bool)
-        if self._scene is None or out.size == 0:
-            return out
-        starts, ways = (origins - self._centre).reshape(-1, 3), (targets - origins).reshape(-1, 3)
+        self._centre, self._ball = ball_around(vertices)
+        mesh = triangle_mesh(mi, vertices - self._centre, faces)
+        self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
+
+    def meets(self, origins: Array, targets: Array) -> NDArray[np.bool_]:
+        """Whether the way between points (ray, 3), both ends drawn in, meets any of it."""
+        starts, ways = origins - self._centre, targets - origins
         size = np.linalg.norm(ways, axis=1)
         ways = ways / np.where(size > 0, size, 1.0)[:, None]
         along = -np.einsum("ij,ij->i", starts, ways)
@@ -65,4 +54,44 @@ class RoomTracer:
         entry = starts[asked] + first[asked, None] * ways[asked]
         rays = np.concatenate([entry.T, ways[asked].T, (last - first)[None, asked]])
         met[asked] = any_met(self._mi, self._scene, rays.astype(np.float32))
-        return met.reshape(out.shape)
+        return met
+
+
+class RoomTracer:
+    """The furniture and the moving objects of a scene for Mitsuba, ``mi`` with its variant set.
+
+    Objects are where `pose` puts them, at first where they are at the start of the capture.
+    """
+
+    def __init__(self, mi: Any, scene: Scene) -> None:
+        pieces = [piece.triangles() for piece in scene.furniture]
+        self._still = _Solid(mi, pieces) if pieces else None
+        self._objects = scene.objects
+        self._solids = [_Solid(mi, [moving.shape]) for moving in scene.objects]
+        self.pose(0.0)
+
+    def pose(self, time_s: float) -> None:
+        """Put the objects where they are at a time since the start of the capture [s]."""
+        self._poses = [moving.pose(time_s) for moving in self._objects]
+
+    def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
+        """Whether anything is between two points, ``origins`` and ``targets (..., 3)``, world [m].
+
+        Both are drawn in by `CLEAR_M`, so either may be on a surface. The answer is False in an
+        empty room, and where two points are at most twice `CLEAR_M` apart.
+        """
+        starts, ends = np.broadcast_arrays(
+            np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
+        )
+        shape = starts.shape[:-1]
+        starts, ends = starts.reshape(-1, 3), ends.reshape(-1, 3)
+        met = np.zeros(len(starts), dtype=bool)
+        if met.size == 0:
+            return met.reshape(shape)
+        if self._still is not None:
+            met |= self._still.meets(starts, ends)
+        for solid, (rotation, place) in zip(self._solids, self._poses, strict=True):
+            clear = np.flatnonzero(~met)
+            own = ((points[clear] - place[0]) @ rotation[0] for points in (starts, ends))
+            met[clear] = solid.meets(*own)
+        return met.reshape(shape)

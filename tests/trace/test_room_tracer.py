@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from rtradar.scene import Furniture, Scene, material
+from rtradar.scene import Furniture, Object, Scene, Turning, material
 from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.room_tracer import CLEAR_M, RoomTracer
 
@@ -89,3 +89,19 @@ def test_shapes_broadcast_and_may_be_empty(backend: Backend, box: Scene) -> None
     expected = np.array([[True, True, False], [True, False, False]])
     np.testing.assert_array_equal(tracer.blocked(origins[:, None], targets), expected)
     assert tracer.blocked(np.empty((0, 3)), middle).shape == (0,)
+
+
+def test_a_turning_plate_is_in_the_way_when_it_is_broadside(backend: Backend) -> None:
+    plate = trimesh.creation.box((1.0, 0.02, 1.0))
+    turning = Object("plate", plate, "wood", position_m=(2, 0, 0), motion=Turning(rate_hz=1.0))
+    tracer = RoomTracer(use(backend), Scene(objects=(turning,)))
+    origins = np.array([[0.0, 0.3, 0.1], [0.0, -0.4, 0.1], [0.0, 0.6, 0.0]])
+    targets = origins + np.array([4.0, 0.0, 0.0])
+    # At first it lies along the lines of sight, between the first two.
+    for time_s, expected in (
+        (0.0, [False] * 3),
+        (0.25, [True, True, False]),
+        (0.5, [False] * 3),
+    ):
+        tracer.pose(time_s)
+        assert tracer.blocked(origins, targets).tolist() == expected

@@ -1,0 +1,380 @@
+"""Rigid objects that move: a mesh that turns, swings, or follows a path.
+
+A motion gives the rotation of the object about its pivot, in the mesh's own axes, and how far the
+pivot is from its position, in world axes, at any time since the start of the capture, in float64.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+from rtradar.scene.materials import material
+from rtradar.scene.mesh_files import Triangles, checked_triangles
+from rtradar.scene.objects import Furniture, Limits
+from rtradar.system.checks import Vector, brief, check_keys, check_number, check_vector
+
+Array: TypeAlias = NDArray[np.float64]
+
+MOST_WAY_POINTS = 10_000
+MOTION_LIMITS: Limits = {
+    "rate_hz": (-1000.0, 1000.0),
+    "phase_deg": (-360.0, 360.0),
+    "amplitude_deg": (0.0, 180.0),
+    "period_s": (1e-3, 1e4),
+}
+"""Least and largest value of each number of a motion; velocities are up to 1 km/s."""
+
+
+class RigidMotion(Protocol):
+    """What an `Object` asks of its motion."""
+
+    def pose(self, times: Array) -> tuple[Array, Array]:
+        """Rotations (time, 3, 3) about the pivot, in the mesh's own axes, and shifts (time, 3) [m].
+
+        The latter are from the position of the object to its pivot, in world axes.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AboutAxis:
+    """Rotation about an axis through the pivot, by an angle that depends on the time."""
+
+    axis: Vector = (0.0, 0.0, 1.0)
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        where = f"motion {type(self).__name__}"
+        axis = check_vector(where, "axis", self.axis, 3)
+        if not any(axis):
+            raise InputError(f"{where}: axis = {brief(self.axis)}; it must have a direction")
+        object.__setattr__(self, "axis", axis)
+        for key, limits in MOTION_LIMITS.items():
+            if hasattr(self, key):
+                object.__setattr__(self, key, check_number(where, key, getattr(self, key), *limits))
+
+    def _angle_rad(self, times: Array) -> Array:
+        raise NotImplementedError
+
+    def pose(self, times: Array) -> tuple[Array, Array]:
+        """Compute rotation about the pivot and shift of it.
+
+        Parameters
+        ----------
+        times : (time,) float64
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        rotation : (time, 3, 3) float64
+            Rotation in the mesh's own axes.
+        shift : (time, 3) float64
+            Vector from the position of the object to its pivot, world axes [m].
+        """
+        from scipy.spatial.transform import Rotation  # slow to import
+
+        axis = np.array(self.axis) / np.linalg.norm(self.axis)
+        turns: Any = Rotation.from_rotvec(self._angle_rad(times)[:, None] * axis)
+        return np.asarray(turns.as_matrix(), dtype=np.float64), np.zeros((len(times), 3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turning(_AboutAxis):
+    """Steady rotation about an axis, as of a fan.
+
+    Parameters
+    ----------
+    axis : tuple of float
+        Direction of the axis in the mesh's own axes, of any length; turns are anticlockwise seen
+        from where it points to.
+    rate_hz : float
+        Turns per second; negative the other way round.
+    phase_deg : float
+        Angle at the start of the capture [deg].
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rtradar as rt
+    >>> rotation, _ = rt.Turning(rate_hz=1.0).pose(np.array([0.25]))
+    >>> rotation.round(9)[0, 1, 0]
+    np.float64(1.0)
+    """
+
+    rate_hz: float = 1.0
+
+    def _angle_rad(self, times: Array) -> Array:
+        turns = self.rate_hz * times + self.phase_deg / 360
+        return np.asarray(2 * np.pi * (turns - np.rint(turns)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swinging(_AboutAxis):
+    """Swing to and fro about an axis, as of a door: amplitude times sin(2 pi t / period + phase).
+
+    Parameters
+    ----------
+    axis : tuple of float
+        Direction of the axis in the mesh's own axes, of any length; angles are anticlockwise seen
+        from where it points to.
+    amplitude_deg : float
+        Largest angle to either side [deg].
+    period_s : float
+        Time of one swing to and fro [s].
+    phase_deg : float
+        Phase at the start of the capture [deg]; 0 in the middle, on the way to positive angles.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning.
+    """
+
+    amplitude_deg: float = 45.0
+    period_s: float = 4.0
+
+    def _angle_rad(self, times: Array) -> Array:
+        phase = 2 * np.pi * times / self.period_s + math.radians(self.phase_deg)
+        return np.asarray(math.radians(self.amplitude_deg) * np.sin(phase))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FollowingPath:
+    """Motion without rotation along a path: at one velocity, or over way-points, as of a cart.
+
+    Parameters
+    ----------
+    velocity_mps : tuple of float, optional
+        Velocity from the object's position on, world axes [m/s].
+    points_m : sequence of three float each, optional
+        Way-points, two or more, relative to the object's position, world axes [m]. Between them the
+        path is smooth and does not overshoot (monotone cubics); before the first and after the last
+        the object rests.
+    times_s : sequence of float, optional
+        Time at each way-point since the start of the capture, ascending [s].
+
+    Raises
+    ------
+    InputError
+        Where neither or both ways are given, or a value has no meaning.
+    """
+
+    velocity_mps: Vector | None = None
+    points_m: tuple[Vector, ...] | None = None
+    times_s: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        where = "motion FollowingPath"
+        if (self.velocity_mps is None) == (self.points_m is None) or (self.points_m is None) != (
+            self.times_s is None
+        ):
+            raise InputError(f"{where}: give velocity_mps, or points_m with times_s")
+        if self.velocity_mps is not None:
+            velocity = check_vector(where, "velocity_mps", self.velocity_mps, 3)
+            object.__setattr__(self, "velocity_mps", velocity)
+        if self.points_m is None or self.times_s is None:
+            return
+        count = len(self.points_m)
+        if not 2 <= count <= MOST_WAY_POINTS:
+            raise InputError(
+                f"{where}: points_m has {count} way-points; 2 to {MOST_WAY_POINTS} are allowed"
+            )
+        points = tuple(check_vector(where, "points_m", point, 3) for point in self.points_m)
+        times = check_vector(where, "times_s", self.times_s, count, 1e6)
+        if min(np.diff(times)) <= 0:
+            raise InputError(f"{where}: times_s = {brief(self.times_s)}; they must ascend")
+        object.__setattr__(self, "points_m", points)
+        object.__setattr__(self, "times_s", times)
+
+    def pose(self, times: Array) -> tuple[Array, Array]:
+        """Compute rotation about the pivot and shift of it.
+
+        Parameters
+        ----------
+        times : (time,) float64
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        rotation : (time, 3, 3) float64
+            Rotation in the mesh's own axes.
+        shift : (time, 3) float64
+            Vector from the position of the object to its pivot, world axes [m].
+        """
+        unturned = np.tile(np.eye(3), (len(times), 1, 1))
+        if self.velocity_mps is not None:
+            return unturned, times[:, None] * np.array(self.velocity_mps)
+        from scipy.interpolate import PchipInterpolator  # slow to import
+
+        ends = self.times_s or ()
+        course = PchipInterpolator(np.array(ends), np.array(self.points_m))
+        shift = np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
+        return unturned, shift
+
+
+MOTIONS: Mapping[str, type[Turning | Swinging | FollowingPath]] = {
+    "turning": Turning,
+    "swinging": Swinging,
+    "path": FollowingPath,
+}
+"""Motions by the ``kind`` that a scene file names."""
+
+_KEYS = {
+    "turning": (("kind", "rate_hz"), ("axis", "phase_deg")),
+    "swinging": (("kind", "amplitude_deg", "period_s"), ("axis", "phase_deg")),
+    "path": (("kind",), ("velocity_mps", "points_m", "times_s")),
+}
+
+
+def motion_of(where: str, table: object) -> RigidMotion:
+    """Make a motion of the ``motion`` table of a scene file; ``where`` ends with a blank."""
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if not isinstance(table, dict) or not isinstance(kind, str) or kind not in MOTIONS:
+        raise InputError(
+            f"{where}motion = {brief(table)}; it must be a table with kind = {' or '.join(MOTIONS)}"
+        )
+    check_keys(f"{where}motion: ", table, *_KEYS[kind])
+    return MOTIONS[kind](**{key: value for key, value in table.items() if key != "kind"})
+
+
+@dataclass(frozen=True)
+class Object(Furniture):
+    """A rigid mesh that moves in a scene: a fan, a door, a reflector on a cart.
+
+    A point v of the mesh, scaled and relative to the pivot, is at ``place + rotation @ v``, as
+    `pose` gives both at any time.
+
+    Parameters
+    ----------
+    name : str
+        Name that reports show.
+    mesh : str, Path or trimesh.Trimesh
+        Name of a mesh that comes with rtradar, a file as `Furniture` takes it, or a mesh in metres.
+    material : Material or str
+        Material of the surface, or its name.
+    position_m : tuple of float
+        Position of the pivot, world [m].
+    yaw_deg : float
+        Rotation of the whole, axis of its motion included, about the vertical, anticlockwise seen
+        from above [deg].
+    scale : float
+        Factor by which the mesh is enlarged.
+    metres_per_unit : float, optional
+        Unit of a file [m]; other meshes are in metres, and take none.
+    sheet : bool
+        Whether the mesh of a file is a thin sheet.
+    pivot_m : tuple of float
+        Point of the scaled mesh, in its own axes, about which it turns [m]: for a door a point of
+        its hinge.
+    motion : Turning, Swinging or FollowingPath, optional
+        How it moves; None for not at all.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning. The mesh itself is read and checked by `triangles`.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> fan = rt.Object("fan", "fan", "metal", position_m=(1, 1, 1), motion=rt.Turning(rate_hz=5))
+    """
+
+    _: KW_ONLY
+    position_m: Vector = (0.0, 0.0, 0.0)
+    pivot_m: Vector = (0.0, 0.0, 0.0)
+    motion: RigidMotion | None = None
+
+    _kind: ClassVar[str] = "object"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.material, str):
+            object.__setattr__(self, "material", material(self.material))
+        super().__post_init__()
+        pivot = check_vector(self._where, "pivot_m", self.pivot_m, 3)
+        object.__setattr__(self, "pivot_m", pivot)
+        if self.motion is not None and not hasattr(self.motion, "pose"):
+            raise InputError(
+                f"{self._where}: motion = {brief(self.motion)}; allowed: Turning, Swinging, "
+                "FollowingPath"
+            )
+
+    @property
+    def _settled(self) -> bool:
+        return self._is_mesh or super()._settled
+
+    @property
+    def _is_mesh(self) -> bool:
+        return hasattr(self.mesh, "vertices") and hasattr(self.mesh, "faces")
+
+    def _read(self) -> Triangles:
+        if not self._is_mesh:
+            return super()._read()
+        vertices = np.asarray(self.mesh.vertices, dtype=np.float64)
+        return checked_triangles(self._where, vertices, np.asarray(self.mesh.faces, dtype=np.int64))
+
+    @cached_property
+    def shape(self) -> Triangles:
+        """Mesh in its own axes, scaled and relative to the pivot [m]."""
+        own = self._own_triangles()
+        vertices = own.vertices - np.array(self.pivot_m)
+        vertices.setflags(write=False)
+        return Triangles(vertices, own.faces, own.closed)
+
+    def pose(self, times: ArrayLike) -> tuple[Array, Array]:
+        """Compute the pose of the object.
+
+        Parameters
+        ----------
+        times : (time,) array_like
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        rotation : (time, 3, 3) float64
+            Rotation from the mesh's own axes to the world's.
+        place : (time, 3) float64
+            Place of the pivot, world [m].
+        """
+        at = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        position = np.array(self.position_m)
+        if self.motion is None:
+            return np.tile(self.yaw, (len(at), 1, 1)), np.tile(position, (len(at), 1))
+        rotation, shift = self.motion.pose(at)
+        return self.yaw @ rotation, position + shift
+
+    def triangles(self, time_s: float = 0.0) -> Triangles:
+        """Return the mesh where it is at a time since the start of the capture [s].
+
+        Parameters
+        ----------
+        time_s : float
+            Time since the start of the capture [s].
+
+        Returns
+        -------
+        Triangles
+            Mesh in world coordinates [m].
+
+        Raises
+        ------
+        InputError
+            As of `Furniture.triangles`.
+        """
+        (rotation,), (place,) = self.pose([time_s])
+        vertices = self.shape.vertices @ rotation.T + place
+        vertices.setflags(write=False)
+        return Triangles(vertices, self.shape.faces, self.shape.closed)
