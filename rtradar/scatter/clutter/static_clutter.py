@@ -11,9 +11,11 @@ with real ones. A room at rest is the same in every TDM cycle: its IF is compute
 from __future__ import annotations
 
 import copy
+import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,10 +27,12 @@ from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes
 from rtradar.scatter.clutter.wall_returns import rough_returns, specular_returns
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scene import Scene
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backends.backend import Backend, select, use
 from rtradar.trace.room_tracer import RoomTracer
 
 MOST_ORDER = 3
+KEPT_ROOMS = 2
+"""Rooms that stay in memory once they are traced; a furnished one may take 100 MB."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,59 @@ class ClutterItem:
     reason: str = ""
 
 
+@dataclass(frozen=True)
+class _Room:
+    """What the static clutter of a room depends on, whoever is in it; equal rooms are one key.
+
+    ``meshes`` is a hash of the furniture's triangles, whose files may change; ``backend`` is
+    that of Mitsuba.
+    """
+
+    radar: Radar
+    scene: Scene
+    meshes: bytes
+    backend: Backend
+
+    @classmethod
+    def of(cls, radar: Radar, scene: Scene, backend: Backend) -> _Room:
+        """Return the room of a scene, without what does not stand still."""
+        digest = hashlib.sha256()
+        for piece in scene.furniture:
+            triangles = piece.triangles()
+            digest.update(triangles.vertices.tobytes())
+            digest.update(triangles.faces.tobytes())
+        still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
+        return cls(radar, still, digest.digest(), backend)
+
+    def tracer(self) -> RoomTracer:
+        """Return a tracer of the furniture."""
+        return RoomTracer(use(self.backend), self.scene)
+
+
+_Found = tuple[tuple[ClutterItem, RoomEchoes], ...]
+
+
+@lru_cache(maxsize=KEPT_ROOMS)
+def _smooth_returns(room: _Room, order: int) -> _Found:
+    """Trace walls as mirrors, and furniture: none of it depends on the seed."""
+    radar, scene = room.radar, room.scene
+    mirrors = specular_returns(radar, scene, room.tracer(), order)
+    furniture = furniture_returns(use(room.backend), radar, scene)
+    return tuple((_item(echoes, radar), echoes) for echoes in (*mirrors, *furniture))
+
+
+@lru_cache(maxsize=KEPT_ROOMS)
+def _rough_returns(room: _Room, seed: int) -> _Found:
+    """Trace the diffuse returns of rough walls."""
+    radar = room.radar
+    found = rough_returns(radar, room.scene, room.tracer(), seed)
+    return tuple((_item(echoes, radar), echoes) for echoes in found)
+
+
 class Clutter:
     """Static clutter of a scene.
+
+    Traced rooms are kept, `KEPT_ROOMS` of them: the next recording in one finds it traced.
 
     The radar is at its position in the scene, where `Scene.place` puts it; ``variant`` is Mitsuba's
     backend, ``seed`` that of the positions and phases of diffuse returns, ``order`` the largest
@@ -70,17 +125,10 @@ class Clutter:
             raise InputError(
                 f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
             )
-        mi = use(select(variant))
-        self.radar, tracer = radar, RoomTracer(mi, scene)
-        found = [
-            *specular_returns(radar, scene, tracer, order),
-            *furniture_returns(mi, radar, scene),
-            *rough_returns(radar, scene, tracer, seed),
-        ]
-        _refuse_not_followed(found, scene)
-        ranked = sorted(
-            ((_item(echoes, radar), echoes) for echoes in found), key=lambda one: -one[0].cell_m2
-        )
+        self.radar, room = radar, _Room.of(radar, scene, select(variant))
+        found = [*_smooth_returns(room, order), *_rough_returns(room, seed)]
+        _refuse_not_followed([echoes for _, echoes in found], scene)
+        ranked = sorted(found, key=lambda one: -one[0].cell_m2)
         self.objects = tuple(echoes for item, echoes in ranked if item.cell_m2 > 0)
         self.kept = tuple(item for item, _ in ranked if item.cell_m2 > 0)
         far = f"farther than the {radar.max_range_m:.3g} m that the sampling reaches"

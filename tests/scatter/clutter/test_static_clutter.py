@@ -7,6 +7,7 @@ import pytest
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scatter.clutter import static_clutter
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 
@@ -91,3 +92,15 @@ def test_free_space_has_none() -> None:
 def test_an_order_without_meaning_is_refused(order: int) -> None:
     with pytest.raises(InputError, match="order"):
         Clutter(RADAR, Scene(), variant="scalar", order=order)
+
+
+def test_a_room_is_traced_once_for_all_who_walk_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0, -1, 0))
+    scene = Scene(furniture=(chair,), radar_position_m=(-4.0, 0.0, 1.1))
+    first = Clutter(RADAR, scene, variant="scalar")
+    monkeypatch.setattr(static_clutter, "furniture_returns", None)
+    again = Clutter(RADAR, replace(scene, person_position_m=(0.5, 0.2)), variant="scalar", seed=3)
+    assert again.objects[0] is first.objects[0]
+    moved = replace(scene, furniture=(replace(chair, position_m=(0, -1.1, 0)),))
+    with pytest.raises(TypeError):  # it would have to be traced
+        Clutter(RADAR, moved, variant="scalar")
