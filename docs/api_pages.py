@@ -32,7 +32,7 @@ PACKAGES = {
 FIRST_PAGE = {
     "Motion": ("load_motion", "synthetic_motion", "Motion"),
     "Radar": ("Radar", "Antenna"),
-    "Scene": ("Scene", "Object", "Turning", "Swinging", "FollowingPath"),
+    "Scene": ("Scene", "Person", "Object", "Turning", "Swinging", "FollowingPath"),
     "Run": ("run", "simulate", "process_samples", "compare", "RunSettings", "Breathing"),
     "Results": ("Result", "Simulation", "Comparison"),
     "Pieces of a run": ("Body", "Ellipsoids", "Echoes", "scattering_length"),

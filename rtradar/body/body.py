@@ -167,6 +167,8 @@ class Body:
         line of the shoulders, by ``amplitude_mm * sin(2 pi rate_hz t + phase_deg)``. The parts move
         as a whole: of the front that is the motion of a chest wall; behind, where a real back
         hardly moves, it is too much.
+    material : str
+        Name of the material of the surface.
 
     Raises
     ------
@@ -177,6 +179,7 @@ class Body:
     motion: Motion
     semi_axes: NDArray[np.float64]
     breathing: Breathing | None = None
+    material: str = "perfect-conductor"
 
     def __post_init__(self) -> None:
         if self.motion.joints != NODES:
@@ -197,7 +200,12 @@ class Body:
         object.__setattr__(self, "semi_axes", axes)
 
     @classmethod
-    def from_motion(cls, motion: Motion, breathing: Breathing | None = None) -> Body:
+    def from_motion(
+        cls,
+        motion: Motion,
+        breathing: Breathing | None = None,
+        material: str = "perfect-conductor",
+    ) -> Body:
         """Put ellipsoids on a skeleton: c is half the bone, a = b are `PART_RADII_M`.
 
         Parameters
@@ -207,6 +215,8 @@ class Body:
             multiplies the radii.
         breathing : Breathing, optional
             Breath of the person.
+        material : str
+            Name of the material of the surface.
 
         Returns
         -------
@@ -220,7 +230,27 @@ class Body:
         nodes = to_nodes(motion)
         radii = np.array(PART_RADII_M) * nodes.girth
         lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
-        return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1), breathing)
+        return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1), breathing, material)
+
+    @property
+    def people(self) -> tuple[Body, ...]:
+        """The people whose parts these are: this one alone; `Bodies` has several."""
+        return (self,)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the `people`."""
+        return (self.motion.name,)
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        """Index of the person that each part (part,) belongs to."""
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Name of the material of each part."""
+        return (self.material,) * len(self.semi_axes)
 
     @property
     def part_names(self) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.body.people import Moving
 from rtradar.errors import InputError
-from rtradar.motion import Motion
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_runs
 from rtradar.pipeline.result import Result
@@ -86,7 +86,7 @@ class Comparison:
 
 
 def compare(
-    motion: Motion,
+    motion: Moving,
     radar: Radar,
     scene: Scene | None = None,
     *,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from rtradar.body import Person
 from rtradar.errors import InputError
-from rtradar.motion import Motion
 from rtradar.pipeline.processing import RANGE_TIME_S
 from rtradar.process import angle_grid, measured_angles
 from rtradar.radar import Radar
@@ -30,11 +32,11 @@ def refuse_large(what: str, n_bytes: float, instead: str) -> None:
         )
 
 
-def refuse_large_maps(motion: Motion, radar: Radar, settings: RunSettings) -> None:
+def refuse_large_maps(people: Sequence[Person], radar: Radar, settings: RunSettings) -> None:
     """Raise an `InputError` if maps of this run are too large for memory."""
-    interval_s = max(motion.duration_s - settings.start_s, 0.0)
-    if settings.duration_s is not None:
-        interval_s = min(interval_s, settings.duration_s)
+    left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
+    asked = settings.duration_s
+    interval_s = max(min(left) if asked is None else min(max(left), asked), 0.0)
     n_bytes = bytes_of_maps(radar, interval_s / radar.chirp_interval_s)
     refuse_large(f"maps of {interval_s:g} s of radar '{radar.name}'", n_bytes, IN_A_FOLDER)
 

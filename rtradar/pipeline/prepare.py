@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
+from rtradar.body import Body, Person
+from rtradar.body.people import Moving, body_of_people
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.processing import Processing
@@ -29,11 +30,12 @@ from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
 
 
-def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
-    """Place a person before a radar and settle everything that the first echo needs.
+def prepare(people: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
+    """Place people before a radar and settle everything that the first echo needs.
 
     Errors are those of `rtradar.run`.
     """
+    everyone = people_in(scene, people)
     reuse_freed_memory()
     processing = Processing.of(radar, settings)
     if settings.snr_db == "physical":
@@ -42,10 +44,10 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
     with stage_line("preparing"):
         with processing_compiled_beside():
             with processing.stages.time("motion"):
-                body = _placed(motion, scene, settings)
+                body = body_of_people(everyone, settings)
                 radar = scene.place(radar)
                 processing = replace(processing, radar=radar)
-            n_chirps, frame_starts = _frames(motion, radar, body)
+            n_chirps, frame_starts = _frames(radar, body)
             warm_up_start = time.perf_counter()
             model = _echo_model(radar, body, scene, settings)
             echoes = model.echoes(np.arange(2 * radar.n_tx))
@@ -68,7 +70,7 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
             powers = budget.power, noise.power
             inside = indoors(model, radar, body, scene, settings, n_chirps, *powers)
     return Capture(
-        motion=motion.name,
+        motion=" and ".join(body.names),
         scene=scene,
         settings=settings,
         processing=processing,
@@ -84,32 +86,45 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
     )
 
 
-def _placed(motion: Motion, scene: Scene, settings: RunSettings) -> Body:
-    """Return the person at their position in the scene."""
-    start_s, duration_s = settings.start_s, settings.duration_s
-    heading_deg = settings.heading_deg + scene.heading_deg
-    placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg)
-    placed = placed.shifted([*scene.person_position_m, 0.0])
-    return Body.from_motion(placed, settings.breathing)
+def people_in(scene: Scene, given: Moving) -> tuple[Person, ...]:
+    """Return everyone in a scene: those who are given, and then those whom the scene has.
+
+    A bare motion is a person where the scene puts them. InputError if there is nobody.
+    """
+    several = given if isinstance(given, Sequence) else (given,)
+    everyone = tuple(
+        one if isinstance(one, Person) else Person(one, scene.person_position_m, scene.heading_deg)
+        for one in several
+    )
+    if not everyone:
+        raise InputError(
+            f"scene '{scene.name}': nobody is there; give a motion, or several with their places"
+        )
+    return everyone
 
 
-def _frames(motion: Motion, radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
+def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
     """Return the number of chirps in whole cycles, and the first cycle of each frame."""
     n_chirps = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12)) * radar.n_tx
     starts = radar.window_starts(n_chirps)
     if len(starts) == 0:
         raise InputError(
-            f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame "
-            f"of {radar.frame_duration_s} s of radar '{radar.name}'; choose a longer one "
-            "(--start, --duration)"
+            f"motion {' and '.join(body.names)}: the interval of {body.duration_s:.3f} s holds no "
+            f"whole frame of {radar.frame_duration_s} s of radar '{radar.name}'; choose a longer "
+            "one (--start, --duration)"
         )
     return n_chirps, starts
 
 
 def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> EchoModel:
     options = dict(settings.model_options or {})
-    if settings.body_material != "perfect-conductor":
-        options["material"] = settings.body_material
+    materials = set(body.materials)
+    if len(materials) > 1:
+        raise InputError(
+            f"people of {' and '.join(sorted(materials))}: their materials must be the same"
+        )
+    if (material := materials.pop()) != "perfect-conductor":
+        options["material"] = material
     return build_model(
         settings.fidelity,
         radar,

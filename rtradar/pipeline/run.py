@@ -7,8 +7,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
+from rtradar.body.people import Moving
 from rtradar.errors import InputError
-from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.output.map_store import open_maps
@@ -17,7 +17,7 @@ from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
-from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.prepare import people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
@@ -32,7 +32,7 @@ from rtradar.trace.rays import rays_traced
 
 
 def run(
-    motion: Motion,
+    motion: Moving,
     radar: Radar,
     scene: Scene | None = None,
     *,
@@ -41,12 +41,13 @@ def run(
     pictures: bool = True,
     **options: Unpack[RunOptions],
 ) -> Result:
-    """Simulate one recording: maps, clouds and a summary, in memory or in a folder.
+    """Simulate people before a radar: maps, clouds and a summary, in memory or in a folder.
 
     Parameters
     ----------
-    motion : Motion
-        Recording, not yet placed: the run places the chosen interval before the radar.
+    motion : Motion, Person, or sequence of them
+        Who moves: a recording, which the run places where the scene has its person, people with
+        places of their own, or several of these.
     radar : Radar
         Radar, which the scene puts at its position.
     scene : Scene, optional
@@ -94,13 +95,13 @@ def run(
     return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite, pictures)
 
 
-def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
+def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
     if settings.save_if:
         raise InputError(
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
-    refuse_large_maps(motion, radar, settings)
+    refuse_large_maps(people_in(scene, motion), radar, settings)
     started, rays_before = _start()
     capture = prepare(motion, radar, scene, settings)
     file = BytesIO()
@@ -122,7 +123,7 @@ def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSett
 
 def run_into(
     out: Path,
-    motion: Motion,
+    motion: Moving,
     radar: Radar,
     scene: Scene,
     settings: RunSettings,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.motion import Motion
+from rtradar.body.people import Moving
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.prepare import prepare
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    motion: Motion,
+    motion: Moving,
     radar: Radar,
     scene: Scene | None = None,
     **options: Unpack[SimulationOptions],

@@ -42,7 +42,7 @@ class Inside:
         Given are the times (time,) [s], the body's poses, and its echo power (time, part) [m^2]. An
         `InputError` is raised if the pelvis is inside a wall.
         """
-        pelvis = [part for part, name in enumerate(self._names) if name in _PELVIS]
+        pelvis = [part for part, name in enumerate(self._names) if name.endswith(_PELVIS)]
         for number, wall in enumerate(self._scene.walls):
             self._keep(number, times, _inside_wall(wall, poses), power)
             found = [part for part in pelvis if np.isfinite(self._first_s[number, part])]

@@ -1,0 +1,248 @@
+"""`Person`: who moves where; `Bodies`: several people as one moving set of ellipsoids."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.body.body import Body, Poses
+from rtradar.errors import InputError
+from rtradar.motion import Motion, place
+from rtradar.settings import RunSettings
+from rtradar.system.checks import brief, check_number, check_text, check_vector
+
+BODY_KINDS = ("ellipsoids", "mesh")
+"""Bodies that a person may have."""
+
+PERSON_LIMITS = {"position_m": (-100.0, 100.0), "heading_deg": (-360.0, 360.0)}
+"""Least and largest values of where a person is in a scene."""
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A person in a scene: what they do, where, and with which body.
+
+    Parameters
+    ----------
+    motion : Motion
+        Recording or synthetic motion, not yet placed.
+    position_m : tuple of float
+        Mean position of the person over the interval, world x and y [m].
+    heading_deg : float
+        Rotation about the vertical, anticlockwise seen from above [degree]. At 0 a walk goes along
+        -x, and everything else faces -x (`rtradar.motion.place`).
+    start_s : float
+        Start of the person's interval in their recording [s]. All people of a capture begin theirs
+        at the same time; one whose recording ends early rests in its last pose.
+    body : {"ellipsoids", "mesh"}
+        Body of the person: 21 ellipsoids, or a mesh of human shape.
+    material : str, optional
+        Material of the surface, as the option ``body_material`` of a run, which holds for those who
+        have none of their own.
+
+    Raises
+    ------
+    InputError
+        Where the motion is none, or another value has no meaning.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> walk = rt.synthetic_motion("walk", duration_s=0.5)
+    >>> rt.Person(walk, position_m=(0.5, -1), heading_deg=90).position_m
+    (0.5, -1.0)
+    """
+
+    motion: Motion
+    position_m: tuple[float, float] = (0.0, 0.0)
+    heading_deg: float = 0.0
+    start_s: float = 0.0
+    body: str = "ellipsoids"
+    material: str | None = None
+
+    def __post_init__(self) -> None:
+        given: object = self.motion
+        if not isinstance(given, Motion):
+            kind = type(given).__name__
+            raise InputError(f"Person: motion is a {kind}; give what rt.load_motion returns")
+        where = f"person '{self.motion.name}'"
+        most = PERSON_LIMITS["position_m"][1]
+        place_m = check_vector(where, "position_m", self.position_m, 2, most)
+        object.__setattr__(self, "position_m", place_m)
+        limits = PERSON_LIMITS["heading_deg"]
+        heading = check_number(where, "heading_deg", self.heading_deg, *limits)
+        object.__setattr__(self, "heading_deg", heading)
+        start = check_number(where, "start_s", self.start_s, 0.0, self.motion.duration_s)
+        object.__setattr__(self, "start_s", start)
+        if self.body not in BODY_KINDS:
+            raise InputError(
+                f"{where}: body = {brief(self.body)}; allowed: {', '.join(BODY_KINDS)}"
+            )
+        if self.material is not None:
+            check_text(where, "material", self.material)
+
+
+Moving = Motion | Person | Sequence[Motion | Person]
+"""Who moves: one or several, with a bare motion for a person where the scene puts them."""
+
+
+class Bodies(Body):
+    """Several people as one moving set of ellipsoids with one clock.
+
+    The parts of one person come after those of another, and are named ``NAME: part``. Past the end
+    of their motion a person rests in the last pose. The ``motion`` is that of the first person;
+    `people` has all.
+
+    Parameters
+    ----------
+    people : sequence of Body
+        The people, each with a motion that begins at 0.
+    duration_s : float, optional
+        Time for which the set is asked [s]; that of the shortest motion if left out.
+    """
+
+    def __init__(self, people: Sequence[Body], duration_s: float | None = None) -> None:
+        shortest = min(person.duration_s for person in people)
+        for name, value in (
+            ("motion", people[0].motion),
+            ("semi_axes", np.concatenate([person.semi_axes for person in people])),
+            ("breathing", None),
+            ("material", people[0].material),
+            ("_people", tuple(people)),
+            ("_duration_s", shortest if duration_s is None else duration_s),
+        ):
+            object.__setattr__(self, name, value)
+
+    _people: tuple[Body, ...]
+    _duration_s: float
+
+    @property
+    def people(self) -> tuple[Body, ...]:
+        """The people, in the order in which they were given."""
+        return self._people
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names of the parts of all people, ``NAME: part``."""
+        return tuple(
+            f"{name}: {part}"
+            for name, person in zip(self.names, self.people, strict=True)
+            for part in person.part_names
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the people: those of their motions, numbered where two are alike."""
+        return distinct_names([person.motion.name for person in self.people])
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        """Index of the person that each part (part,) belongs to."""
+        sizes = [len(person.part_names) for person in self.people]
+        return np.repeat(np.arange(len(sizes)), sizes)
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """Name of the material of each part."""
+        return tuple(name for person in self.people for name in person.materials)
+
+    @property
+    def duration_s(self) -> float:
+        """Time up to which the set may be asked [s]."""
+        return self._duration_s
+
+    def at(self, times: ArrayLike) -> Poses:
+        """Pose the ellipsoids of all people at any times from 0 to `duration_s`.
+
+        Parameters
+        ----------
+        times : (time,) array_like
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        Poses
+
+        Raises
+        ------
+        InputError
+            Where a time is negative.
+        """
+        instants = np.asarray(times, dtype=np.float64)
+        poses = [person.at(np.minimum(instants, person.duration_s)) for person in self.people]
+        centres, frames = (
+            np.concatenate(arrays, axis=1) for arrays in list(zip(*poses, strict=True))[:2]
+        )
+        return Poses(centres, frames, self.semi_axes)
+
+
+def distinct_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Number the names that come more than once, from 1 on.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names, some of them alike.
+
+    Returns
+    -------
+    tuple of str
+        As many names, each once: ``walk 1``, ``walk 2``, ``kick``.
+    """
+    counts, seen, found = Counter(names), Counter[str](), []
+    for name in names:
+        seen[name] += 1
+        found.append(f"{name} {seen[name]}" if counts[name] > 1 else name)
+    # A numbered name may be that of another.
+    return distinct_names(found) if len(set(found)) < len(found) else tuple(found)
+
+
+def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
+    """Place people as they say, and make one moving set of ellipsoids of them.
+
+    The interval of each starts at ``settings.start_s`` after their own, and ends with the shortest
+    recording or after ``settings.duration_s``, which the longest must reach.
+
+    Parameters
+    ----------
+    people : sequence of Person
+        Everyone in the scene.
+    settings : RunSettings
+        Interval, additional heading, breath and material of those who have none of their own.
+
+    Returns
+    -------
+    Body
+        Of one person their `Body`, of several `Bodies`.
+
+    Raises
+    ------
+    InputError
+        Where an interval is not inside a recording, or a body is not known.
+    """
+    left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
+    duration_s = settings.duration_s
+    if duration_s is None and len(people) > 1:
+        duration_s = min(left)
+    bodies = []
+    for person, rest in zip(people, left, strict=True):
+        if person.body != "ellipsoids":
+            raise InputError(
+                f"person '{person.motion.name}': body = 'mesh' is not available; use 'ellipsoids'"
+            )
+        # Who ends early rests, unless nobody lasts that long.
+        rests = duration_s is not None and 0 <= rest < duration_s <= max(left)
+        placed = place(
+            person.motion,
+            start_s=settings.start_s + person.start_s,
+            duration_s=None if rests else duration_s,
+            heading_deg=settings.heading_deg + person.heading_deg,
+        )
+        placed = placed.shifted([*person.position_m, 0.0])
+        material = settings.body_material if person.material is None else person.material
+        bodies.append(Body.from_motion(placed, settings.breathing, material))
+    return bodies[0] if len(bodies) == 1 else Bodies(bodies, duration_s)
