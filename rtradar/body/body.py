@@ -281,6 +281,10 @@ class Body:
         InputError
             Where a time lies outside the motion.
         """
+        return self._posed(times, times)
+
+    def _posed(self, times: ArrayLike, breath_times: ArrayLike) -> Poses:
+        """Poses at times of the motion; who rests after its end goes on breathing."""
         positions, quaternions = self.motion.at(times)
         shape = len(positions), len(self.semi_axes), 3
         centres, frames = np.empty(shape), np.empty((*shape, 3))
@@ -290,7 +294,7 @@ class Body:
             left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
             ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
             ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
-            turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(times, np.float64)
+            turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(breath_times, np.float64)
             breath = np.sin(turned + np.radians(self.breathing.phase_deg))
             centres[:, _CHEST] += 1e-3 * self.breathing.amplitude_mm * breath[:, None, None] * ahead
         return Poses(centres, frames, self.semi_axes)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body.body import Body, Poses
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
-from rtradar.settings import RunSettings
+from rtradar.settings import Breathing, RunSettings
 from rtradar.system.checks import brief, check_number, check_text, check_vector
 
 BODY_KINDS = ("ellipsoids", "mesh")
@@ -43,6 +43,9 @@ class Person:
     material : str, optional
         Material of the surface, as the option ``body_material`` of a run, which holds for those who
         have none of their own.
+    breathing : Breathing, optional
+        Breath of the person, as the option ``breathing`` of a run, which holds for those who have
+        none of their own.
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Person:
     start_s: float = 0.0
     body: str = "ellipsoids"
     material: str | None = None
+    breathing: Breathing | None = None
 
     def __post_init__(self) -> None:
         given: object = self.motion
@@ -173,7 +177,10 @@ class Bodies(Body):
             Where a time is negative.
         """
         instants = np.asarray(times, dtype=np.float64)
-        poses = [person.at(np.minimum(instants, person.duration_s)) for person in self.people]
+        poses = [
+            person._posed(np.minimum(instants, person.duration_s), instants)
+            for person in self.people
+        ]
         centres, frames = (
             np.concatenate(arrays, axis=1) for arrays in list(zip(*poses, strict=True))[:2]
         )
@@ -244,5 +251,6 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
         )
         placed = placed.shifted([*person.position_m, 0.0])
         material = settings.body_material if person.material is None else person.material
-        bodies.append(Body.from_motion(placed, settings.breathing, material))
+        breathing = settings.breathing if person.breathing is None else person.breathing
+        bodies.append(Body.from_motion(placed, breathing, material))
     return bodies[0] if len(bodies) == 1 else Bodies(bodies, duration_s)

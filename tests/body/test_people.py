@@ -52,6 +52,22 @@ def test_the_shortest_ends_the_capture_and_who_ends_early_rests() -> None:
         body_of_people(people, RunSettings(duration_s=0.7))
 
 
+def test_each_person_breathes_in_their_own_way_and_goes_on_while_they_rest() -> None:
+    own, usual = rt.Breathing(3.0, 0.5), rt.Breathing(2.0, 0.25, phase_deg=90.0)
+    people = [rt.Person(WALK), rt.Person(KICK, breathing=own)]
+    options = {"duration_s": 0.5}
+    breathing = body_of_people(people, RunSettings(**options, breathing=usual))
+    still = body_of_people([rt.Person(WALK), rt.Person(KICK)], RunSettings(**options))
+    times = np.array([0.2, 0.3, 0.5])
+    moved = np.linalg.norm(breathing.at(times).centres - still.at(times).centres, axis=2)
+    chest = [name.endswith("upper torso") for name in breathing.part_names]
+    expected = [
+        2e-3 * np.sin(2 * np.pi * 0.25 * times + np.pi / 2),
+        3e-3 * np.sin(2 * np.pi * 0.5 * times),
+    ]
+    np.testing.assert_allclose(moved[:, chest].T, np.abs(expected), rtol=1e-9)
+
+
 def test_names_that_come_twice_are_numbered() -> None:
     assert distinct_names(["a", "b", "a"]) == ("a 1", "b", "a 2")
     assert len(set(distinct_names(["a", "a", "a 1"]))) == 3
