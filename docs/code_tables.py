@@ -15,8 +15,10 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
+from rtradar.body import Person
 from rtradar.campaign.spec import DRAWN, RUN_KEYS, Intervals
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.radar import Radar
 from rtradar.scene import (
     MATERIALS,
@@ -30,7 +32,7 @@ from rtradar.scene import (
 )
 from rtradar.scene.materials import OWN_LIMITS
 from rtradar.scene.objects import FURNITURE_LIMITS, ROOM_LIMITS, SURFACE_LIMITS
-from rtradar.scene.scene import KEYS, PERSON_LIMITS
+from rtradar.scene.scene import KEYS
 from rtradar.settings import RunSettings
 
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -58,9 +60,18 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
     "a side of a room": (Surface, "", SURFACE_LIMITS),
     "[[walls]]": (Wall, "", SURFACE_LIMITS),
     "[[furniture]]": (Furniture, "", FURNITURE_LIMITS),
+    "[[people]]": (Person, "", PERSON_LIMITS),
     "[materials.NAME]": (own_material, "", OWN_LIMITS),
 }
 """What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
+
+OF_RECORDINGS = {
+    "motion": "recording beside the scene file or below, or `synthetic:` and an activity",
+    "skeleton": "the `.asf` of an `.amc`",
+    "seed": "number of the subject of a synthetic actor; 0",
+    "duration_s": "how long a synthetic actor moves [s]; 10",
+}
+"""Keys of a person in a scene file that find their motion."""
 
 DATA_SET_KEYS = {
     "top": {
@@ -182,10 +193,12 @@ def scene_keys() -> str:
             for names, _, meaning in described(inspect.getdoc(thing) or "")
             for name in names
         }
+        if table == "[[people]]":
+            texts |= OF_RECORDINGS
         needed, others = KEYS[table]
         for key in (*needed, *others):
             name = prefix + key if prefix + key in parameters else key
-            default = parameters[name].default
+            default = parameters[name].default if name in parameters else None
             usual = "" if default is None else "must be given" if key in needed else toml(default)
             least, most = (toml(limit).strip("`") for limit in limits.get(key, (0, 0)))
             allowed = f"{least} to {most}" if key in limits else ""

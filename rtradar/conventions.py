@@ -64,3 +64,6 @@ MINIMUM_KA = 5.0
 """Least product of wavenumber and radius of curvature for geometric and physical optics.
 
 Below it they are off by decibels."""
+
+PERSON_LIMITS = {"position_m": (-100.0, 100.0), "heading_deg": (-360.0, 360.0)}
+"""Least and largest values of where a person is in a scene."""

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -18,6 +19,7 @@ import xarray
 
 from rtradar.cli import main
 from rtradar.cli.values import setting
+from rtradar.errors import InputError
 
 SHORT = ["--duration", "0.2", "--snr-db", "20"]
 
@@ -470,3 +472,63 @@ def test_files_that_may_not_grow_are_told_in_one_line(
     assert "Traceback" not in done.stderr
     assert "File too large" in done.stderr.splitlines()[-1]
     assert not list(tmp_path.iterdir())
+
+
+# -- several people ------------------------------------------------------------------------------
+
+
+def people_of(monkeypatch: pytest.MonkeyPatch, *words: object) -> list[Any]:
+    """People whom `rtradar run` would simulate."""
+    found: list[Any] = []
+
+    def run_nothing(motion: list[Any], **_: object) -> None:
+        found.extend(motion)
+        raise InputError("enough")
+
+    monkeypatch.setattr("rtradar.pipeline.run", run_nothing)
+    assert run(*words, "--duration", "0.2", "--out", "nowhere") == 2
+    return found
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("synthetic:walk", "synthetic:kick", "--at", "-1,0.5", "--at", "-.5,-1,90"),
+        ("synthetic:walk", "--at", "-1,0.5", "synthetic:kick", "--at=-.5,-1,90"),
+        ("--at", "-1,0.5", "--at", "-.5,-1,90", "synthetic:walk", "synthetic:kick"),
+    ],
+)
+def test_each_motion_has_its_place_in_order(
+    monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    walker, kicker = people_of(monkeypatch, *words)
+    assert walker.motion.name == "synthetic:walk"
+    assert (walker.position_m, walker.heading_deg) == ((-1.0, 0.5), 0.0)
+    assert kicker.motion.name == "synthetic:kick"
+    assert (kicker.position_m, kicker.heading_deg) == ((-0.5, -1.0), 90.0)
+
+
+def test_actors_of_one_activity_are_two_people(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = "synthetic:walk", "synthetic:walk", "--at", "0,1", "--at", "0,-1"
+    one, other = people_of(monkeypatch, *words)
+    assert not np.array_equal(one.motion.rotations, other.motion.rotations)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["synthetic:walk", "synthetic:kick"], "2 MOTION and 0 --at"),
+        (["synthetic:walk", "--at", "1,2", "--at", "1,3"], "1 MOTION and 2 --at"),
+        (["synthetic:walk", "--at", "1"], "place X,Y"),
+        (["synthetic:walk", "--at", "1,2,3,4"], "place X,Y"),
+        ([], "nobody is there"),
+        (["a.amc", "b.amc", "--at", "0,1", "--at", "1,0", *["--skeleton", "a.asf"] * 3], "2 rec"),
+    ],
+)
+def test_places_that_do_not_fit_are_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: list[str], message: str
+) -> None:
+    assert run(*words, "--out", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1

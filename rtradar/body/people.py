@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.body import Body, Poses
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
 from rtradar.settings import Breathing, RunSettings
@@ -17,9 +18,6 @@ from rtradar.system.checks import brief, check_number, check_text, check_vector
 
 BODY_KINDS = ("ellipsoids", "mesh")
 """Bodies that a person may have."""
-
-PERSON_LIMITS = {"position_m": (-100.0, 100.0), "heading_deg": (-360.0, 360.0)}
-"""Least and largest values of where a person is in a scene."""
 
 
 @dataclass(frozen=True, eq=False)

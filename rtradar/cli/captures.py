@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.cli.values import (
@@ -16,6 +18,7 @@ from rtradar.cli.values import (
     decibels,
     number,
     path,
+    place_at,
     say,
     seconds,
     setting,
@@ -27,7 +30,9 @@ from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
+    from rtradar.body import Person
     from rtradar.cli.values import OneLineParser, Subcommands
+    from rtradar.motion import Motion
 
 _SYNTHETIC = "synthetic:"
 _SYNTHETIC_S = 3.0
@@ -68,6 +73,7 @@ def add(commands: Subcommands) -> None:
         (
             "rtradar run synthetic:walk --duration 3 --out out/walk",
             "rtradar run walk.amc --skeleton walk.asf --scene living-room --out out/room",
+            "rtradar run synthetic:walk synthetic:kick --at 0.5,1 --at -1,-0.5,90 --out out/two",
             "rtradar run kick.bvh --radar paper-77ghz --fidelity analytic --out out/kick",
         ),
     )
@@ -133,9 +139,27 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "motion",
         "MOTION",
-        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch, :jumping_jack or :stand",
+        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch, :jumping_jack or :stand; "
+        "several for several people, none where the scene has its own",
+        nargs="*",
     )
-    command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
+    command.intermixed = True
+    command.option(
+        "--at",
+        "X,Y[,HEADING]",
+        "place [m] and heading [degree] of a person in the scene, once for each MOTION, in order",
+        type=place_at,
+        action="append",
+        default=[],
+    )
+    command.option(
+        "--skeleton",
+        "ASF",
+        "the .asf file that an .amc recording needs; one for all, or one for each, in order",
+        type=path,
+        action="append",
+        default=[],
+    )
     command.option(
         "--radar",
         "NAME|TOML",
@@ -266,23 +290,60 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     from rtradar.scene import Scene
 
     radar, scene = Radar.load(options.radar), Scene.load(options.scene)
-    from rtradar.motion import load_motion, synthetic_motion
-
-    if options.motion.startswith(_SYNTHETIC):
-        if options.skeleton is not None:
-            raise InputError(
-                f"{options.motion}: a synthetic actor has its own skeleton; leave --skeleton out"
-            )
-        duration_s = _SYNTHETIC_S if options.duration_s is None else options.duration_s
-        activity = options.motion.removeprefix(_SYNTHETIC)
-        end_s = options.start_s + duration_s
-        motion = synthetic_motion(activity, seed=options.seed, duration_s=end_s)
-    else:
-        motion = load_motion(options.motion, skeleton=options.skeleton)
     return settings | {
-        "motion": motion,
+        "motion": _people(options),
         "radar": radar,
         "scene": scene,
         "out": options.out,
         "overwrite": options.overwrite,
     }
+
+
+def _people(options: argparse.Namespace) -> list[Motion | Person]:
+    """Return the motions of the command line, as people where places are given."""
+    names, places = options.motion, options.at
+    if len(places) not in (0 if len(names) < 2 else len(names), len(names)):
+        raise InputError(
+            f"{len(names)} MOTION and {len(places)} --at; several people need places: give "
+            "--at X,Y once for each MOTION, in the same order"
+        )
+    if not names:
+        return []
+    skeletons = _skeletons(names, options.skeleton)
+    from rtradar.motion import load_motion, synthetic_motion
+
+    motions: list[Motion] = []
+    for person, name in enumerate(names):
+        if name.startswith(_SYNTHETIC):
+            duration_s = _SYNTHETIC_S if options.duration_s is None else options.duration_s
+            motion = synthetic_motion(
+                name.removeprefix(_SYNTHETIC),
+                seed=options.seed + person,
+                duration_s=options.start_s + duration_s,
+            )
+        else:
+            motion = load_motion(name, skeleton=skeletons.get(name))
+        motions.append(motion)
+    if not places:
+        return [*motions]
+    from rtradar.body import Person  # which takes long to import
+
+    return [Person(motion, **own) for motion, own in zip(motions, places, strict=True)]
+
+
+def _skeletons(names: Sequence[str], skeletons: Sequence[Path]) -> dict[str, Path]:
+    """Return the skeleton of each recording: the only one, or one for each in order."""
+    if not skeletons:
+        return {}
+    recorded = [name for name in names if not name.startswith(_SYNTHETIC)]
+    needing = [name for name in recorded if name.lower().endswith(".amc")] or recorded
+    if not needing:
+        raise InputError(
+            f"{names[0]}: a synthetic actor has its own skeleton; leave --skeleton out"
+        )
+    if len(skeletons) not in (1, len(needing)):
+        raise InputError(
+            f"{len(needing)} recordings need a skeleton, and {len(skeletons)} are given; give "
+            "--skeleton once for all, or once for each, in order"
+        )
+    return dict(zip(needing, cycle(skeletons), strict=False))

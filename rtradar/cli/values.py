@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -41,7 +42,7 @@ class OneLineParser(argparse.ArgumentParser):
         examples: Sequence[str] = (),
         **options: Any,
     ) -> None:
-        self._fill = fill
+        self._fill, self.intermixed = fill, False
         if examples:
             options["epilog"] = "\n  ".join(["examples:", *examples])
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
@@ -62,8 +63,13 @@ class OneLineParser(argparse.ArgumentParser):
             fill(self)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the arguments that are known."""
+        """Parse the arguments that are known, with options among the others if `intermixed`."""
         self._filled()
+        if args is not None:
+            args = _joined(args)
+        if self.intermixed:
+            self.intermixed = False  # for it calls this method
+            return self.parse_known_intermixed_args(args, namespace)
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
@@ -83,6 +89,17 @@ class OneLineParser(argparse.ArgumentParser):
         """Return the help."""
         self._filled()
         return super().format_help()
+
+
+def _joined(args: Sequence[str]) -> list[str]:
+    """Join an option and a value that begins with a negative number, such as ``--at -1,0.5``."""
+    found: list[str] = []
+    for text in args:
+        if found and found[-1].startswith("--") and re.match(r"-\.?\d[^ ]*,", text):
+            found[-1] += "=" + text
+        else:
+            found.append(text)
+    return found
 
 
 def add_command(
@@ -167,6 +184,15 @@ def window(text: str) -> str | tuple[str, float]:
     """Read a window function: a name, or a name and its parameter."""
     name, colon, value = text.partition(":")
     return (name, number(value)) if colon else name
+
+
+@_named("place X,Y[,HEADING], such as -1,0.5 or 0,2,90")
+def place_at(text: str) -> dict[str, Any]:
+    """Read where a person is, x and y [m], and the heading [degree] if there is one."""
+    x, y, *heading = (number(part) for part in text.split(","))
+    if len(heading) > 1:
+        raise ValueError
+    return {"position_m": (x, y)} | ({"heading_deg": heading[0]} if heading else {})
 
 
 @_named("amplitude [mm] and rate [Hz], such as 3,0.25")

@@ -96,6 +96,7 @@ def people_in(scene: Scene, given: Moving) -> tuple[Person, ...]:
         one if isinstance(one, Person) else Person(one, scene.person_position_m, scene.heading_deg)
         for one in several
     )
+    everyone += scene.people
     if not everyone:
         raise InputError(
             f"scene '{scene.name}': nobody is there; give a motion, or several with their places"

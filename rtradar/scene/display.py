@@ -10,6 +10,7 @@ import numpy as np
 from rtradar.scene.objects import ROOM_SIDES
 
 if TYPE_CHECKING:
+    from rtradar.body import Person
     from rtradar.scene.objects import Furniture, Wall
     from rtradar.scene.scene import Scene
 
@@ -26,6 +27,8 @@ def brief_rows(scene: Scene) -> dict[str, str]:
     kinds += [("Objects", scene.objects)] if scene.objects else []
     for kind, parts in kinds:
         rows[kind] = f"{len(parts)}: {_names(parts)}" if parts else "none"
+    if scene.people:
+        rows["People"] = f"{len(scene.people)}: {', '.join(map(_person, scene.people))}"
     if scene.materials:
         rows["Materials"] = ", ".join(material.name for material in scene.materials)
     return {label.lower(): value for label, value in rows.items()}
@@ -40,6 +43,8 @@ def tables(scene: Scene) -> dict[str, dict[str, str]]:
     furniture = {piece.name: _piece(piece) for piece in scene.furniture}
     objects = {piece.name: _piece(piece) for piece in scene.objects}
     found = {"": room_rows(scene)}
+    if scene.people:
+        found[""]["People"] = ", ".join(map(_person, scene.people))
     for kind, rows in (("Walls", walls), ("Furniture", furniture), ("Objects", objects)):
         count = len(rows)
         if len(rows) > _MOST_ROWS:
@@ -66,6 +71,11 @@ def room_rows(scene: Scene) -> dict[str, str]:
 
 def _names(parts: Iterable[Wall | Furniture]) -> str:
     return ", ".join(part.name for part in parts)
+
+
+def _person(person: Person) -> str:
+    turned = f", turned by {person.heading_deg:g}°" if person.heading_deg else ""
+    return f"{person.motion.name} at {_point(person.position_m)}{turned}"
 
 
 def _point(position_m: Iterable[float]) -> str:

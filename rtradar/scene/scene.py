@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from rtradar.cards import html_card, text_card
-from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M
+from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene import display
+from rtradar.scene import display, people
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.moving import Object, motion_of
@@ -38,6 +38,8 @@ from rtradar.system.registries import scene_files
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from rtradar.body import Person
+
 Piece = TypeVar("Piece", Wall, Furniture, Object)
 
 KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -55,15 +57,11 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             "name mesh material motion",
             "position_m pivot_m yaw_deg scale metres_per_unit sheet",
         ),
+        ("[[people]]", "motion", people.KEYS),
         ("[materials.NAME]", "source low_hz high_hz a", "b c d"),
     )
 }
 """Keys of each table of a scene file: those that must be given, and the others."""
-
-PERSON_LIMITS: Mapping[str, tuple[float, float]] = {
-    "position_m": (-100.0, 100.0),
-    "heading_deg": (-360.0, 360.0),
-}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -82,6 +80,8 @@ class Scene:
         Meshes in the room.
     objects : tuple of Object
         Rigid meshes that move.
+    people : tuple of Person
+        People who are in the scene already, beside those whom a run is given.
     radar_position_m : tuple of float, optional
         Position of the radar in this scene, world [m]; its axes stay parallel to the world's. The
         radar keeps its own position where this is left out.
@@ -108,6 +108,7 @@ class Scene:
     walls: tuple[Wall, ...] = ()
     furniture: tuple[Furniture, ...] = ()
     objects: tuple[Object, ...] = ()
+    people: tuple[Person, ...] = ()
     radar_position_m: Vector | None = None
     person_position_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0
@@ -128,6 +129,7 @@ class Scene:
                     f"{where}: {key} has two of the name '{twice[0]}'; give each its own"
                 )
             object.__setattr__(self, key, pieces)
+        object.__setattr__(self, "people", people.checked(where, self.people))
         if self.radar_position_m is not None:
             position = check_vector(where, "radar position_m", self.radar_position_m, 3)
             object.__setattr__(self, "radar_position_m", position)
@@ -295,7 +297,7 @@ def _named(name: str) -> Path:
 def _fields(table: Table, path: Path) -> dict[str, Any]:
     """Turn the table of the file at ``path`` into the fields of a `Scene`."""
     texts = KEYS["top"][1]
-    tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects")
+    tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects", "people")
     check_keys("", table, (), (*texts, *tables))
     for key in texts:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
@@ -308,6 +310,7 @@ def _fields(table: Table, path: Path) -> dict[str, Any]:
         "walls": (*room, *_pieces("walls", Wall, table, materials, path.parent)),
         "furniture": _pieces("furniture", Furniture, table, materials, path.parent),
         "objects": _pieces("objects", Object, table, materials, path.parent),
+        "people": people.people_of(table, path.parent),
     }
     if "radar" in table:
         radar = table_at("radar", table)
