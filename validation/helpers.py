@@ -1,4 +1,4 @@
-"""Helpers that several scripts share: decibels, root mean squares, and bodies of one ellipsoid.
+"""Helpers that several scripts share: decibels, root mean squares, simple bodies, a patch antenna.
 
 None of them uses what the scripts judge. A script imports them after this folder has joined
 ``sys.path``, because each runs by hand from any folder.
@@ -61,3 +61,32 @@ class MovingEllipsoid:
         frame = np.eye(3) if self.frame is None else self.frame
         centres = np.array(self.centre) + times[:, None, None] * np.array(self.velocity)
         return Poses(centres, np.broadcast_to(frame, (len(times), 1, 3, 3)), self.semi_axes)
+
+
+def patch_antenna() -> rt.Antenna:
+    """A rectangular microstrip patch in vertical polarisation, on a ground plane of some size.
+
+    Cavity model of C. A. Balanis, Antenna Theory (3rd ed.), eqs. 14-43 to 14-45, on a substrate of
+    a relative permittivity of 2.2, its thickness neglected: the patch is L = 0.337 and W = 0.395
+    wavelengths long and wide (eqs. 14-6 and 14-7). In elevation, the E-plane, the field falls as
+    cos(pi L sin theta), in azimuth, the H-plane, as cos(theta) sinc(W sin theta). A finite ground
+    plane lets a little through to the back, 20 dB less than ahead, which the model has not. The
+    gain is that of the pattern without losses.
+    """
+    length, width, back_db = 0.337, 0.395, -20.0
+    degrees = np.arange(-180.0, 181.0, 5.0)
+    angle, high = np.radians(degrees), np.abs(degrees) <= 90  # elevation ends at the zenith
+    sine, ahead = np.sin(angle), np.maximum(np.cos(angle), 0.0)
+    azimuth = np.maximum(field_db((ahead * np.sinc(width * sine)).clip(1e-9)), back_db)
+    elevation = field_db(np.cos(np.pi * length * sine[high]))
+    # Power through the unit sphere, of which 1 would be isotropic; solid angle is cos(e) de da.
+    over_e = np.cos(angle[high]) * 10 ** (elevation / 10)
+    whole = np.outer(10 ** (azimuth[:-1] / 10), over_e).sum() * np.radians(5.0) ** 2
+    return rt.Antenna(
+        pattern="table",
+        gain_dbi=power_db(4 * np.pi / whole),
+        azimuth_deg=tuple(degrees),
+        azimuth_db=tuple(azimuth),
+        elevation_deg=tuple(degrees[high]),
+        elevation_db=tuple(elevation),
+    )
