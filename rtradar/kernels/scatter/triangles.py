@@ -59,7 +59,7 @@ def _sine(angle):
 
 
 @inlined(fastmath=FAST)
-def _by_series(a, b):
+def by_series(a, b):
     """Mean of exp(j phase), real and imaginary, for phases a, b and -a - b that differ little."""
     p = a * a + a * b + b * b
     q = -a * b * (a + b)
@@ -98,7 +98,7 @@ def mean_of_phasor(a, b, c):
     These add up to 0: the caller takes out their mean.
     """
     if a * a + a * b + b * b < _EXACT_SERIES:
-        return _by_series(-a, -b)
+        return by_series(-a, -b)
     return _by_differences(0.0, -a, -b, 1.0)
 
 
@@ -107,7 +107,7 @@ def sum_small(mean, u, v, strength, k):
     """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), small u, v and -u - v."""
     real, imaginary = 0.0, 0.0
     for i in range(len(mean)):
-        mean_re, mean_im = _by_series(-k * u[i], -k * v[i])
+        mean_re, mean_im = by_series(-k * u[i], -k * v[i])
         turn_re, turn_im = fast_phasor(-k * mean[i])
         real += strength[i] * (turn_re * mean_re - turn_im * mean_im)
         imaginary += strength[i] * (turn_re * mean_im + turn_im * mean_re)

@@ -92,7 +92,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     bar = tqdm(pieces, desc="furniture", unit="piece", disable=None, leave=False, delay=_PATIENCE_S)
     for piece, triangles in bar:
         last = first + len(triangles.faces)
-        grid = _facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
+        grid = small_facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
         own = _Piece(surfaces, first, last)
         returns = _returns(piece, triangles.closed, own, grid, radar, scene)
         if returns is not None:
@@ -114,7 +114,7 @@ def _facet_edge(corners: Array, radar: Radar) -> float:
     return float(min(flat, 2 * radar.range_bin_m, _OF_PIECE * (high - low).max()))
 
 
-def _facets(corners: Array, first: int, edge: float) -> MeshGrid:
+def small_facets(corners: Array, first: int, edge: float) -> MeshGrid:
     """Faces, numbered from ``first`` on, halved across their longest sides until these fit."""
     face = np.arange(first, first + len(corners))
     done: list[tuple[Array, Indices]] = []

@@ -1,0 +1,297 @@
+"""The physical-optics integral over facets that move fast, shared among echoes of fixed spacing.
+
+The integral is that of `rtradar.kernels.scatter.facets`, with the exact phase at each chirp. What a
+facet returns is shared between the two echoes whose lengths are next to its path, by weights that
+add up to 1 and change smoothly: each share is turned back to the length of its echo, so that their
+sum is exact at every frequency where it is computed, and little phase is left over the sweep. A
+facet over which the path changes much in terms of the sweep is taken apart into its edges, and an
+edge into its ends: the mean of exp(-jk p) over a triangle with p = a <= b <= c at its corners is
+
+    2 j / (k (c - a)) * (E(b, c) - E(a, b)),  E(x, y) = exp(-jk (x + y) / 2) sinc(k (y - x) / 2)
+                                                      = j (exp(-jky) - exp(-jkx)) / (k (y - x)).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.elementary import fast_phasor, smoothstep
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.triangles import FAST, SERIES, by_series, mean_of_phasor
+
+Array = NDArray[np.float64]
+
+_MOST_TURN = 0.5
+"""Phase [rad] that may change over half the sweep between the ends of one piece of a facet."""
+
+_OVER_ROOT_PI = 1 / math.sqrt(math.pi)
+
+_BOWED = 0.75
+"""Part of the bow of a path over a triangle, from its corners to its middle, in the mean path."""
+
+
+class RigidFacets(NamedTuple):
+    """Facets of a rigid mesh in its own axes, about a point of reference.
+
+    ``vertices (3, vertex)`` [m], of which the last are the middles of the facets in their order;
+    ``faces (facet, 3)`` int64; ``normals (facet, 3)``; ``planes (facet,)``, the product of normal
+    and any of the corners [m]; ``areas (facet,)`` [m^2]. With ``both_sides`` they are a sheet.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    normals: Array
+    planes: Array
+    areas: Array
+    both_sides: bool
+
+
+class RigidViews(NamedTuple):
+    """Tasks: a Tx and its Rx at one instant, in the axes of the mesh [m].
+
+    ``tx (task, 3)``, ``rx (task, rx, 3)``. Between the keyframes ``before (task,)`` and ``after
+    (task,)`` the task is at ``fraction (task,)``; ``seen (keyframe, place, facet)`` float32 is the
+    visibility from places of the array, whose weights in the antennas are ``tx_weight (task,
+    place)`` and ``rx_weight (task, rx, place)``; ``factor (keyframe, facet)`` is what the material
+    and the antennas make of the field of a conductor.
+    """
+
+    tx: Array
+    rx: Array
+    before: NDArray[np.int64]
+    after: NDArray[np.int64]
+    fraction: Array
+    seen: NDArray[np.float32]
+    tx_weight: Array
+    rx_weight: Array
+    factor: NDArray[np.complex128]
+
+
+class LengthGrid(NamedTuple):
+    """Echoes: paths ``(first + number) * step`` longer than that over the point of reference [m].
+
+    ``wavenumber (3,)`` [rad/m] are evenly spaced; ``sweep`` is half the sweep over its middle, and
+    ``back (3,)`` exp(-jk step).
+    """
+
+    first: int
+    step: float
+    wavenumber: Array
+    sweep: float
+    back: NDArray[np.complex128]
+
+
+@inlined(fastmath=FAST)
+def _excess(antenna, vertices, out):
+    """Path from the antenna to each vertex less that to the origin, which is returned."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    distance = math.sqrt(a * a + b * b + c * c)
+    x, y, z = vertices[0], vertices[1], vertices[2]
+    for i in range(len(out)):
+        p, q, r = x[i], y[i], z[i]
+        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
+        # |T - p| - |T| without the loss of digits of a far antenna.
+        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
+    return distance
+
+
+@inlined(fastmath=FAST)
+def _put(out, path, grid, value):
+    """Share the fields ``value (3,)`` exp(-jk path) between two echoes of ``out (3, echo)``.
+
+    As conjugates, turned back to the lengths of these. The three wavenumbers are evenly spaced.
+    """
+    place = path / grid.step - grid.first
+    cell = int(math.floor(place))
+    after = smoothstep(place - cell)
+    beyond = (place - cell) * grid.step
+    re, im = fast_phasor(grid.wavenumber[1] * beyond)
+    turn = complex(re, im)
+    re, im = fast_phasor((grid.wavenumber[2] - grid.wavenumber[1]) * beyond)
+    apart = complex(re, im)
+    for node in range(3):
+        own = turn * value[node].conjugate()
+        own *= apart.conjugate() if node == 0 else (apart if node == 2 else 1.0 + 0.0j)
+        out[node, cell] += (1 - after) * own
+        out[node, cell + 1] += after * grid.back[node] * own
+
+
+@inlined(fastmath=FAST)
+def _put_edge(out, low, high, grid, apart, value, field):
+    """The same for ``value (3,)`` E(low, high); taken ``apart`` into its ends."""
+    for node in range(3):
+        k = grid.wavenumber[node]
+        if apart:
+            field[node] = value[node] * complex(0.0, 1.0 / (k * (high - low)))
+        else:
+            half = 0.5 * k * (high - low)
+            field[node] = value[node] * (math.sin(half) / half if half > 1e-6 else 1.0)
+    if apart:
+        _put(out, high, grid, field)
+        for node in range(3):
+            field[node] = -field[node]
+        _put(out, low, grid, field)
+    else:
+        _put(out, 0.5 * (low + high), grid, field)
+
+
+@inlined(fastmath=FAST)
+def _put_facet(out, mean, u, v, grid, strength, field, value):
+    """Share the field of a facet (3, echo): its mean path, and those of two corners less it.
+
+    ``field`` and ``value (3,)`` are room to work in.
+    """
+    w, spread = -u - v, u * u + u * v + v * v
+    low, high = min(u, min(v, w)), max(u, max(v, w))
+    middle = -low - high
+    many = grid.wavenumber[1] * grid.sweep / _MOST_TURN
+    if (high - low) * many <= 1.0:
+        for node in range(3):
+            k = grid.wavenumber[node]
+            if spread * k * k < SERIES:
+                re, im = by_series(-k * u, -k * v)
+            else:
+                re, im = mean_of_phasor(k * u, k * v, k * w)
+            field[node] = strength * complex(-im * k, re * k) * _OVER_ROOT_PI
+        _put(out, mean, grid, field)
+        return
+    for node in range(3):
+        # j k times 2 j / (k (high - low)).
+        value[node] = strength * (-2.0 * _OVER_ROOT_PI / (high - low))
+    upper, lower = (high - middle) * many > 1.0, (middle - low) * many > 1.0
+    _put_edge(out, mean + middle, mean + high, grid, upper, value, field)
+    for node in range(3):
+        value[node] = -value[node]
+    _put_edge(out, mean + low, mean + middle, grid, lower, value, field)
+
+
+@inlined(fastmath=FAST)
+def _blend(before, after, fraction, weight, out):
+    """Fill ``out (facet,)`` with the visibility (place, facet) between keyframes, by weights."""
+    for f in range(len(out)):
+        out[f] = 0.0
+    for place in range(len(weight)):
+        if weight[place] != 0:
+            for f in range(len(out)):
+                seen = before[place, f] + fraction * (after[place, f] - before[place, f])
+                out[f] += weight[place] * seen
+
+
+@compiled()
+def facets_by_length(begin, end, facets, views, grid, spreading, out):
+    """Add to ``out (task, rx, node, echo)`` amplitudes as of `Echoes` [m], from begin to end."""
+    n_facets, n_vertices = len(facets.faces), facets.vertices.shape[1]
+    middle = n_vertices - n_facets
+    field, value = np.empty(3, dtype=np.complex128), np.empty(3, dtype=np.complex128)
+    to_tx, to_rx = np.empty(n_vertices), np.empty(n_vertices)
+    open_tx, open_rx, facing = np.empty(n_facets), np.empty(n_facets), np.empty(n_facets)
+    factor, lit = np.empty(n_facets, dtype=np.complex128), np.empty(n_facets, dtype=np.int64)
+    for task in range(begin, end):
+        fraction = smoothstep(views.fraction[task])
+        before, after = views.seen[views.before[task]], views.seen[views.after[task]]
+        first, last = views.factor[views.before[task]], views.factor[views.after[task]]
+        tx = views.tx[task]
+        far_tx = _excess(tx, facets.vertices, to_tx)
+        _blend(before, after, fraction, views.tx_weight[task], open_tx)
+        count = 0
+        for f in range(n_facets):
+            normal = facets.normals[f]
+            height = normal[0] * tx[0] + normal[1] * tx[1] + normal[2] * tx[2] - facets.planes[f]
+            if open_tx[f] > 0 and (height > 0 or facets.both_sides):
+                facing[f] = height / (far_tx + to_tx[middle + f])
+                factor[f] = first[f] + fraction * (last[f] - first[f])
+                lit[count] = f
+                count += 1
+        for r in range(views.rx.shape[1]):
+            rx = views.rx[task, r]
+            far_rx = _excess(rx, facets.vertices, to_rx)
+            _blend(before, after, fraction, views.rx_weight[task, r], open_rx)
+            for f in lit[:count]:
+                normal, far_r = facets.normals[f], far_rx + to_rx[middle + f]
+                height = normal[0] * rx[0] + normal[1] * rx[1] + normal[2] * rx[2]
+                along = (height - facets.planes[f]) / far_r
+                # Both on one side of the facet, which of a closed mesh is the outside.
+                if open_rx[f] <= 0 or along * facing[f] <= 0:
+                    continue
+                size = abs(along + facing[f]) / 2 * min(open_tx[f], open_rx[f]) * facets.areas[f]
+                if spreading:
+                    size /= (far_tx + to_tx[middle + f]) * far_r
+                a, b, c = facets.faces[f, 0], facets.faces[f, 1], facets.faces[f, 2]
+                first_path, second_path = to_tx[a] + to_rx[a], to_tx[b] + to_rx[b]
+                mean = (first_path + second_path + to_tx[c] + to_rx[c]) / 3
+                bow = _BOWED * (to_tx[middle + f] + to_rx[middle + f] - mean)
+                u, v = first_path - mean, second_path - mean
+                strength = size * factor[f]
+                _put_facet(out[task, r], mean + bow, u, v, grid, strength, field, value)
+
+
+def facets_by_length_reference(facets, views, grid, spreading):
+    """Field (task, rx, node) of the same facets without sharing, by middles of small triangles."""
+    from rtradar.kernels.scatter.triangles import midpoints
+
+    corners, fraction = facets.vertices.T[facets.faces], smoothstep(views.fraction)[:, None]
+    factor = views.factor[views.before] * (1 - fraction) + views.factor[views.after] * fraction
+    kept = fraction[..., None]
+    seen = views.seen[views.before] * (1 - kept) + views.seen[views.after] * kept
+    points = np.einsum("mc,fcx->fmx", midpoints(16), corners)
+    out = np.zeros((*views.rx.shape[:2], len(grid.wavenumber)), dtype=complex)
+    for task, receiver in np.ndindex(*views.rx.shape[:2]):
+        size = np.ones(len(corners))
+        path, total = -0.0, np.zeros(len(corners))
+        for antenna, weight in (
+            (views.tx[task], views.tx_weight[task]),
+            (views.rx[task, receiver], views.rx_weight[task, receiver]),
+        ):
+            away = np.linalg.norm(points - antenna, axis=-1)
+            path = path + away - np.linalg.norm(antenna)
+            middle = np.linalg.norm(corners.mean(axis=1) - antenna, axis=-1)
+            along = (facets.normals @ antenna - facets.planes) / middle
+            size *= (along > 0) / (middle if spreading else 1.0)
+            total += along / 2
+        both = np.minimum(
+            views.tx_weight[task] @ seen[task], views.rx_weight[task, receiver] @ seen[task]
+        )
+        strength = size * total * both * facets.areas * factor[task]
+        for node, k in enumerate(grid.wavenumber):
+            mean = np.exp(-1j * k * path).mean(axis=1)
+            out[task, receiver, node] = np.conj(1j * k / np.sqrt(np.pi) * (strength @ mean))
+    return out
+
+
+@compiled()
+def between_knots(field, first, fraction, tx, out):
+    """Fill ``out (node, chirp, rx, echo)`` with polynomials through ``field (knot, tx, rx, node, echo)``.
+
+    A chirp of the Tx ``tx (chirp,)`` is at ``fraction (chirp,)`` of the interval in the middle of
+    the six knots from ``first (chirp,)`` on; the polynomial is that of Lagrange.
+    """
+    weights = np.empty(6)
+    for chirp in range(len(first)):
+        knot, own = first[chirp], tx[chirp]
+        for i in range(6):
+            weights[i] = 1.0
+            for other in range(6):
+                if other != i:
+                    weights[i] *= (fraction[chirp] + 2 - other) / (i - other)
+        for r in range(out.shape[2]):
+            for node in range(out.shape[0]):
+                for echo in range(out.shape[3]):
+                    total = 0.0 + 0.0j
+                    for i in range(6):
+                        total += weights[i] * field[knot + i, own, r, node, echo]
+                    out[node, chirp, r, echo] = total
+
+
+def between_knots_reference(field, first, fraction, tx):
+    """The same by NumPy's polynomials, chirp by chirp."""
+    out = []
+    for chirp, knot in enumerate(first):
+        values = field[knot : knot + 6, tx[chirp]]
+        fitted = np.polynomial.polynomial.polyfit(np.arange(-2, 4), values.reshape(6, -1), 5)
+        out.append(np.polynomial.polynomial.polyval(fraction[chirp], fitted))
+    shaped = np.reshape(out, (len(first), *field.shape[2:]))
+    return np.moveaxis(shaped, 2, 0)

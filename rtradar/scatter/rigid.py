@@ -1,0 +1,318 @@
+"""Echoes of rigid objects that move: physical optics over their facets at every chirp.
+
+Facets are fixed in the object's axes, into which antennas are brought by the pose at each chirp, in
+float64. The integral over a facet, with the Fresnel coefficients of a half-space of its material at
+its own angle, is exact but for the bow of the path over it. What is visible from the array past
+furniture, other objects, people and the object itself, changes slowly: it is asked of Mitsuba at
+keyframes, for the middle of each facet, and fades smoothly in between; so do the coefficients.
+
+An object is seen over some lengths, one echo each, about that over its point of reference; each
+facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
+phases change slowly against those at the point of reference, the field is computed at knots in time
+for all pairs of antennas, with polynomials in between; else at every chirp.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.kernels.scatter.facets_by_length import (
+    LengthGrid,
+    RigidFacets,
+    RigidViews,
+    between_knots,
+    facets_by_length,
+)
+from rtradar.radar import Radar
+from rtradar.scatter.clutter.furniture import small_facets
+from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
+from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.polarization import antenna_field, copolar, unit
+from rtradar.scatter.validity import Limit
+from rtradar.scene import Object, reflection
+from rtradar.system.threads import thread_map
+from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.room_tracer import RoomTracer
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_NODES = 3
+"""Frequencies over the sweep: one pass of `synthesize` in float32 takes as many."""
+
+_LENGTHS_A_CELL = 3.0
+"""Echoes to a range cell of path, c / bandwidth: at three nodes, 0.3 % of a facet's field is lost
+at the ends of the sweep."""
+
+_BOW_RAD = 0.5
+"""Largest bow of paths over a facet [rad]; three quarters of it are corrected."""
+
+_OF_OBJECT = 0.125
+"""Largest facet over the longest extent of the object: what occludes it does so facet by facet."""
+
+_KNOT_RAD = 0.8
+"""Phase against the point of reference from one knot to the next: a polynomial through six is off
+by 0.2 %."""
+
+_KEYFRAME_S, _KEYFRAME_RAD = 20e-3, math.radians(10.0)
+"""Most time and most rotation from one keyframe to the next."""
+
+_KEPT_KEYFRAMES, _PASSING = 512, 64
+_SAMPLES, _STEP_S = 200, 1e-5
+"""Instants of a capture at which velocities and distances are looked at, and the time for both."""
+
+_TASKS_AT_ONCE = 16
+
+
+class _Keyframe(NamedTuple):
+    """Visibility (place, facet) float32, and what is left of a conductor's field (facet,)."""
+
+    seen: NDArray[np.float32]
+    factor: NDArray[np.complex128]
+
+
+class Past(NamedTuple):
+    """What may hide an object: the tracer of the room, and people with theirs, if there are any."""
+
+    room: RoomTracer
+    body: Body
+    people: BodyTracer
+
+
+class RigidEchoes:
+    """Echoes of one moving object for any chirps; ``past`` is what may hide it, None for nothing.
+
+    An `InputError` is raised if its mesh cannot be used, or comes within 0.3 m of an antenna while
+    the capture lasts.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        moving: Object,
+        duration_s: float,
+        past: Past | None,
+        *,
+        spreading: bool = True,
+    ) -> None:
+        self.moving, self._radar, self._past, self._spreading = moving, radar, past, spreading
+        shape = moving.shape
+        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+        self._reference = (low + high) / 2
+        own = shape.corners - self._reference
+        radius = float(np.linalg.norm(own, axis=-1).max())
+        nearest, rates, speeds, turning = self._kinematics(duration_s)
+        self.frequency = sweep_nodes(radar, _NODES)
+        wavenumber = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
+        k = wavenumber[-1]
+        bow_m = 2 * math.sqrt(_BOW_RAD * nearest / k)
+        edge = min(bow_m, _OF_OBJECT * float((high - low).max()))
+        self._facets = _rigid_facets(small_facets(own, 0, edge).corners, not shape.closed)
+        step = SPEED_OF_LIGHT_MPS / (_LENGTHS_A_CELL * radar.bandwidth_hz)
+        half = math.ceil(2 * radius / step) + 1
+        sweep = radar.bandwidth_hz / (2 * radar.centre_frequency_hz)
+        self._grid, self._count = (
+            LengthGrid(-half, step, wavenumber, sweep, np.exp(-1j * wavenumber * step)),
+            2 * half + 2,
+        )
+        self._knot_s = _KNOT_RAD / max(k * rates, _KNOT_RAD / _KEYFRAME_S)
+        self._keyframe_s = min(_KEYFRAME_S, _KEYFRAME_RAD / max(turning, 1e-9))
+        self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
+        self._places, self._tx_weight, self._rx_weight = shadow_nodes(radar)
+        self.limits = tuple(self._limits(speeds))
+
+    def _kinematics(self, duration_s: float) -> tuple[float, float, Array, float]:
+        """Least distance [m], largest rates, and range rates of the mesh over the capture.
+
+        Returned are the least distance from the radar to the ball about the object; the largest
+        rate of paths against that over the point of reference [m/s]; range rates (instant, vertex)
+        [m/s]; and the largest rate of rotation [rad/s].
+        """
+        shape, antenna = self.moving.shape, np.array(self._radar.position_m)
+        times = np.linspace(0.0, duration_s, _SAMPLES)
+        points = np.concatenate([shape.vertices, self._reference[None]])
+        early, late = (
+            np.einsum("tij,vj->tvi", rotation, points) + place[:, None]
+            for rotation, place in (self.moving.pose(at) for at in (times, times + _STEP_S))
+        )
+        ranges, later = (np.linalg.norm(at - antenna, axis=-1) for at in (early, late))
+        speeds = (later - ranges) / _STEP_S
+        self._refuse_too_near(times, ranges)
+        rates = 2 * float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
+        rotations = [self.moving.pose(at)[0] for at in (times, times + _STEP_S)]
+        # The chord of a small rotation, over all three axes, is sqrt(2) of its angle.
+        change = np.linalg.norm(rotations[1] - rotations[0], axis=(1, 2)) / math.sqrt(2)
+        nearest = max(float(ranges.min()), MINIMUM_ANTENNA_DISTANCE_M)
+        return nearest, rates, speeds[:, :-1], float(change.max()) / _STEP_S
+
+    def _refuse_too_near(self, times: Array, ranges: Array) -> None:
+        radar = self._radar
+        antennas = np.concatenate([radar.tx, radar.rx])
+        around = float(np.linalg.norm(antennas - np.array(radar.position_m), axis=1).max())
+        size = float(np.ptp(self.moving.shape.vertices, axis=0).max())
+        least = MINIMUM_ANTENNA_DISTANCE_M
+        for number in np.flatnonzero(ranges.min(axis=1) < least + around + size):
+            mesh = self.moving.triangles(float(times[number]))
+            gap = min(mesh.distance_m(antenna) for antenna in antennas)
+            if gap < least:
+                raise InputError(
+                    f"at {times[number]:.2f} s the object '{self.moving.name}' is {gap:.2f} m from "
+                    f"an antenna of radar '{radar.name}'; at least {least} m is allowed: move the "
+                    "radar (position_m) or the object"
+                )
+
+    def _limits(self, speeds: Array) -> list[Limit]:
+        radar, fastest = self._radar, float(np.abs(speeds).max())
+        if fastest <= radar.max_velocity_mps:
+            return []
+        fraction = float((np.abs(speeds) > radar.max_velocity_mps).mean())
+        return [
+            Limit(
+                "object_velocity_ambiguous",
+                fraction,
+                f"corners of object '{self.moving.name}', the fastest at {fastest:.2f} m/s, beyond "
+                f"the unambiguous {radar.max_velocity_mps:.2f} m/s: they show at another velocity",
+            )
+        ]
+
+    # -- echoes ------------------------------------------------------------------------------------
+
+    def echoes(self, chirps: Indices) -> tuple[Array, NDArray[np.complex64]]:
+        """Lengths (chirp, rx, echo) [m] and amplitudes (node, chirp, rx, echo) as of `Echoes` [m].
+
+        Only lengths at which something is seen are there, so their number changes from call to
+        call.
+        """
+        radar = self._radar
+        times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
+        numbers = np.floor(times / self._knot_s).astype(np.int64)
+        knots = np.unique(numbers[:, None] + np.arange(-2, 4))
+        if len(knots) * radar.n_tx < len(chirps):
+            every = np.repeat(knots * self._knot_s, radar.n_tx)
+            field = self._field(every, np.tile(np.arange(radar.n_tx), len(knots)))
+            used = field.any(axis=(0, 1, 2))
+            field = field[..., used].reshape(len(knots), radar.n_tx, *field.shape[1:3], -1)
+            amplitude = np.empty((_NODES, len(chirps), radar.n_rx, field.shape[-1]), np.complex64)
+            fraction = times / self._knot_s - numbers
+            first = np.searchsorted(knots, numbers - 2)
+            between_knots(field, first, fraction, tx, amplitude)
+        else:
+            field = self._field(times, tx)
+            used = field.any(axis=(0, 1, 2))
+            amplitude = np.moveaxis(field[..., used], 2, 0).astype(np.complex64)
+        over = self._over_reference(times, tx)
+        steps = (self._grid.first + np.flatnonzero(used)) * self._grid.step
+        return over[..., None] + steps, np.ascontiguousarray(amplitude)
+
+    def _pose(self, times: Array) -> tuple[Array, Array]:
+        """Rotations (time, 3, 3), and the point of reference (time, 3), world [m]."""
+        rotation, place = self.moving.pose(times)
+        return rotation, place + rotation @ self._reference
+
+    def _over_reference(self, times: Array, tx: Indices) -> Array:
+        """Paths over the point of reference (task, rx) [m]."""
+        radar, at = self._radar, self._pose(times)[1]
+        out = np.linalg.norm(radar.tx[tx] - at, axis=1)
+        back = np.linalg.norm(radar.rx[radar.rx_of_tx[tx]] - at[:, None], axis=2)
+        return np.asarray(out[:, None] + back)
+
+    def _field(self, times: Array, tx: Indices) -> NDArray[np.complex128]:
+        """Amplitudes (task, rx, node, echo) at the times of tasks and for their Tx."""
+        radar, (rotation, at) = self._radar, self._pose(times)
+        place = times / self._keyframe_s
+        before = np.floor(place).astype(np.int64)
+        numbers = np.unique([before, before + 1])
+        keyframes = self._find(numbers.tolist())
+        rx = radar.rx_of_tx[tx]
+        views = RigidViews(
+            tx=np.einsum("tji,tj->ti", rotation, radar.tx[tx] - at),
+            rx=np.einsum("tji,trj->tri", rotation, radar.rx[rx] - at[:, None]),
+            before=np.searchsorted(numbers, before),
+            after=np.searchsorted(numbers, before + 1),
+            fraction=place - before,
+            seen=np.stack([own.seen for own in keyframes]),
+            tx_weight=self._tx_weight[tx],
+            rx_weight=self._rx_weight[rx],
+            factor=np.stack([own.factor for own in keyframes]),
+        )
+        out = np.zeros((len(times), radar.n_rx, _NODES, self._count), dtype=np.complex128)
+        given = self._facets, views, self._grid, self._spreading, out
+        thread_map(
+            lambda first: facets_by_length(first, min(first + _TASKS_AT_ONCE, len(out)), *given),
+            range(0, len(out), _TASKS_AT_ONCE),
+        )
+        return out
+
+    # -- keyframes ---------------------------------------------------------------------------------
+
+    def _find(self, numbers: list[int]) -> list[_Keyframe]:
+        cache = self._keyframes
+        return [cache.get(number, lambda own=number: self._keyframe(own)) for number in numbers]
+
+    def _keyframe(self, number: int) -> _Keyframe:
+        time_s, facets = number * self._keyframe_s, self._facets
+        (rotation,), (at,) = self._pose(np.array([time_s]))
+        middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
+        normals = facets.normals @ rotation.T
+        places = self._places
+        facing = np.einsum("fi,pfi->pf", normals, places[:, None] - middles)
+        seen = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
+        if self._past is not None:
+            place, facet = np.nonzero(seen)
+            seen[place, facet] = self._clear(time_s, places[place], middles[facet])
+        return _Keyframe(seen.astype(np.float32), self._factor(middles, normals))
+
+    def _clear(self, time_s: float, origins: Array, targets: Array) -> NDArray[np.bool_]:
+        assert self._past is not None
+        room, body, people = self._past
+        room.pose(time_s)
+        clear = ~room.blocked(origins, targets)
+        poses = body.at([min(max(time_s, 0.0), body.duration_s)])
+        people.pose(poses.centres[0], poses.frames[0])
+        on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
+        clear[clear] = people.sees(origins[clear], targets[clear], on_none)
+        return clear
+
+    def _factor(self, middles: Array, normals: Array) -> NDArray[np.complex128]:
+        """Field of each facet over that of a conductor between isotropic antennas, (facet,).
+
+        It is that of the middle of the array. With the fraction p of TE in the field that is sent,
+        what comes back the same way is p times minus the coefficient of TE, and the rest times that
+        of TM.
+        """
+        radar, way = self._radar, unit(middles - np.array(self._radar.position_m))
+        factor = np.asarray(copolar(-way, -way, radar.polarization), dtype=np.complex128)
+        for antenna in (radar.tx_antenna, radar.rx_antenna):
+            if antenna is not None:
+                factor *= np.sqrt(antenna.relative(way, radar.polarization))
+        if self.moving.material.conducts:
+            return factor
+        cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)
+        across = unit(np.cross(way, normals))
+        te = np.sum(antenna_field(way, radar.polarization) * across, axis=-1) ** 2
+        eta = self.moving.material.eta(np.array([radar.centre_frequency_hz]))
+        in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+        return np.asarray(factor * (in_tm - te * (in_te + in_tm)))
+
+
+def _rigid_facets(corners: Array, both_sides: bool) -> RigidFacets:
+    """Facets of triangles (facet, 3, 3), whose equal corners become one vertex."""
+    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(across, axis=1)
+    normals = across / twice[:, None]
+    return RigidFacets(
+        vertices=np.ascontiguousarray(np.concatenate([vertices, corners.mean(axis=1)]).T),
+        faces=np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64),
+        normals=np.ascontiguousarray(normals),
+        planes=np.einsum("fi,fi->f", normals, corners[:, 0]),
+        areas=twice / 2,
+        both_sides=both_sides,
+    )
