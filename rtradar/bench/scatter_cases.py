@@ -306,3 +306,51 @@ def _delayed_lengths(k: Any) -> Calls:
     given = antennas, tx, points, bodies, delays, 8 + rng.random((100, 8, 273))
     call = filled(k.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
     return call, lambda: k.delayed_lengths_reference(*given)
+
+
+# -- objects that move -----------------------------------------------------------------------------
+
+
+@kernel_case(
+    "scatter.facets_by_length.facets_by_length", "echoes of 32 facets at 8 chirps, added up", 2e-3
+)
+def _facets_by_length(k: Any) -> Calls:
+    rng, chirps, receivers = np.random.default_rng(0), 8, 4
+    across = np.linspace(-0.06, 0.06, 5)
+    corner = np.stack(np.meshgrid([0.0], across, across), axis=-1).reshape(-1, 3)
+    square = (np.arange(4)[:, None] * 5 + np.arange(4)).reshape(-1, 1)
+    faces = np.concatenate([np.add(square, [0, 1, 6]), np.add(square, [0, 6, 5])])
+    vertices = np.concatenate([corner, corner[faces].mean(axis=1)]).T
+    count = len(faces)
+    normals, areas = np.tile([1.0, 0.0, 0.0], (count, 1)), np.full(count, 0.03**2 / 2)
+    facets = k.RigidFacets(
+        np.ascontiguousarray(vertices), faces, normals, np.zeros(count), areas, False
+    )
+    angle, pose = rng.uniform(-1, 1, chirps), np.arange(chirps)
+    tx = 40 * np.stack([np.cos(angle), np.sin(angle), np.zeros(chirps)], axis=1)
+    rx = tx[:, None] + rng.uniform(-0.05, 0.05, (chirps, receivers, 3))
+    factor = rng.normal(size=(chirps, count)) + 1j * rng.normal(size=(chirps, count))
+    views = k.RigidViews(
+        tx, rx, pose, pose, np.zeros(chirps), np.ones((chirps, 1, count), dtype=np.float32),
+        np.ones((chirps, 1)), np.ones((chirps, receivers, 1)), factor,
+    )  # fmt: skip
+    wavenumber, step = _WAVENUMBER * np.array([0.9, 1.0, 1.1]), 0.025
+    grid = k.LengthGrid(-40, step, wavenumber, 0.14, np.exp(-1j * wavenumber * step))
+    out = np.empty((chirps, receivers, 3, 80), dtype=np.complex128)
+    fill = filled(k.facets_by_length, 0, chirps, facets, views, grid, True, out=(out,), adds=True)
+    turned = np.exp(1j * wavenumber[:, None] * step * (grid.first + np.arange(80)))
+
+    def added() -> Any:
+        fill()
+        return (out * turned).sum(axis=3)
+
+    return added, lambda: k.facets_by_length_reference(facets, views, grid, True)
+
+
+@kernel_case("scatter.facets_by_length.between_knots", "100 chirps between 12 knots", 1e-6)
+def _between_knots(k: Any) -> Calls:
+    rng = np.random.default_rng(0)
+    field = rng.normal(size=(12, 3, 4, 3, 20)) + 1j * rng.normal(size=(12, 3, 4, 3, 20))
+    given = field, rng.integers(0, 7, 100), rng.uniform(0, 1, 100), rng.integers(0, 3, 100)
+    call = filled(k.between_knots, *given, out=(np.empty((3, 100, 4, 20), np.complex64),))
+    return call, lambda: k.between_knots_reference(*given)

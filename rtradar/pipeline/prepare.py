@@ -21,10 +21,12 @@ from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import reuse_freed_memory, stage_line
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.radar import Radar
-from rtradar.scatter import EchoModel, build_model
+from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget, link_budget
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.together import World, build_world, model_of_people
+from rtradar.scatter.validity import warn_of
 from rtradar.scene import Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
@@ -58,17 +60,21 @@ def prepare(people: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         warmup_s = time.perf_counter() - warm_up_start
     with warnings.catch_warnings(record=True) as caught, processing.stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
-        person = model.person if isinstance(model, RoomModel) else model
-        spreading = settings.spreading
+        person, spreading = model_of_people(model), settings.spreading
         budget = link_budget(person, radar, body, n_chirps, spreading=spreading, scene=scene)
+        if isinstance(model, World):
+            budget = replace(budget, limits=(*budget.limits, *model.limits))
+            for limit in model.limits:
+                warn_of(limit)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
     inside = None
-    if isinstance(model, RoomModel):
+    around = model.person if isinstance(model, World) else model
+    if isinstance(around, RoomModel):
         with processing.stages.time("room"):
             powers = budget.power, noise.power
-            inside = indoors(model, radar, body, scene, settings, n_chirps, *powers)
+            inside = indoors(around, radar, body, scene, settings, n_chirps, *powers)
     return Capture(
         motion=" and ".join(body.names),
         scene=scene,
@@ -126,7 +132,7 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
         )
     if (material := materials.pop()) != "perfect-conductor":
         options["material"] = material
-    return build_model(
+    return build_world(
         settings.fidelity,
         radar,
         body,

@@ -71,7 +71,7 @@ def build_model(
         Where it is of another package, and fails.
     """
     kind = MODELS.find(fidelity)
-    room = scene if scene is not None and (scene.walls or scene.furniture) else None
+    room = scene if scene is not None and not scene.is_empty else None
     if room is not None:
         _check_for_room(fidelity, radar, room)
     with MODELS.guarded(fidelity):

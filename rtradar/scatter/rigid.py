@@ -51,7 +51,7 @@ _LENGTHS_A_CELL = 3.0
 """Echoes to a range cell of path, c / bandwidth: at three nodes, 0.3 % of a facet's field is lost
 at the ends of the sweep."""
 
-_BOW_RAD = 0.5
+_BOW_RAD = 0.3
 """Largest bow of paths over a facet [rad]; three quarters of it are corrected."""
 
 _OF_OBJECT = 0.125
@@ -253,8 +253,12 @@ class RigidEchoes:
     # -- keyframes ---------------------------------------------------------------------------------
 
     def _find(self, numbers: list[int]) -> list[_Keyframe]:
-        cache = self._keyframes
-        return [cache.get(number, lambda own=number: self._keyframe(own)) for number in numbers]
+        found = []
+        for number in numbers:
+            if number not in self._keyframes:
+                self._keyframes.keep(number, self._keyframe(number))
+            found.append(self._keyframes[number])
+        return found
 
     def _keyframe(self, number: int) -> _Keyframe:
         time_s, facets = number * self._keyframe_s, self._facets

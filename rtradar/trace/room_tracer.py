@@ -74,11 +74,14 @@ class RoomTracer:
         """Put the objects where they are at a time since the start of the capture [s]."""
         self._poses = [moving.pose(time_s) for moving in self._objects]
 
-    def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
+    def blocked(
+        self, origins: ArrayLike, targets: ArrayLike, times: ArrayLike | None = None
+    ) -> NDArray[np.bool_]:
         """Whether anything is between two points, ``origins`` and ``targets (..., 3)``, world [m].
 
         Both are drawn in by `CLEAR_M`, so either may be on a surface. The answer is False in an
-        empty room, and where two points are at most twice `CLEAR_M` apart.
+        empty room, and where two points are at most twice `CLEAR_M` apart. With ``times (...)`` [s]
+        objects are where they are at each of them, and stay where they are last.
         """
         starts, ends = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
@@ -90,8 +93,21 @@ class RoomTracer:
             return met.reshape(shape)
         if self._still is not None:
             met |= self._still.meets(starts, ends)
+        if times is None or not self._solids:
+            return self._past_objects(starts, ends, met).reshape(shape)
+        moments, moment = np.unique(np.broadcast_to(times, shape), return_inverse=True)
+        for number, time_s in enumerate(moments.tolist()):
+            own = np.flatnonzero(moment.ravel() == number)
+            self.pose(time_s)
+            met[own] = self._past_objects(starts[own], ends[own], met[own])
+        return met.reshape(shape)
+
+    def _past_objects(
+        self, starts: Array, ends: Array, met: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
+        """Add to what rays (ray, 3) have ``met (ray,)`` the objects where they are posed."""
         for solid, (rotation, place) in zip(self._solids, self._poses, strict=True):
             clear = np.flatnonzero(~met)
             own = ((points[clear] - place[0]) @ rotation[0] for points in (starts, ends))
             met[clear] = solid.meets(*own)
-        return met.reshape(shape)
+        return met

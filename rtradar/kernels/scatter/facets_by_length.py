@@ -21,7 +21,13 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.elementary import fast_phasor, smoothstep
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.scatter.triangles import FAST, SERIES, by_series, mean_of_phasor
+from rtradar.kernels.scatter.triangles import (
+    FAST,
+    SERIES,
+    by_series,
+    mean_of_phasor,
+    midpoints,
+)
 
 Array = NDArray[np.float64]
 
@@ -106,7 +112,7 @@ def _put(out, path, grid, value):
     As conjugates, turned back to the lengths of these. The three wavenumbers are evenly spaced.
     """
     place = path / grid.step - grid.first
-    cell = int(math.floor(place))
+    cell = math.floor(place)
     after = smoothstep(place - cell)
     beyond = (place - cell) * grid.step
     re, im = fast_phasor(grid.wavenumber[1] * beyond)
@@ -230,44 +236,31 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
 
 
 def facets_by_length_reference(facets, views, grid, spreading):
-    """Field (task, rx, node) of the same facets without sharing, by middles of small triangles."""
-    from rtradar.kernels.scatter.triangles import midpoints
-
-    corners, fraction = facets.vertices.T[facets.faces], smoothstep(views.fraction)[:, None]
-    factor = views.factor[views.before] * (1 - fraction) + views.factor[views.after] * fraction
-    kept = fraction[..., None]
-    seen = views.seen[views.before] * (1 - kept) + views.seen[views.after] * kept
-    points = np.einsum("mc,fcx->fmx", midpoints(16), corners)
-    out = np.zeros((*views.rx.shape[:2], len(grid.wavenumber)), dtype=complex)
-    for task, receiver in np.ndindex(*views.rx.shape[:2]):
-        size = np.ones(len(corners))
-        path, total = -0.0, np.zeros(len(corners))
-        for antenna, weight in (
-            (views.tx[task], views.tx_weight[task]),
-            (views.rx[task, receiver], views.rx_weight[task, receiver]),
-        ):
-            away = np.linalg.norm(points - antenna, axis=-1)
-            path = path + away - np.linalg.norm(antenna)
-            middle = np.linalg.norm(corners.mean(axis=1) - antenna, axis=-1)
-            along = (facets.normals @ antenna - facets.planes) / middle
-            size *= (along > 0) / (middle if spreading else 1.0)
-            total += along / 2
-        both = np.minimum(
-            views.tx_weight[task] @ seen[task], views.rx_weight[task, receiver] @ seen[task]
-        )
-        strength = size * total * both * facets.areas * factor[task]
-        for node, k in enumerate(grid.wavenumber):
-            mean = np.exp(-1j * k * path).mean(axis=1)
-            out[task, receiver, node] = np.conj(1j * k / np.sqrt(np.pi) * (strength @ mean))
-    return out
+    """Field (task, rx, node) of facets all seen, by middles of small triangles and not shared."""
+    corners, out = facets.vertices.T[facets.faces], []
+    points = np.einsum("mc,fcx->fmx", midpoints(48), corners)
+    for tx, receivers, pose in zip(views.tx, views.rx, views.before, strict=True):
+        for rx in receivers:
+            path, along, size = 0.0, [], facets.areas * views.factor[pose]
+            for antenna in (tx, rx):
+                path = path + np.linalg.norm(points - antenna, axis=-1) - np.linalg.norm(antenna)
+                middle = np.linalg.norm(corners.mean(axis=1) - antenna, axis=-1)
+                along.append((facets.normals @ antenna - facets.planes) / middle)
+                size = size / (middle if spreading else 1.0)
+            size = size * (np.min(along, axis=0) > 0) * np.mean(along, axis=0)
+            k = grid.wavenumber[:, None, None]
+            phases = np.exp(-1j * k * path).mean(axis=2)
+            out.append(np.conj(1j * grid.wavenumber / np.sqrt(np.pi) * (phases @ size)))
+    return np.reshape(out, (*views.rx.shape[:2], -1))
 
 
 @compiled()
 def between_knots(field, first, fraction, tx, out):
-    """Fill ``out (node, chirp, rx, echo)`` with polynomials through ``field (knot, tx, rx, node, echo)``.
+    """Fill ``out (node, chirp, rx, echo)`` with polynomials through values at knots in time.
 
-    A chirp of the Tx ``tx (chirp,)`` is at ``fraction (chirp,)`` of the interval in the middle of
-    the six knots from ``first (chirp,)`` on; the polynomial is that of Lagrange.
+    These are ``field (knot, tx, rx, node, echo)``. A chirp of the Tx ``tx (chirp,)`` is at
+    ``fraction (chirp,)`` of the interval in the middle of the six knots from ``first (chirp,)`` on;
+    the polynomial is that of Lagrange.
     """
     weights = np.empty(6)
     for chirp in range(len(first)):

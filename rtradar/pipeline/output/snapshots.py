@@ -18,6 +18,7 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.together import World
 from rtradar.scene import Scene, Triangles
 
 MAX_STEPS = 400
@@ -55,6 +56,8 @@ def snapshots(capture: Capture) -> Snapshots:
     array are summed by path, part and number of reflections.
     """
     model, radar, body, scene = capture.model, capture.radar, capture.body, capture.scene
+    # The view follows the parts of people.
+    model = model.person if isinstance(model, World) else model
     frame_starts = capture.frame_starts
     hop_s = radar.frame_hop_s
     if len(frame_starts) > 1:

@@ -71,8 +71,10 @@ class Surroundings(NamedTuple):
     polarization: Literal["v", "h"]
 
 
-def path_keyframes(around: Surroundings, columns: EchoColumns, poses: Poses) -> PathKeyframes:
-    """Compute what is left of the echoes at some poses.
+def path_keyframes(
+    around: Surroundings, columns: EchoColumns, poses: Poses, times: Array | None = None
+) -> PathKeyframes:
+    """Compute what is left of the echoes at some poses, with objects where they are at ``times``.
 
     Columns that are met for the first time are added. Whether other parts occlude a direct echo is
     decided by `SpecularVisibility`, not here.
@@ -98,7 +100,7 @@ def path_keyframes(around: Surroundings, columns: EchoColumns, poses: Poses) -> 
     seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & (strength > 0)
     seen &= exists[:, :, None, None]
     if around.tracers is not None:
-        seen &= _not_occluded(*around.tracers, legs, seen, poses, columns.part, direct)
+        seen &= _not_occluded(*around.tracers, legs, seen, poses, columns.part, direct, times)
     factor = _in_columns(columns, factors, strength)
     middle = factor[len(factor) // 2]
     change = np.abs(factor - middle) <= _FLAT * np.abs(middle)
@@ -252,14 +254,20 @@ def _not_occluded(
     poses: Poses,
     part: NDArray[np.int64],
     direct: NDArray[np.int64],
+    times: Array | None,
 ) -> NDArray[np.bool_]:
-    """Whether furniture and body leave both legs free, (keyframe, line, 2, rx_end, echo)."""
-    clear = []
+    """Whether furniture, objects and body leave both legs free.
+
+    Returned is (keyframe, line, 2, rx_end, echo).
+    """
+    clear, moments = [], None
     for leg, axis in zip(legs, (3, 2), strict=True):
         free = np.logical_or.reduce(seen, axis=axis)
         for chosen, origins, targets, _ in leg.sections:
             still = free[..., chosen]
-            still[still] = ~room.blocked(origins[still], targets[still])
+            if times is not None:
+                moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
+            still[still] = ~room.blocked(origins[still], targets[still], moments)
             free[..., chosen] = still
         clear.append(free)
     for keyframe in range(len(seen)):

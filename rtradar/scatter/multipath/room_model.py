@@ -116,7 +116,7 @@ class RoomModel:
         *,
         order: int = 1,
     ) -> None:
-        if not model.spreading and (scene.walls or scene.furniture):
+        if not model.spreading and not scene.is_empty:
             raise InputError(
                 f"scene '{scene.name}': spreading may be off in free space only; leave "
                 "--no-spreading out"
@@ -129,7 +129,7 @@ class RoomModel:
         )
         walls = WallResponse(scene.walls, series.walls, series.frequency)
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order)
-        self._empty = not scene.walls and not scene.furniture
+        self._empty = scene.is_empty
         self._legs = LegImages(radar, self.paths)
         self._columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         tracers = None
@@ -239,8 +239,9 @@ class RoomModel:
         missing = [number for number in numbers if number not in cache]
         for first in range(0, len(missing), _KEYFRAMES_AT_ONCE):
             some = missing[first : first + _KEYFRAMES_AT_ONCE]
-            at = chirp_poses(self._radar, self._body, np.array(some) * self._step)
-            keyframes = path_keyframes(self._around, self._columns, Poses(*at[3:]))
+            chirps = np.array(some) * self._step
+            at, times = chirp_poses(self._radar, self._body, chirps), self._radar.centres_of(chirps)
+            keyframes = path_keyframes(self._around, self._columns, Poses(*at[3:]), times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))
                 cache.stay = int(_KEPT_BYTES / sum(array.nbytes for array in own))

@@ -1,0 +1,161 @@
+"""Objects that move against `scattering_length` of their posed meshes, and who hides whom."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.motion import place
+from rtradar.scatter.rigid import RigidEchoes
+from rtradar.scatter.together import build_world, together
+from rtradar.scene import material, reflection
+
+RADAR = dataclasses.replace(
+    rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2, position_m=(0.0, 0.0, 1.0)
+)
+
+
+def field(
+    echoes: tuple[NDArray[np.float64], NDArray[np.complex64]], nodes: NDArray[np.float64]
+) -> NDArray[np.complex128]:
+    """Field (node, chirp, rx) of all echoes of an object."""
+    length, amplitude = echoes
+    k = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
+    return np.asarray(
+        (amplitude.conj() * np.exp(-1j * k[:, None, None, None] * length)).sum(axis=3)
+    )
+
+
+def box(motion: rt.Turning | rt.FollowingPath | None, made_of: str = "metal") -> rt.Object:
+    mesh = trimesh.creation.box((0.03, 0.3, 0.2))
+    return rt.Object("box", mesh, made_of, position_m=(2.5, 0.3, 1.1), motion=motion)
+
+
+@pytest.mark.parametrize("yaw_deg", [7.0, 25.0, 80.0])
+def test_it_returns_what_physical_optics_of_the_posed_mesh_does(yaw_deg: float) -> None:
+    still = dataclasses.replace(box(None), yaw_deg=yaw_deg)
+    model = RigidEchoes(RADAR, still, 0.1, None)
+    found = field(model.echoes(np.arange(2)), model.frequency)
+    posed = trimesh.Trimesh(still.triangles().vertices, still.shape.faces, process=False)
+    tx = np.repeat(RADAR.tx[RADAR.tx_of_chirp(np.arange(2))], RADAR.n_rx, axis=0)
+    rx = RADAR.rx[RADAR.rx_of_tx[RADAR.tx_of_chirp(np.arange(2))]].reshape(-1, 3)
+    ranges = np.linalg.norm(tx, axis=1) * np.linalg.norm(rx, axis=1)
+    # The largest that it ever returns, broadside, scales the error.
+    k = 2 * np.pi * model.frequency[1] / SPEED_OF_LIGHT_MPS
+    most = k * 0.3 * 0.2 / np.sqrt(np.pi) / 2.5**2
+    for node, frequency in enumerate(model.frequency):
+        expected = rt.scattering_length(posed, tx, rx, frequency, fidelity="physical-optics")
+        path = np.linalg.norm(tx, axis=1) + np.linalg.norm(rx, axis=1)
+        expected = expected / ranges * np.exp(-2j * np.pi * frequency * path / SPEED_OF_LIGHT_MPS)
+        np.testing.assert_allclose(found[node].ravel(), expected, atol=0.005 * most)
+
+
+def test_between_its_nodes_the_sweep_is_met_as_well() -> None:
+    still = dataclasses.replace(box(None), yaw_deg=25.0)
+    radar = dataclasses.replace(RADAR, bandwidth_hz=RADAR.bandwidth_hz * 0.999)
+    models = [RigidEchoes(one, still, 0.1, None) for one in (RADAR, radar)]
+    length, amplitude = models[0].echoes(np.arange(1))
+    # Another sweep has other nodes; at its ends the polynomial of the first is extrapolated least.
+    weights = np.array(
+        [
+            np.prod(
+                [
+                    (models[1].frequency - other) / (own - other)
+                    for other in models[0].frequency
+                    if other != own
+                ],
+                axis=0,
+            )
+            for own in models[0].frequency
+        ]
+    ).T
+    between = np.tensordot(weights, amplitude, axes=1)
+    found = field((length, between), models[1].frequency)
+    expected = field(models[1].echoes(np.arange(1)), models[1].frequency)
+    np.testing.assert_allclose(found, expected, atol=0.005 * np.abs(expected).max())
+
+
+def test_knots_in_time_give_what_every_chirp_gives() -> None:
+    turning = box(rt.Turning(rate_hz=0.2))
+    model = RigidEchoes(RADAR, turning, 0.5, None)
+    chirps = np.arange(1200)
+    length, amplitude = model.echoes(chirps)
+    assert model._knot_s > 3 * RADAR.cycle_duration_s
+    found = field((length, amplitude), model.frequency)[:, 700:712]
+    expected = field(model.echoes(chirps[700:712]), model.frequency)
+    np.testing.assert_allclose(found, expected, atol=0.003 * np.abs(expected).max())
+
+
+def test_a_plate_of_wood_reflects_by_its_coefficient() -> None:
+    ahead = dataclasses.replace(box(None), position_m=(2.5, 0.0, 1.0))
+    plates = [
+        RigidEchoes(RADAR, dataclasses.replace(ahead, material=material(name)), 0.1, None)
+        for name in ("perfect-conductor", "wood")
+    ]
+    conductor, wood = (field(own.echoes(np.arange(1)), own.frequency) for own in plates)
+    eta = material("wood").eta(np.array([RADAR.centre_frequency_hz]))[0]
+    expected = -reflection(eta, 1.0, "te")
+    np.testing.assert_allclose(wood / conductor, expected, atol=0.02 * abs(expected))
+
+
+def test_the_velocity_that_is_ambiguous_is_said() -> None:
+    fast = box(rt.Turning(rate_hz=60))
+    (limit,) = RigidEchoes(RADAR, fast, 0.5, None).limits
+    assert limit.name == "object_velocity_ambiguous"
+    assert 0 < limit.share < 1
+    assert RigidEchoes(RADAR, box(rt.Turning(rate_hz=0.5)), 0.5, None).limits == ()
+
+
+def test_too_near_to_an_antenna_is_refused() -> None:
+    coming = box(rt.FollowingPath(velocity_mps=(-5, 0, 0)))
+    with pytest.raises(rt.InputError, match=r"the object 'box' is 0\.\d+ m from an antenna"):
+        RigidEchoes(RADAR, coming, 0.5, None)
+
+
+def test_people_and_objects_hide_each_other() -> None:
+    radar = dataclasses.replace(RADAR, position_m=(-3.0, 0.0, 1.0))
+    standing = place(rt.synthetic_motion("punch", seed=0), duration_s=0.1)
+    body = Body.from_motion(standing)
+    sheet = trimesh.creation.box((0.02, 1.0, 2.2))
+    chirps, power = np.arange(2), {}
+    for name, x in (("before", -1.0), ("behind", 1.0), ("beside", 1.0)):
+        y = 3.0 if name == "beside" else 0.0
+        screen = rt.Object("screen", sheet, "metal", position_m=(x, y, 1.1))
+        scene = rt.Scene(objects=(screen,))
+        model = build_world("specular", radar, body, scene=scene)
+        echoes = model.echoes(chirps)
+        every = (np.abs(echoes.amplitude[1]) ** 2).sum(axis=(0, 1))
+        own = echoes.part == len(body.part_names)
+        power[name] = every[~own].sum(), every[own].sum()
+    # The screen before the person leaves little of them; behind, they leave less of it.
+    assert power["before"][0] < 0.02 * power["beside"][0]
+    assert power["behind"][0] == pytest.approx(power["beside"][0])
+    assert power["behind"][1] < 0.5 * power["before"][1]
+
+
+def test_echoes_together_are_the_sum_of_each() -> None:
+    rng = np.random.default_rng(0)
+    several = []
+    for nodes in (1, 3, 2):
+        shape = (nodes, 4, 2, 5)
+        several.append(
+            rt.Echoes(
+                length=np.broadcast_to(rng.uniform(2, 8, (2, 5)), shape[1:]),
+                amplitude=rng.normal(size=shape) + 1j * rng.normal(size=shape),
+                frequency=RADAR.start_frequency_hz + rng.uniform(0, 4e9, nodes),
+                tx=RADAR.tx_of_chirp(np.arange(4)),
+                part=np.arange(5),
+                bounces=np.ones(5, dtype=np.int64),
+            )
+        )
+    times = RADAR.chirp_times(4)
+    found = rt.signal.synthesize(together(several), RADAR, times)
+    expected = sum(rt.signal.synthesize(own, RADAR, times) for own in several)
+    np.testing.assert_allclose(found, expected, atol=1e-7)
