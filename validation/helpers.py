@@ -51,6 +51,16 @@ class MovingEllipsoid:
     frame: Array | None = None  # columns are the axes; None: those of the world
     duration_s: float = 1.0
     part_names: tuple[str, ...] = ("ellipsoid",)
+    names: tuple[str, ...] = ("somebody",)
+    material: str = "perfect-conductor"
+
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(1, dtype=np.int64)
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        return (self.material,)
 
     @property
     def semi_axes(self) -> Array:

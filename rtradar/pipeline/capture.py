@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from rtradar.body import Body
+from rtradar.body import Body, Person
 from rtradar.echoes import Echoes
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.processing import Processing, block_chirps
@@ -42,14 +42,15 @@ class SpectraSink(Protocol):
 class Capture:
     """Everything that `prepare` settles before the first echo is computed.
 
-    ``processing`` has the radar at its position in the scene, ``body`` is the person at theirs.
+    ``people`` are those of the scene and those who were given, ``body`` is all of them at their
+    places, and ``processing`` has the radar at its position in the scene.
     ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or None.
     ``link_budget`` is that of the person's parts, ``warned`` its warnings. ``n_chirps`` are
     whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
     the IF samples, and ``warmup_s`` the time until everything was compiled or loaded [s].
     """
 
-    motion: str
+    people: tuple[Person, ...]
     scene: Scene
     settings: RunSettings
     processing: Processing
@@ -67,6 +68,11 @@ class Capture:
     def radar(self) -> Radar:
         """Radar at its position in the scene."""
         return self.processing.radar
+
+    @property
+    def motion(self) -> str:
+        """Names of the motions."""
+        return " and ".join(self.body.names)
 
     @property
     def stages(self) -> Stages:

@@ -76,7 +76,7 @@ def prepare(people: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
             powers = budget.power, noise.power
             inside = indoors(around, radar, body, scene, settings, n_chirps, *powers)
     return Capture(
-        motion=" and ".join(body.names),
+        people=everyone,
         scene=scene,
         settings=settings,
         processing=processing,

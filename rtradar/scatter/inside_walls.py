@@ -21,13 +21,14 @@ _FURNITURE_STEP = 10
 """Instants to one at which furniture is tested: a mesh takes long."""
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 class Inside:
     """Record of which parts were inside walls and furniture over a capture."""
 
-    def __init__(self, scene: Scene, part_names: tuple[str, ...]) -> None:
-        self._scene, self._names = scene, part_names
+    def __init__(self, scene: Scene, part_names: tuple[str, ...], owner: Indices) -> None:
+        self._scene, self._names, self._owner = scene, part_names, owner
         self._solids = [
             (piece.name, mesh) for piece in scene.furniture if (mesh := piece.triangles()).closed
         ]
@@ -64,10 +65,11 @@ class Inside:
         """Return the name, power while inside [m^2] and message of each limit.
 
         ``part_power (part,)`` is the echo power of each part, over all instants [m^2]. An
-        `InputError` is raised if a part with more than 5 % of it was inside a wall.
+        `InputError` is raised if a part with more than 5 % of that of its owner was inside a wall.
         """
         walls, inside = len(self._scene.walls), np.isfinite(self._first_s)
-        large = part_power > REFUSED_FRACTION * part_power.sum()
+        of_owner = np.bincount(self._owner, weights=part_power)[self._owner]
+        large = part_power > REFUSED_FRACTION * of_owner
         for number in range(walls):
             if (parts := np.flatnonzero(large & inside[number])).size:
                 self._refuse(number, parts.tolist())

@@ -1,4 +1,4 @@
-"""Link budget: the power of a person's echoes over time, and the limits of validity they meet."""
+"""Link budget: the power of people's echoes over time, and the limits of validity they meet."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.common.poses import EchoModel
+from rtradar.scatter.inside_people import InsidePeople
 from rtradar.scatter.inside_walls import Inside
 from rtradar.scatter.validity import (
     Limit,
@@ -35,18 +36,19 @@ _CHIRPS_AT_ONCE = 64
 
 @dataclass(frozen=True)
 class LinkBudget:
-    """Echo power of a person over a capture, and limits of validity.
+    """Echo power of people over a capture, and limits of validity.
 
     ``power`` is the sum of |amplitude|^2 over the visible echoes, averaged over rx and one chirp
-    every 10 ms, ``part_power`` the same by name of body part [m^2]; ``visible`` says whether there
-    is any echo. At ``times (time,)`` since the start of the capture [s], ``power_at (time, part)``
-    is the power [m^2], and ``hidden_at (time, part)`` the fraction of the channels that do not see
-    the part.
+    every 10 ms, ``part_power`` the same by name of body part and ``person_power`` (person,) by
+    person [m^2]; ``visible`` says whether there is any echo. At ``times (time,)`` since the start
+    of the capture [s], ``power_at (time, part)`` is the power [m^2], and ``hidden_at (time, part)``
+    the fraction of the channels that do not see the part.
     """
 
     power: float
     visible: bool
     part_power: dict[str, float]
+    person_power: tuple[float, ...]
     times: Array
     power_at: Array
     hidden_at: Array
@@ -66,44 +68,48 @@ def link_budget(
 
     ``spreading`` counts only for the reference of an invisible body. The person must not be in
     walls and furniture of the scene: an `InputError` is raised if the pelvis, or a part with more
-    than 5 % of the echo power, is inside a wall, and also if a part comes within 0.3 m of an
-    antenna, or nothing of the person is ever within the radar's range. A `ValidityWarning` is
+    than 5 % of the person's echo power, is inside a wall, and also if the trunks of two people are
+    inside one another, a part comes within 0.3 m of an antenna, or nothing of a person is ever
+    within the radar's range. A `ValidityWarning` is
     issued if more than 5 % of the echo power is concerned by a limit, or nobody is visible.
     """
     chirps = np.arange(0, n_chirps, keyframe_step(radar))
     powers, fractions = FileBackedRows(), FileBackedRows()
-    solid = Inside(scene or Scene(), body.part_names)
+    solid, others = Inside(scene or Scene(), body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts = np.zeros(len(body.part_names), dtype=bool)
-    ever_sampled = False
+    ever_sampled = np.zeros(len(body.names), dtype=bool)
     for first in range(0, len(chirps), _CHIRPS_AT_ONCE):
         chosen = chirps[first : first + _CHIRPS_AT_ONCE]
         times = np.minimum(radar.centres_of(chosen), body.duration_s)
         refuse_too_near(radar, body, times)
         echoes = model.echoes(chosen)
         inside = sampled(echoes.length, radar)
-        ever_sampled |= bool(inside.any())
+        ever_sampled[body.owner[echoes.part[inside.any(axis=(0, 1))]]] = True
         by_part, hidden, beyond = _by_part(echoes, inside, len(body.part_names))
         powers.append(by_part)
         fractions.append(hidden)
-        solid.look(times, body.at(times), by_part)
+        for look in (solid.look, others.look):
+            look(times, body.at(times), by_part)
         concerned["beyond_range"] += beyond
         small = by_part * small_curvature(radar, body, times)
         concerned["small_curvature"] += float(small.sum())
         small_parts |= small.any(axis=0)
         concerned["velocity_ambiguous"] += float((by_part * too_fast(radar, body, times)).sum())
-    if not ever_sampled:
+    if not ever_sampled.all():
+        who = "person" if len(body.names) == 1 else f"person '{body.names[ever_sampled.argmin()]}'"
         raise InputError(
-            f"the person is never within the range of radar '{radar.name}', "
+            f"the {who} is never within the range of radar '{radar.name}', "
             f"{radar.max_range_m:.2f} m; place the radar nearer (position_m) or raise "
             "samples_per_chirp"
         )
     power_at, hidden_at = powers.rows(), fractions.rows()
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
     power = float(power_at.sum())
-    in_solids = solid.found(power_at.sum(axis=0))
+    person_power = np.bincount(body.owner, weights=power_at.mean(axis=0)).tolist()
+    in_solids = [*solid.found(power_at.sum(axis=0)), *others.found()]
     release_pages(power_at)
-    kept = part_power, radar.centres_of(chirps), power_at, hidden_at
+    kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at, hidden_at
     if power == 0:
         return LinkBudget(_reference_power(radar, spreading), False, *kept, ())
     names = [name for name, small in zip(body.part_names, small_parts, strict=True) if small]

@@ -46,7 +46,7 @@ def wall(x: float, thickness: float, name: str = "across") -> Wall:
 
 def inside(*walls: Wall, furniture: tuple[Furniture, ...] = ()) -> list[tuple[str, float, str]]:
     """By even echo powers, in blocks of 7 instants."""
-    solid = Inside(Scene(walls=walls, furniture=furniture), BODY.part_names)
+    solid = Inside(Scene(walls=walls, furniture=furniture), BODY.part_names, BODY.owner)
     power = np.full((len(TIMES), len(BODY.part_names)), 1e-3)
     for first in range(0, len(TIMES), 7):
         some = slice(first, first + 7)
@@ -104,7 +104,7 @@ def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
     assert power == pytest.approx(1e-3 * np.count_nonzero(reach[:, hand] <= back))
     assert f"the {BODY.part_names[hand]} in 'across' from {first:.2f} s" in message
     # The same with all power from that hand.
-    solid = Inside(Scene(walls=(ahead,)), BODY.part_names)
+    solid = Inside(Scene(walls=(ahead,)), BODY.part_names, BODY.owner)
     power_of_hand = np.zeros((len(TIMES), len(BODY.part_names)))
     power_of_hand[:, hand] = 1.0
     solid.look(TIMES, BODY.at(TIMES), power_of_hand)
@@ -155,6 +155,6 @@ def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, acti
     )
     body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
     times = np.arange(0, body.duration_s, 0.02)
-    solid = Inside(scene, body.part_names)
+    solid = Inside(scene, body.part_names, body.owner)
     solid.look(times, body.at(times), np.ones((len(times), len(body.part_names))))
     assert solid.found(np.ones(len(body.part_names))) == []

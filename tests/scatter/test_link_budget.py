@@ -35,6 +35,8 @@ class Balls:
     )
     duration_s: float = 0.2
     part_names: tuple[str, ...] = ("ball", "needle")
+    names: tuple[str, ...] = ("somebody",)
+    owner: NDArray[np.int64] = dataclasses.field(default_factory=lambda: np.zeros(2, np.int64))
 
     def at(self, times: Array) -> Poses:
         centres = np.tile(np.asarray(self.place), (len(times), 2, 1))

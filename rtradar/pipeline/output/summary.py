@@ -70,6 +70,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
         "noise_power_m2": capture.noise.power,
+        "people": _people(capture),
     }
     if radar.transmit_power_dbm is not None and settings.spreading:
         # Powers per IF sample as received at the port of the antenna: the radar equation.
@@ -85,6 +86,34 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
     if capture.inside:
         summary["room"] = capture.inside.summary
     return summary
+
+
+def _people(capture: Capture) -> list[dict[str, Any]]:
+    """Return who was where, and the power of the echoes of each."""
+    found, noise, settings = [], capture.noise.power, capture.settings
+    for name, person, body, power in zip(
+        capture.body.names,
+        capture.people,
+        capture.body.people,
+        capture.link_budget.person_power,
+        strict=True,
+    ):
+        snr_db = float(10 * np.log10(power / noise)) if power > 0 and noise > 0 else None
+        found.append(
+            {
+                "name": name,
+                "motion": person.motion.name,
+                "position_m": person.position_m,
+                "heading_deg": person.heading_deg + settings.heading_deg,
+                "start_s": person.start_s + settings.start_s,
+                "body": person.body,
+                "material": body.material,
+                "breathing": body.breathing and dataclasses.asdict(body.breathing),
+                "echo_power_m2": power,
+                "snr_db": snr_db,
+            }
+        )
+    return found
 
 
 def summary_of_samples(
