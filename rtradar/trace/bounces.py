@@ -61,41 +61,35 @@ class Surfaces(Protocol):
 
 
 class BodySurfaces:
-    """Ellipsoids with ``semi_axes (part, 3)`` [m], posed; a surface is a part."""
+    """Ellipsoids with ``semi_axes (part, 3)`` [m], posed; a surface is a part.
+
+    ``owner (part,)`` are the people whose parts they are, one if left out. Each has a scene of
+    their own about their own middle, so that float32 rounds alike whoever else is there.
+    """
 
     flat = False
 
-    def __init__(self, mi: Any, semi_axes: Array) -> None:
-        self._mi = mi
+    def __init__(self, mi: Any, semi_axes: Array, owner: NDArray[np.int64] | None = None) -> None:
         self._axes = np.asarray(semi_axes, dtype=np.float64)
-        self._scene = build_body_scene(mi, *unit_sphere(SUBDIVISIONS), len(self._axes))
-        self._parameters = mi.traverse(self._scene)
-        # The instances by their numbers in Dr.Jit's registry, which scalar variants have none of.
-        self._instances = np.empty(0, dtype=np.int64)
-        if not mi.variant().startswith("scalar"):
-            import drjit as dr
-
-            shapes = sorted(self._scene.shapes(), key=lambda shape: shape.id())
-            pointers = (dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes)
-            registry = [int(pointer[0]) for pointer in pointers]
-            self._instances = np.full(max(registry) + 1, -1, dtype=np.int64)
-            self._instances[registry] = np.arange(len(registry))
+        owner = np.zeros(len(self._axes), dtype=np.int64) if owner is None else owner
+        groups = (np.flatnonzero(owner == person) for person in np.unique(owner))
+        self._people = [(parts, _PosedParts(mi, self._axes[parts])) for parts in groups]
 
     def pose(self, centres: Array, frames: Array) -> None:
         """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``."""
         self._centres, self._frames = centres, frames
-        self._centre, self._ball = ball_around(centres, self._axes.max(axis=1))
-        matrices = np.zeros((len(centres), 4, 4))
-        matrices[:, :3, :3] = frames * self._axes[:, None, :]
-        matrices[:, :3, 3] = centres - self._centre
-        matrices[:, 3, 3] = 1
-        pose_body_scene(self._mi, self._parameters, matrices)
+        for parts, own in self._people:
+            own.pose(centres[parts], frames[parts])
 
     def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
         """Part (ray,) met first, -1 for none, and distance (ray,) [m] along unit vectors."""
-        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
-        part, distance = first_met(self._mi, self._scene, starts, directions, self._instances)
-        return part, distance + ahead
+        part = np.full(len(origins), -1, dtype=np.int64)
+        distance = np.full(len(origins), np.inf)
+        for parts, own in self._people:
+            met, far = own.first_parts(origins, directions)
+            nearer = far < distance
+            part[nearer], distance[nearer] = parts[met[nearer]], far[nearer]
+        return part, distance
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """As `Surfaces.sees`; a part does not occlude itself: its normal tells that."""
@@ -128,6 +122,41 @@ class BodySurfaces:
     def _stretched(self, surface: NDArray[np.int64], vectors: Array) -> Array:
         """To the axes in which the part is the unit sphere."""
         return np.einsum("...ji,...j->...i", self._frames[surface], vectors) / self._axes[surface]
+
+
+class _PosedParts:
+    """The triangles of ellipsoids in a scene of Mitsuba, about their middle."""
+
+    def __init__(self, mi: Any, semi_axes: Array) -> None:
+        self._mi = mi
+        self._axes = semi_axes
+        self._scene = build_body_scene(mi, *unit_sphere(SUBDIVISIONS), len(self._axes))
+        self._parameters = mi.traverse(self._scene)
+        # The instances by their numbers in Dr.Jit's registry, which scalar variants have none of.
+        self._instances = np.empty(0, dtype=np.int64)
+        if not mi.variant().startswith("scalar"):
+            import drjit as dr
+
+            shapes = sorted(self._scene.shapes(), key=lambda shape: shape.id())
+            pointers = (dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes)
+            registry = [int(pointer[0]) for pointer in pointers]
+            self._instances = np.full(max(registry) + 1, -1, dtype=np.int64)
+            self._instances[registry] = np.arange(len(registry))
+
+    def pose(self, centres: Array, frames: Array) -> None:
+        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``."""
+        self._centre, self._ball = ball_around(centres, self._axes.max(axis=1))
+        matrices = np.zeros((len(centres), 4, 4))
+        matrices[:, :3, :3] = frames * self._axes[:, None, :]
+        matrices[:, :3, 3] = centres - self._centre
+        matrices[:, 3, 3] = 1
+        pose_body_scene(self._mi, self._parameters, matrices)
+
+    def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Part (ray,) met first, -1 for none, and distance (ray,) [m] along unit vectors."""
+        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
+        part, distance = first_met(self._mi, self._scene, starts, directions, self._instances)
+        return part, distance + ahead
 
 
 class MeshSurfaces:

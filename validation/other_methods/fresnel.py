@@ -206,6 +206,10 @@ class Standing:
     def semi_axes(self) -> Array:
         return self.pose.semi_axes
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         n = len(np.asarray(times))
         fields = (np.broadcast_to(a, (n, *a.shape)) for a in (self.pose.centres, self.pose.frames))

@@ -291,6 +291,10 @@ class Passing:
         y = OCCLUDER_RADIUS_M + self.speed * (np.asarray(times) - self.instant)
         return np.stack([np.full_like(y, -BEFORE_M), y, np.zeros_like(y)], axis=-1)
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         sphere = self.sphere(times)
         centres = np.stack([np.zeros_like(sphere), sphere], axis=1)

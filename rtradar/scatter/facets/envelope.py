@@ -2,7 +2,7 @@
 
 The envelope is the echo over that of the unobstructed specular point, carrier and all: 1 where
 optics is geometric, and slow. Keyframes are 10 ms apart. Where the second difference of a part's
-echo over neighbouring keyframes is more than a given fraction of the whole body's, the interval is
+echo over neighbouring keyframes is more than a given fraction of its owner's, the interval is
 halved, and halved again, down to an eighth: there an edge crosses the part, or what it returns
 comes from far beside its specular point. Between keyframes runs a cubic with one slope on either
 side of each.
@@ -33,6 +33,7 @@ _KEPT_INTERVALS = TOGETHER + 8
 """More than these and one on either side."""
 
 Field = NDArray[np.complex128]
+Scale = NDArray[np.float64]
 
 
 class Sample(NamedTuple):
@@ -58,23 +59,23 @@ class Course(NamedTuple):
 
 
 class Envelope:
-    """An envelope over a capture, of so many parts.
+    """An envelope over a capture, of the parts of one or several people: ``owner (part,)``.
 
     ``sample(place, parts, whole)`` returns the `Sample` of parts (n,) at a place in time, counted
-    in keyframes from the start; ``whole`` is `whole_echo` near by, or None where all parts are
-    asked for. Several threads call it at once. ``tolerance`` is the second difference of a part's
-    echo over the root of the whole body's power that halves an interval, ``end`` the keyframe from
-    which on nothing moves.
+    in keyframes from the start; ``whole (part,)`` is `whole_echo` near by, or None where all parts
+    are asked for. Several threads call it at once. ``tolerance`` is the second difference of a
+    part's echo over the root of the power of the whole person that halves an interval, ``end`` the
+    keyframe from which on nothing moves.
     """
 
     def __init__(
         self,
-        sample: Callable[[float, NDArray[np.int64], float | None], Sample],
-        parts: int,
+        sample: Callable[[float, NDArray[np.int64], Scale | None], Sample],
+        owner: NDArray[np.int64],
         tolerance: float,
         end: int,
     ) -> None:
-        self._sample, self._parts = sample, np.arange(parts)
+        self._sample, self._owner, self._parts = sample, owner, np.arange(len(owner))
         self._tolerance, self._end = tolerance, end
         self._keyframes: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
         self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _KEPT_INTERVALS)
@@ -138,7 +139,7 @@ class Envelope:
         bends = [_bend(first.ratio, last.ratio, after.ratio, last.strength)]
         if before is not None:
             bends.append(_bend(before.ratio, first.ratio, last.ratio, first.strength))
-        whole = max(whole_echo(first), whole_echo(last))
+        whole = np.maximum(*(whole_echo(end, self._owner) for end in (first, last)))
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
         interval = _Interval(ratio, known)
         if index < self._end:
@@ -155,7 +156,7 @@ class Envelope:
         left: int,
         right: int,
         parts: NDArray[np.int64],
-        whole: float,
+        whole: Scale,
     ) -> None:
         """Sample these parts half-way, and go on where they bend there."""
         if right - left < 2 or len(parts) == 0:
@@ -165,7 +166,7 @@ class Envelope:
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
         before, after = ratio[left][:, :, parts], ratio[right][:, :, parts]
-        bent = _bend(before, found.ratio, after, found.strength) > self._tolerance * whole
+        bent = _bend(before, found.ratio, after, found.strength) > self._tolerance * whole[parts]
         for ends in ((left, middle), (middle, right)):
             self._divide(index, interval, *ends, parts[bent], whole)
 
@@ -177,6 +178,10 @@ def _bend(
     return np.asarray((np.abs(before - 2 * here + after) * strength).max(axis=(0, 1)))
 
 
-def whole_echo(sample: Sample) -> float:
-    """Root of the power of all parts, the mean over frequencies and pairs [m]."""
-    return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean()))
+def whole_echo(sample: Sample, owner: NDArray[np.int64]) -> Scale:
+    """Root of the power of all of a part's owner (part,), mean over frequencies and pairs [m].
+
+    Scales of one person are so the same whoever else is there.
+    """
+    power = (np.abs(sample.ratio * sample.strength) ** 2).mean(axis=(0, 1))
+    return np.asarray(np.sqrt(np.bincount(owner, power)[owner]))

@@ -88,9 +88,10 @@ class Auto(BuiltInModel):
     Parameters
     ----------
     tolerance_db : float
-        Largest error of the power of a frame [dB].
+        Largest error of the power of a frame, of each person [dB].
     tolerance_complex : float, optional
-        Largest rms error of the received field over its rms; None: only the power matters.
+        Largest rms error of the received field over its rms, of each person; None: only the power
+        matters.
 
     Raises
     ------
@@ -252,7 +253,14 @@ class Auto(BuiltInModel):
             spreading=self._spreading,
             shadow_rays=self._shadow_rays,
         )
-        chosen = select_candidates(budget, self._power_fraction, self._complex_fraction)[1:-1]
+        chosen = np.empty(budget.true.shape, dtype=np.int64)
+        # A tolerance is one for each person, whoever else is there.
+        for person in range(self._body.owner.max() + 1):
+            own = self._body.owner == person
+            alone = ErrorBudget(**{name: a[..., own] for name, a in budget._asdict().items()})
+            tolerances = self._power_fraction, self._complex_fraction
+            chosen[:, own] = select_candidates(alone, *tolerances)
+        chosen = chosen[1:-1]
         budget = ErrorBudget(**{name: array[1:-1] for name, array in budget._asdict().items()})
         # Later ones are looked at again in the next pass, and are not to count twice.
         if not self._counted >> chunk & 1:

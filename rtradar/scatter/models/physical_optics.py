@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, whole_echo
+from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
@@ -39,8 +39,8 @@ class PhysicalOptics(BuiltInModel):
     anchor_s : float
         Time between keyframes [s]; where the echo bends it comes down to an eighth of it.
     tolerance : float
-        Bend of a part's echo, over the root of the whole body's power, above which keyframes come
-        closer.
+        Bend of a part's echo, over the root of the power of the whole person, above which keyframes
+        come closer.
     unevenness : float
         Change of a part's echo over the array, over the same, above which it is computed at more
         places of the array.
@@ -96,16 +96,16 @@ class PhysicalOptics(BuiltInModel):
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
-        self._envelope = Envelope(self._sample, len(body.part_names), tolerance, end)
+        self._envelope = Envelope(self._sample, body.owner, tolerance, end)
 
-    def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
+    def _sample(self, place: float, parts: NDArray[np.int64], whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose = self._body.at([time])
         coarse = self._at_nodes(pose, self._coarse, parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
-        scale = whole_echo(coarse) if whole is None else whole
+        scale = whole_echo(coarse, self._body.owner) if whole is None else whole[parts]
         uneven = (
             np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1))
             > self._unevenness * scale

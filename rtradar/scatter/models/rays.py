@@ -85,7 +85,7 @@ class Rays(BuiltInModel):
         self._grid = EllipsoidGrid.cover(body.semi_axes, radar.wavelength_m / rays_per_wavelength)
         backend = select(variant)
         self.variant: str | None = backend.kind
-        self._surfaces = BodySurfaces(use(backend), body.semi_axes)
+        self._surfaces = BodySurfaces(use(backend), body.semi_axes, body.owner)
         self._posed: tuple[int, PosedGrid] | None = None
         self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 

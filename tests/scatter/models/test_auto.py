@@ -189,6 +189,10 @@ class Passing:
         if self.semi_axes is None:
             object.__setattr__(self, "semi_axes", np.array([[0.1, 0.1, 0.1], [0.25, 0.25, 0.25]]))
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         y = 2.0 * (np.asarray(times) - 0.1)
         n = len(self.semi_axes)

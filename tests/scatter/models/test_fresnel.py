@@ -39,6 +39,10 @@ class Curtain:
     def semi_axes(self) -> Array:
         return np.array([[0.07, 0.07, 0.2], [0.3, 0.3, 0.3]])
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         y = 0.3 + self.edge + self.speed * (np.asarray(times) - 0.1)
         centres = np.zeros((len(y), 2, 3))

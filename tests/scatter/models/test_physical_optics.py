@@ -39,6 +39,10 @@ class Passing:
     def semi_axes(self) -> Array:
         return np.array([[0.05, 0.05, 0.16], [0.06, 0.06, 0.06]])
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         times = np.asarray(times)
         turn = Rotation.from_rotvec(np.outer(0.2 + 1.5 * times, [0.1, 0.97, 0.2])).as_matrix()
@@ -234,12 +238,12 @@ def envelope_of(
     """An envelope of two parts, one by the law, the other 1; and the places where it was asked."""
     asked: list[float] = []
 
-    def sample(place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
+    def sample(place: float, parts: NDArray[np.int64], whole: Array | None) -> Sample:
         asked.append(place)
         ratio = np.array([law(place), 1.0 + 0j])[parts]
         return Sample(np.tile(ratio, (3, 2, 1)), np.ones((2, len(parts))))
 
-    return Envelope(sample, 2, tolerance, end), asked
+    return Envelope(sample, np.zeros(2, dtype=np.int64), tolerance, end), asked
 
 
 def between(envelope: Envelope, index: int, fraction: Array) -> NDArray[np.complex128]:

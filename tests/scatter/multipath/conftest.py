@@ -39,6 +39,10 @@ class Still:
     def semi_axes(self) -> Array:
         return self.axes
 
+    @property
+    def owner(self) -> NDArray[np.int64]:
+        return np.zeros(len(self.semi_axes), dtype=np.int64)
+
     def at(self, times: Array) -> Poses:
         moved = self.centres + np.asarray(times)[:, None, None] * np.array(self.velocity)
         return Poses(
