@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
 from rtradar.errors import InputError
-from rtradar.system.checks import check_order
+from rtradar.system.checks import check_number, check_order
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -36,7 +36,7 @@ class Breathing:
     rate_hz : float
         Breaths per second [Hz], 0 to 5.
     phase_deg : float
-        Phase at the start [degree]; at 0 the person begins to breathe in.
+        Phase at the start, -360 to 360 [degree]; at 0 the person begins to breathe in.
 
     Raises
     ------
@@ -49,14 +49,10 @@ class Breathing:
     phase_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, most in (("amplitude_mm", 50.0), ("rate_hz", 5.0)):
-            if not 0 <= getattr(self, name) <= most:
-                raise InputError(
-                    f"breathing: {name} = {getattr(self, name)}; allowed is 0 to {most:g} "
-                    "(--breathing AMPLITUDE_MM,RATE_HZ)"
-                )
-        if not math.isfinite(self.phase_deg):
-            raise InputError(f"breathing: phase_deg = {self.phase_deg}; it must be finite")
+        limits = {"amplitude_mm": (0, 50), "rate_hz": (0, 5), "phase_deg": (-360, 360)}
+        for name, allowed in limits.items():
+            value = check_number("breathing", name, getattr(self, name), *allowed)
+            object.__setattr__(self, name, value)
 
 
 class _Seed(TypedDict, total=False):
