@@ -35,7 +35,7 @@ FIRST_PAGE = {
     "Scene": ("Scene", "Person", "Object", "Turning", "Swinging", "FollowingPath"),
     "Run": ("run", "simulate", "process_samples", "compare", "RunSettings", "Breathing"),
     "Results": ("Result", "Simulation", "Comparison"),
-    "Pieces of a run": ("Body", "Ellipsoids", "Echoes", "scattering_length"),
+    "Pieces of a run": ("Body", "HumanMesh", "Ellipsoids", "Echoes", "scattering_length"),
     "Extensions": ("register_reader", "register_radar", "register_model", "register_detector"),
     "Errors and warnings": ("InputError", "BackendError", "ExtensionError", "ValidityWarning"),
 }

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rtradar import classify, exchange, process, rcs, signal
     from rtradar.antenna import Antenna
-    from rtradar.body import Body, Ellipsoids, Person
+    from rtradar.body import Body, Ellipsoids, HumanMesh, Person
     from rtradar.clouds import Collection
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
@@ -40,7 +40,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _NAMES = {
     "antenna": "Antenna",
-    "body": "Body Ellipsoids Person",
+    "body": "Body Ellipsoids HumanMesh Person",
     "clouds": "Collection",
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
@@ -66,6 +66,7 @@ __all__ = [
     "Ellipsoids",
     "ExtensionError",
     "FollowingPath",
+    "HumanMesh",
     "InputError",
     "Motion",
     "Object",

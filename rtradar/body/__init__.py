@@ -1,6 +1,7 @@
-"""People as posed ellipsoids, 21 each, and their meshes."""
+"""People as posed ellipsoids, 21 each, and as meshes."""
 
 from rtradar.body.body import PART_NAMES, Body, Ellipsoids, Poses, ellipsoid_meshes, unit_sphere
+from rtradar.body.human import HumanMesh
 from rtradar.body.people import Bodies, Person
 
 __all__ = [
@@ -8,6 +9,7 @@ __all__ = [
     "Bodies",
     "Body",
     "Ellipsoids",
+    "HumanMesh",
     "Person",
     "Poses",
     "ellipsoid_meshes",

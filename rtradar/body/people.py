@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.body import Body, Poses
+from rtradar.body.human import HumanMesh
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
 from rtradar.settings import Breathing, RunSettings
 from rtradar.system.checks import brief, check_number, check_text, check_vector
+
+if TYPE_CHECKING:
+    import trimesh
 
 BODY_KINDS = ("ellipsoids", "mesh")
 """Bodies that a person may have."""
@@ -86,6 +91,36 @@ class Person:
             )
         if self.material is not None:
             check_text(where, "material", self.material)
+
+    def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
+        """Pose a mesh of human shape where the person is, whichever ``body`` they have.
+
+        Parameters
+        ----------
+        time_s : float
+            Time since ``start_s`` of their recording [s].
+        divisions : int
+            Number of times that each triangle is divided in four, 0 to 4.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            Closed, world [m]; `rtradar.scattering_length` takes it.
+
+        Raises
+        ------
+        InputError
+            Where the package `anny` is missing, or the time is outside the recording.
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> person = rt.Person(rt.synthetic_motion("walk"), position_m=(0, 1))
+        >>> person.trimesh(0.5).is_watertight  # doctest: +SKIP
+        True
+        """
+        placed = place(self.motion, start_s=self.start_s, heading_deg=self.heading_deg)
+        return HumanMesh(placed.shifted([*self.position_m, 0.0])).trimesh(time_s, divisions)
 
 
 Moving = Motion | Person | Sequence[Motion | Person]

