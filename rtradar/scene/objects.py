@@ -41,6 +41,9 @@ SMALLEST_M, LARGEST_M = 1e-3, 100.0
 _SHORTEST_M = 0.01
 """Least length of a wall's edge [m]."""
 
+Opening = tuple[float, float, float, float]
+"""Rectangle in a wall: its beginning along both edges, its width and its height [m]."""
+
 _SQUARE = 1e-6
 """Largest cosine between the edges of a rectangle: 1 um of skew a metre."""
 
@@ -66,6 +69,9 @@ class Wall:
         Distance between the two faces [m].
     roughness_m : float
         Root mean square of the height of the faces about their planes [m].
+    openings : tuple of tuple of float
+        Doorways and other openings, each as (u, v, width, height) [m]: where it begins along both
+        edges, from the corner, and its size along them.
 
     Raises
     ------
@@ -81,6 +87,7 @@ class Wall:
     material: Material
     thickness_m: float
     roughness_m: float = 0.0
+    openings: tuple[Opening, ...] = ()
 
     def __post_init__(self) -> None:
         check_text("wall", "name", self.name)
@@ -99,7 +106,39 @@ class Wall:
                 f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)} "
                 "are not at right angles; a wall is a rectangle"
             )
+        self._check_slab(where)
+        object.__setattr__(self, "openings", self._checked_openings(where))
+
+    def _check_slab(self, where: str) -> None:
         _check(self, where, SURFACE_LIMITS)
+
+    def _checked_openings(self, where: str) -> tuple[Opening, ...]:
+        """Openings that lie in the wall, and nowhere in each other."""
+        width, height = (float(np.linalg.norm(edge)) for edge in (self.edge_u_m, self.edge_v_m))
+        given: object = self.openings
+        if not isinstance(given, list | tuple):
+            raise InputError(
+                f"{where}: openings = {brief(given)}; it must be a list of "
+                "[u, v, width, height] in metres"
+            )
+        found: list[Opening] = []
+        for opening in given:
+            u, v, wide, high = check_vector(where, "an opening", opening, 4)
+            inside = min(u, v) >= 0 and u + wide <= width + 1e-9 and v + high <= height + 1e-9
+            if not inside or min(wide, high) < _SHORTEST_M:
+                raise InputError(
+                    f"{where}: opening {brief([u, v, wide, high])} is [u, v, width, height] in "
+                    f"metres; it must lie in the wall of {width:g} by {height:g} m, and measure "
+                    f"{_SHORTEST_M} m or more"
+                )
+            for a, b, c, d in found:
+                if u < a + c and a < u + wide and v < b + d and b < v + high:
+                    raise InputError(
+                        f"{where}: openings {brief([a, b, c, d])} and "
+                        f"{brief([u, v, wide, high])} overlap; make them one, or two apart"
+                    )
+            found.append((u, v, wide, high))
+        return tuple(found)
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:
@@ -129,14 +168,36 @@ class Wall:
         Returns
         -------
         (...) float64
-            Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle.
+            Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle and in an
+            opening.
         """
         away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
         inside = np.ones(away.shape[:-1], dtype=bool)
         for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
             fraction = away @ edge / (edge @ edge)
             inside &= (fraction >= 0) & (fraction <= 1)
+        inside &= ~self.in_opening(points)
         return np.where(inside, -(away @ self.normal), np.nan)
+
+    def in_opening(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell whether points, projected onto the front, lie in an opening.
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            Points, world [m].
+
+        Returns
+        -------
+        (...) bool
+        """
+        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
+        edges = (np.array(edge) for edge in (self.edge_u_m, self.edge_v_m))
+        along, up = (away @ (edge / np.linalg.norm(edge)) for edge in edges)
+        open_here = np.zeros(away.shape[:-1], dtype=bool)
+        for u, v, wide, high in self.openings:
+            open_here |= (along > u) & (along < u + wide) & (up > v) & (up < v + high)
+        return open_here
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell whether points lie inside the slab.
@@ -166,11 +227,15 @@ class Surface:
         Thickness [m].
     roughness_m : float
         Root mean square of the height of the faces about their planes [m].
+    openings : tuple of tuple of float
+        Openings, as those of a `Wall`: from the lower left corner, seen from inside; those of the
+        floor and the ceiling along x and y.
     """
 
     material: Material
     thickness_m: float
     roughness_m: float = 0.0
+    openings: tuple[Opening, ...] = ()
 
 
 def room_walls(

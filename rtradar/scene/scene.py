@@ -49,8 +49,12 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("[radar]", "position_m", ""),
         ("[person]", "", "position_m heading_deg"),
         ("[room]", "size_m corner_m", ""),
-        ("a side of a room", "material thickness_m", "roughness_m"),
-        ("[[walls]]", "name corner_m edge_u_m edge_v_m material thickness_m", "roughness_m"),
+        ("a side of a room", "material thickness_m", "roughness_m openings"),
+        (
+            "[[walls]]",
+            "name corner_m edge_u_m edge_v_m material thickness_m",
+            "roughness_m openings",
+        ),
         ("[[furniture]]", "name mesh material position_m", "yaw_deg scale metres_per_unit sheet"),
         (
             "[[objects]]",

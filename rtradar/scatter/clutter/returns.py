@@ -19,8 +19,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.polarization import antenna_field
-from rtradar.scatter.multipath.image_paths import crossed
 from rtradar.scatter.multipath.slab_series import WallSeries, room_series
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse, Wave
 from rtradar.scatter.validity import sampled
 from rtradar.scene import Scene, Wall
@@ -161,8 +161,9 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     """
     points = returns.points[0, 0, :, 0]
     behind = np.zeros(len(points), dtype=bool)
-    for wall, antennas in product(scene.walls, (radar.tx, radar.rx)):
-        behind |= crossed(wall, antennas[:, None], points).any(axis=0)
+    edges = WallEdges.of(scene.walls, radar)
+    for number, antennas in product(range(len(scene.walls)), (radar.tx, radar.rx)):
+        behind |= edges.passage(number, antennas[:, None], points)[0].any(axis=0)
     if not behind.any():
         return returns
     nodes = sweep_nodes(radar, FURNITURE_NODES)
@@ -183,7 +184,7 @@ def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[
     """Echoes behind walls, in groups of equal delays, and their error [m]."""
     points = returns.points[0, 0, :, 0]
     series = delayed(scene.walls, radar, FURNITURE_NODES)
-    walls = WallResponse(scene.walls, series, returns.frequency)
+    walls = WallResponse(WallEdges.of(scene.walls, radar), series, returns.frequency)
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
         ways = points - antennas[:, None]

@@ -1,13 +1,14 @@
 """What walls return: specular reflections by images, and diffuse returns of rough faces.
 
-A wall reflects like an infinite one wherever the specular point lies in its rectangle, and not at
-all elsewhere; only furniture occludes it, and edges send nothing. The field on a path of length L
-is that of free space times what the walls do, so an echo is F = -2 sqrt(pi) (p_rx . E) / L, whose
-square is a radar cross-section: with a conductor, which reverses E, +2 sqrt(pi) / L. Waves that go
-to and fro inside one wall are in its slab's coefficient, or echoes of their own where no polynomial
-over the sweep follows that (`rtradar.scatter.multipath.slab_series`). Left out are those between a
-wall and a pane right before it (a reflection by the pane's back is in, once), and the direct
-coupling from Tx to Rx.
+A wall reflects like an infinite one where the specular point lies well inside its rectangle, and
+fades at edges that are free (`rtradar.scatter.multipath.wall_edges`); only furniture occludes it.
+The
+field on a path of length L is that of free space times what the walls do, so an echo is F = -2
+sqrt(pi) (p_rx . E) / L, whose square is a radar cross-section: with a conductor, which reverses E,
++2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's coefficient, or echoes
+of their own where no polynomial over the sweep follows that
+(`rtradar.scatter.multipath.slab_series`). Left out are those between a wall and a pane right before
+it (a reflection by the pane's back is in, once), and the direct coupling from Tx to Rx.
 
 The fraction of the reflected power that roughness takes from the specular wave,
 1 - exp(-(2 k s)^2 cos_i cos_s) (Ament, Proc. IRE 41 (1953) 142, made reciprocal by the mean of both
@@ -44,8 +45,9 @@ from rtradar.scatter.clutter.returns import (
 )
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import antenna_field
-from rtradar.scatter.multipath.image_paths import Face, Leg, corners, height, image_chain
+from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain
 from rtradar.scatter.multipath.slab_series import DENSE_NODES, whole_walls
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse, reflect
 from rtradar.scene import Scene
 from rtradar.system.seeds import stream
@@ -93,11 +95,12 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
     tx, rx = radar.tx[:, None], radar.rx[radar.rx_of_tx]
     # By the edge of a right-angled corner the path goes over both walls in either order, each of
     # them with half of its weight: no two or none of it.
-    (stops, wide), (_, narrow) = (corners(leg, tx, rx, margin) for margin in (_EDGE_M, -_EDGE_M))
-    weight = (wide + narrow.astype(np.float64)) / 2
+    edges = WallEdges.of(scene.walls, radar)
+    (stops, wide), (_, narrow) = (edges.leg(leg, tx, rx, margin) for margin in (_EDGE_M, -_EDGE_M))
+    weight = (wide + narrow) / 2
     images = image_chain(leg, np.broadcast_to(tx, rx.shape))
     length = np.linalg.norm(rx - images[-1], axis=-1)
-    which = np.flatnonzero(weight > 0)
+    which = np.flatnonzero(weight)
     ends = [stop.reshape(-1, 3)[which] for stop in stops]
     free = np.ones(len(which), dtype=bool)
     for start, end in pairwise(ends):
@@ -109,13 +112,15 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
     sources = [image.reshape(-1, 3)[which] for image in images]
     ways = [end - source for source, end in zip(sources, ends[1:], strict=True)]
     ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
-    sent = antenna_field(ways[0], radar.polarization, x_for_steep=True)
+    sent = (
+        antenna_field(ways[0], radar.polarization, x_for_steep=True) * weight.ravel()[which, None]
+    )
     received = antenna_field(-ways[-1], radar.polarization, x_for_steep=True)
-    spread = -2 * sqrt(pi) * (weight / length).ravel()[which]
+    spread = -2 * sqrt(pi) / length.ravel()[which]
     frequency = sweep_nodes(radar, DENSE_NODES)
     best = None
     for series in (whole_walls, lambda walls: delayed(walls, radar)):
-        walls = WallResponse(scene.walls, series(scene.walls), frequency)
+        walls = WallResponse(edges, series(scene.walls), frequency)
         waves = walls.along(leg, ends, ways, sent)
         returned = [spread * np.conj((wave.field * received).sum(axis=-1)) for wave in waves]
         sizes = [float(np.abs(one).max()) for one in returned]
@@ -173,7 +178,8 @@ def _points(face: Face, cell_m: float, rng: np.random.Generator) -> tuple[Array,
     u, v = (cells + rng.random(cells.shape)) / np.array(counts)[:, None]
     corner = np.array(wall.corner_m) - (wall.thickness_m if face.back else 0.0) * wall.normal
     points = corner + u[:, None] * edges[0] + v[:, None] * edges[1]
-    return points, wall.area_m2 / len(points), rng.uniform(0, 2 * np.pi, len(points))
+    phases, there = rng.uniform(0, 2 * np.pi, len(points)), ~wall.in_opening(points)
+    return points[there], wall.area_m2 / len(points), phases[there]
 
 
 def _rough_face(

@@ -101,40 +101,28 @@ def inside(wall: Wall, points: Array, margin_m: float = 0.0) -> Bools:
     return within
 
 
-def crossed(wall: Wall, origins: Array, targets: Array) -> Bools:
-    """Whether straight legs, ``origins`` to ``targets`` (..., 3) [m], pass through the slab.
-
-    They do where their ends are on different sides of the slab's middle plane, so a leg that ends
-    on a face does not cross it.
-    """
-    first, second = np.broadcast_arrays(height(wall, origins), height(wall, targets))
-    across = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
-    if across.any():
-        # Where they pass the front: the fronts of a room meet, the middles of its slabs do not.
-        starts, ends = (
-            np.broadcast_to(places, (*across.shape, 3))[across] for places in (origins, targets)
-        )
-        fraction = first[across] / (first - second)[across]
-        across[across] = inside(wall, starts + fraction[:, None] * (ends - starts))
-    return across
-
-
 def specular_point(
-    wall: Wall, origins: Array, targets: Array, *, back: bool = False, margin_m: float = 0.0
+    wall: Wall,
+    origins: Array,
+    targets: Array,
+    *,
+    back: bool = False,
+    margin_m: float = 0.0,
+    beside_m: float = 0.0,
 ) -> tuple[Array, Bools]:
     """Find where a wall reflects a wave from origins to targets (..., 3) [m].
 
     The margin [m] is added to the rectangle, and before the face for the target. Returned are the
     point on the plane of the front, or of the back (..., 3) [m], which is NaN where the ends are on
-    different sides, and whether both ends are before that face and the point lies in the rectangle
-    (...).
+    different sides, and whether both ends are before that face and the point lies in the rectangle,
+    or as far beside it as ``beside_m`` (...).
     """
     origins, targets = np.broadcast_arrays(origins, targets)
     first, second = height(wall, origins, back=back), height(wall, targets, back=back)
     before = (first > abs(margin_m)) & (second > -margin_m)
     fraction = np.where(before, first, np.nan) / np.where(before, first + second, 1.0)
     point = origins + fraction[..., None] * (image(wall, targets, back=back) - origins)
-    return point, before & inside(wall, point, margin_m)
+    return point, before & inside(wall, point, margin_m + beside_m)
 
 
 # -- legs over several walls -----------------------------------------------------------------------
@@ -157,13 +145,13 @@ def images(leg: Leg, antennas: Array) -> Array:
 
 
 def corners(
-    leg: Leg, antennas: Array, points: Array, margin_m: float = 0.0
+    leg: Leg, antennas: Array, points: Array, margin_m: float = 0.0, *, beside_m: float = 0.0
 ) -> tuple[list[Array], Bools]:
     """Find where a leg from antennas to points (..., 3) [m] runs.
 
     Returned are the antenna, the places of reflection and the point at the other end, a list of
     (..., 3) [m], and whether each place of reflection lies in its rectangle, before the face (...),
-    with the margin of `specular_point`. Where both ends are on different sides of a face, the next
+    with the margins of `specular_point`. Where both ends are on different sides of a face, the next
     corner takes the place of the missing one.
     """
     antennas, points = np.broadcast_arrays(antennas, points)
@@ -171,7 +159,8 @@ def corners(
     along = [points]
     sources = image_chain(leg, antennas)[:-1]
     for (wall, back), source in zip(reversed(leg), reversed(sources), strict=True):
-        place, holds = specular_point(wall, source, along[-1], back=back, margin_m=margin_m)
+        margins = {"margin_m": margin_m, "beside_m": beside_m}
+        place, holds = specular_point(wall, source, along[-1], back=back, **margins)
         along.append(np.where(np.isnan(place), along[-1], place))
         valid &= holds
     return [antennas, *reversed(along)], valid

@@ -26,7 +26,7 @@ from rtradar.scatter.common.polarization import (
     over_copolar,
     unit,
 )
-from rtradar.scatter.multipath.image_paths import Leg, WallPath, corners, images
+from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.path_echoes import AT_ONCE, EchoColumns, Met
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -191,10 +191,12 @@ def _carry(around: Surroundings, legs: Sequence[Leg], antennas: Array, points: A
     for leg in dict.fromkeys(legs):
         chosen = np.array([number for number, own in enumerate(legs) if own == leg])
         of_leg[chosen] = np.arange(len(chosen))
-        along, valid[..., chosen] = corners(leg, antennas[:, :, None], points[:, :, None, chosen])
+        ends = antennas[:, :, None], points[:, :, None, chosen]
+        along, extent = around.walls.edges.leg(leg, *ends)
+        valid[..., chosen] = extent != 0
         ways = [unit(targets - origins) for origins, targets in pairwise(along)]
         sent = antenna_field(ways[0], around.polarization)
-        waves = around.walls.along(leg, along, ways, sent)
+        waves = around.walls.along(leg, along, ways, sent * extent[..., None])
         for step, (origins, targets) in enumerate(pairwise(along)):
             start, end = np.broadcast_arrays(origins, targets)
             sections.append((chosen, start, end, step == len(leg)))

@@ -31,6 +31,7 @@ from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, pat
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.slab_series import room_series
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
@@ -127,7 +128,7 @@ class RoomModel:
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
-        walls = WallResponse(scene.walls, series.walls, series.frequency)
+        walls = WallResponse(WallEdges.of(scene.walls, radar), series.walls, series.frequency)
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order)
         self._empty = scene.is_empty
         self._legs = LegImages(radar, self.paths)

@@ -2,7 +2,7 @@
 
 A wave carries its electric field as a complex 3-vector, for exp(+j omega t), without the phase of
 its straight path through air. A wall splits the field into TE and TM by the plane of incidence and
-multiplies each by the coefficient of its slab. Edges are sharp: they send no diffracted wave.
+multiplies each by the coefficient of its slab, of finite extent by `wall_edges`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter.common.polarization import apply_te_tm
-from rtradar.scatter.multipath.image_paths import Leg, crossed
+from rtradar.scatter.multipath.image_paths import Leg
 from rtradar.scatter.multipath.slab_series import POLARIZATIONS, WHOLE, Term, WallSeries
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Wall
 
 Array = NDArray[np.float64]
@@ -88,19 +89,24 @@ class Wave(NamedTuple):
 
 
 class WallResponse(NamedTuple):
-    """The walls of a room, the series of their slabs, and the frequencies of the nodes [Hz]."""
+    """The edges of all walls, the series of their slabs, and the frequencies of the nodes [Hz]."""
 
-    walls: tuple[Wall, ...]
+    edges: WallEdges
     series: Sequence[WallSeries]
     frequency: Array
 
-    def start(self, field: Array) -> Waves:
+    @property
+    def walls(self) -> tuple[Wall, ...]:
+        """Walls of the room."""
+        return self.edges.walls
+
+    def start(self, field: Array | Field) -> Waves:
         """Return a wave at its antenna, of a field (..., 3) that is the same at all nodes."""
         nodes = np.broadcast_to(field, (len(self.frequency), *np.shape(field)))
         return [Wave((), np.zeros(np.shape(field)[:-1]), np.array(nodes, dtype=np.complex128))]
 
     def along(
-        self, leg: Leg, corners: Sequence[Array], directions: Sequence[Array], field: Array
+        self, leg: Leg, corners: Sequence[Array], directions: Sequence[Array], field: Field
     ) -> Waves:
         """Follow a wave over a leg, whose faces reflect, from its field at the antenna (..., 3).
 
@@ -137,13 +143,14 @@ class WallResponse(NamedTuple):
 
         The ends of the section (..., 3) [m] broadcast to the shape of the waves; if one is on a
         face of a wall, the section does not cross that wall. The waves at the targets are without
-        spreading and without the phase of the section's length, and 0 behind metal.
+        spreading and without the phase of the section's length, and 0 behind metal. What goes past
+        the edges of a wall, or through its openings, goes on as it is.
         """
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
         )
         for number, wall in enumerate(self.walls):
-            across = crossed(wall, origins, targets)
+            across, met = self.edges.passage(number, origins, targets)
             if not across.any():
                 continue
             ways = targets[across] - origins[across]
@@ -152,10 +159,11 @@ class WallResponse(NamedTuple):
             came, waves = waves, []
             for passages, extra, field in came:
                 # Those that do not cross go on as they are.
-                past = np.where(across[..., None], 0.0, field)
+                past, comes = field.copy(), field[:, across] * met[:, None]
+                past[:, across] -= comes
                 for term in self.series[number].terms[1]:
                     passed = past if term.whole else np.zeros_like(field)
-                    passed[:, across] = transmit(wall, field[:, across], ways, self.frequency, term)
+                    passed[:, across] += transmit(wall, comes, ways, self.frequency, term)
                     if not term.whole:
                         longer = extra.copy()
                         longer[across] += term.extra_m(wall.thickness_m, cosine)

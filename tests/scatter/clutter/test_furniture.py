@@ -112,9 +112,9 @@ def test_a_wall_on_the_way_is_passed_twice(tmp_path: Path) -> None:
     scene = Scene(furniture=(block(tmp_path, "block", (0.1, 0.4, 0.3), (0.05, 0, 1), "metal"),))
     pane = Wall(
         name="pane",
-        corner_m=(-30, -5, 0),
-        edge_u_m=(0, 10, 0),
-        edge_v_m=(0, 0, 3),
+        corner_m=(-30, -20, -20),
+        edge_u_m=(0, 40, 0),
+        edge_v_m=(0, 0, 40),
         material=material("plasterboard"),
         thickness_m=0.0125,
     )

@@ -208,7 +208,7 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
 def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
     # It walks out from behind a partition of brick.
     partition = replace(pane("brick", 0.1), corner_m=(-2.0, -3.0, -20.0), edge_v_m=(0.0, 3.5, 0.0))
-    body = Ball((0.0, -0.6, 1.0), velocity=(0.0, 3.0, 0.0))
+    body = Ball((0.0, -1.2, 1.0), velocity=(0.0, 3.0, 0.0))
     model = build_model(
         "specular", PRESET, body, scene=Scene(walls=(partition,)), variant=backend.kind, order=1
     )  # type: ignore[arg-type]

@@ -10,6 +10,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter.multipath import image_paths
 from rtradar.scatter.multipath import wall_interaction as rw
 from rtradar.scatter.multipath.slab_series import whole_walls
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Scene, Wall, material, own_material, slab
 
 # A tilted front, so that no axis is special.
@@ -84,9 +85,10 @@ def test_legs_cross_where_they_end_on_both_sides_of_the_slab() -> None:
     beside = np.array([0, 0, 6.0])
     origins = np.stack([before, behind, before, before, before + beside, behind])
     targets = np.stack([behind, before, before + 0.1, front, behind + beside, front])
-    np.testing.assert_array_equal(
-        image_paths.crossed(WALL, origins, targets), [True, True, False, False, False, True]
-    )
+    across, met = WallEdges([WALL], 0.02, 0.08).passage(0, origins, targets)
+    np.testing.assert_array_equal(across, [True, True, False, False, False, True])
+    # A metre from any edge is 12 zones of 8 cm: nothing is left of the edges at this resolution.
+    np.testing.assert_array_equal(met, 1)
 
 
 @given(seed=st.integers(0, 1000))
@@ -164,7 +166,8 @@ def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
     origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
     targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
     field, frequency = np.array([0.0, 0, 1.0]), np.array([12e9, 16e9])
-    walls = rw.WallResponse(scene.walls, whole_walls(scene.walls), frequency)
+    edges = WallEdges(scene.walls, 0.02, 0.08)
+    walls = rw.WallResponse(edges, whole_walls(scene.walls), frequency)
     start = walls.start(np.broadcast_to(field, (2, 3, 3)))
     (wave,) = walls.transmitted(0, start, origins[:, None], targets)
     got = wave.field

@@ -1,0 +1,218 @@
+"""Edges of walls and openings: what a face of finite extent leaves of a wave.
+
+Physical optics sums over the face what each of its points sends on. About the specular point that
+sum is a product of two Fresnel integrals, one for each direction along the rectangle, between its
+edges (Born and Wolf, Principles of Optics, section 8.7). Each edge counts by the way that the wave
+makes longer over it, the detour: exact for a straight edge alone, at any incidence. By Babinet's
+principle a wave goes past a wall with 1 minus what its face would send on, and an opening takes its
+own part from its wall.
+
+An edge that lies on another wall is not free: there the face goes on in the image of the other, and
+ends as the image method has it. What comes over an edge later than the range resolution of the
+sweep shows elsewhere, and weakly: it is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fresnel
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.radar import Radar
+from rtradar.scatter.multipath.image_paths import Leg, corners, height, image, image_chain
+from rtradar.scene import Wall
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+Bools = NDArray[np.bool_]
+
+_TOUCHES_M = 1e-3
+"""Distance up to which an edge lies on a wall [m]."""
+_PLACES = np.linspace(0.01, 0.99, 9)
+"""Places along an edge, as fractions of it: it is free if one of them is."""
+
+
+class Sides(NamedTuple):
+    """A rectangle on a face: ``ends (2, 2)`` along each edge [m], and which of these are free."""
+
+    ends: Array
+    free: Bools
+
+
+class WallEdges:
+    """The walls of a room with their edges, for the sweep of a radar.
+
+    Edges count at the wavelength in the middle of the sweep, ``wavelength_m``; its range resolution
+    ``resolution_m`` is c / B, of the whole path.
+    """
+
+    def __init__(self, walls: Sequence[Wall], wavelength_m: float, resolution_m: float) -> None:
+        self.walls = tuple(walls)
+        self.wavelength_m, self.resolution_m = wavelength_m, resolution_m
+
+    @classmethod
+    def of(cls, walls: Sequence[Wall], radar: Radar) -> WallEdges:
+        """Make those for the sweep of a radar."""
+        light = SPEED_OF_LIGHT_MPS
+        return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz)
+
+    @cached_property
+    def _sides(self) -> tuple[tuple[Sides, ...], ...]:
+        """The rectangle of each wall, then its openings."""
+        return tuple(
+            tuple(Sides(ends, _free(wall, ends, self.walls)) for ends in _rectangles(wall))
+            for wall in self.walls
+        )
+
+    def leg(
+        self, leg: Leg, antennas: Array, points: Array, margin_m: float = 0.0
+    ) -> tuple[list[Array], Field]:
+        """Find where a leg runs, and what the extents of its faces leave of its wave.
+
+        Returned are the corners of `rtradar.scatter.multipath.image_paths.corners`, where places of
+        reflection may also lie beside their rectangles, and the factor (...) for the field, 0 where
+        there is no such leg. The margin [m] moves the edges that are not free.
+        """
+        along, valid = corners(leg, antennas, points, margin_m, beside_m=np.inf)
+        weight = valid.astype(np.complex128)
+        sources = np.broadcast_arrays(*image_chain(leg, antennas), points)[1:-1]
+        ends = np.broadcast_to(points, along[0].shape)
+        for face, source in zip(reversed(leg), reversed(sources), strict=True):
+            number = self.walls.index(face.wall)
+            weight[valid] *= self.weight(
+                number, source[valid], ends[valid], back=face.back, margin_m=margin_m
+            )
+            ends = image(face.wall, ends, back=face.back)
+        return along, weight
+
+    def passage(self, number: int, origins: Array, targets: Array) -> tuple[Bools, Field]:
+        """Tell which straight legs pass through a wall, and how much of each.
+
+        The ends (..., 3) [m] of those that do are on different sides of the slab's middle plane, so
+        a leg that ends on a face does not cross it. Returned are (...), and the factor (crossing,)
+        of what meets the wall; the rest goes past it, or through its openings.
+        """
+        wall = self.walls[number]
+        origins, targets = np.broadcast_arrays(origins, targets)
+        half = wall.thickness_m / 2
+        across = (height(wall, origins) + half) * (height(wall, targets) + half) < 0
+        if not across.any():
+            return across, np.zeros(0, dtype=np.complex128)
+        # Where they pass the front: the fronts of a room meet, the middles of its slabs do not.
+        met = self.weight(number, origins[across], targets[across])
+        across[across] = met != 0
+        return across, met[met != 0]
+
+    def weight(
+        self,
+        number: int,
+        sources: Array,
+        targets: Array,
+        *,
+        back: bool = False,
+        margin_m: float = 0.0,
+    ) -> Field:
+        """Compute what a face sends on of waves, over all that an endless one would, (leg,).
+
+        The straight legs from sources to targets (leg, 3) [m] cross the plane of the front, or of
+        the back; in a reflection sources are images.
+        """
+        wall = self.walls[number]
+        source, target = (_on_face(wall, points, back) for points in (sources, targets))
+        total, *openings = (
+            self._between(sides, source, target, margin_m) for sides in self._sides[number]
+        )
+        return np.asarray(total - sum(openings))
+
+    def _between(self, sides: Sides, source: Array, target: Array, margin_m: float) -> Field:
+        """The same for one rectangle; source and target (3, leg) are in the axes of the face."""
+        gap = source[2] - target[2]
+        fraction = source[2] / np.where(gap == 0, 1.0, gap)
+        places = source[:2] + fraction * (target[:2] - source[:2])
+        whole = np.ones(source.shape[1], dtype=np.complex128)
+        for axis, (ends, free) in enumerate(zip(sides.ends, sides.free, strict=True)):
+            part = np.full(whole.shape, -1.0 + 0j)
+            for side, end, soft in zip((1, -1), ends, free, strict=True):
+                depth = side * (places[axis] - end)
+                if soft:
+                    detour = _detour(source, target, axis, end)
+                    part += self._past_edge(depth, detour)
+                else:
+                    part += depth >= -margin_m
+            whole *= part
+        return whole
+
+    def _past_edge(self, depth: Array, detour: Array) -> Field:
+        """Field of a half plane over that of a whole one, by the depth of the leg within it [m].
+
+        Equation :eq:`wall-edge` of the theory page.
+        """
+        number = np.copysign(2 * np.sqrt(detour / self.wavelength_m), depth)
+        sine, cosine = fresnel(number)
+        field = 0.5 + (1 + 1j) / 2 * (cosine - 1j * sine)
+        # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
+        near = np.minimum(detour / self.resolution_m, 1.0)
+        resolved = np.where(near < 1.0, np.sinc(near), 0.0)
+        lit = depth >= 0
+        return np.asarray(lit + (field - lit) * resolved)
+
+
+def _detour(source: Array, target: Array, axis: int, end: float) -> Array:
+    """How much longer the shortest way over the line of an edge is than the straight leg [m]."""
+    one, other = (np.stack([place[axis] - end, place[2]]) for place in (source, target))
+    first, last = np.hypot(*one), np.hypot(*other)
+    over = np.hypot(first + last, source[1 - axis] - target[1 - axis])
+    straight = np.sqrt(((source - target) ** 2).sum(axis=0))
+    # The difference of both squares over their sum, which keeps its digits.
+    more = 2 * np.maximum(first * last + (one * other).sum(axis=0), 0.0)
+    total = over + straight
+    return np.asarray(more / np.where(total > 0, total, 1.0))
+
+
+def _on_face(wall: Wall, points: Array, back: bool) -> Array:
+    """Places along both edges of a face, and heights above its plane, (3, point) [m]."""
+    corner = np.array(wall.corner_m) - (wall.thickness_m if back else 0.0) * wall.normal
+    return np.asarray(_axes(wall) @ (points - corner).T)
+
+
+def _axes(wall: Wall) -> Array:
+    edges = [np.array(edge) / np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m)]
+    return np.stack([*edges, wall.normal])
+
+
+def _rectangles(wall: Wall) -> list[Array]:
+    """Ends of a wall along its edges, and those of its openings, (2, 2) each [m]."""
+    lengths = [np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m)]
+    whole = np.array([[0.0, length] for length in lengths])
+    return [whole, *(np.array([[u, u + a], [v, v + b]]) for u, v, a, b in wall.openings)]
+
+
+def _free(wall: Wall, ends: Array, walls: Sequence[Wall]) -> Bools:
+    """Which edges of a rectangle do not lie on another wall, (2, 2)."""
+    along_u, along_v, _ = _axes(wall)
+    free = np.empty((2, 2), dtype=bool)
+    for axis, side in np.ndindex(2, 2):
+        across = ends[1 - axis, 0] + _PLACES * np.ptp(ends[1 - axis])
+        fixed = np.full_like(across, ends[axis, side])
+        u, v = (fixed, across) if axis == 0 else (across, fixed)
+        points = np.array(wall.corner_m) + u[:, None] * along_u + v[:, None] * along_v
+        held = np.zeros(len(points), dtype=bool)
+        for other in walls:
+            if other is not wall:
+                held |= _touches(other, points)
+        free[axis, side] = not held.all()
+    return free
+
+
+def _touches(wall: Wall, points: Array) -> Bools:
+    """Whether points (point, 3) [m] lie on a wall or inside it."""
+    u, v, above = _on_face(wall, points, back=False)
+    touches = (above <= _TOUCHES_M) & (above >= -wall.thickness_m - _TOUCHES_M)
+    for place, edge in ((u, wall.edge_u_m), (v, wall.edge_v_m)):
+        touches &= (place >= -_TOUCHES_M) & (place <= np.linalg.norm(edge) + _TOUCHES_M)
+    return np.asarray(touches)
