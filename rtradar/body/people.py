@@ -123,10 +123,6 @@ class Person:
         return HumanMesh(placed.shifted([*self.position_m, 0.0])).trimesh(time_s, divisions)
 
 
-Moving = Motion | Person | Sequence[Motion | Person]
-"""Who moves: one or several, with a bare motion for a person where the scene puts them."""
-
-
 class Bodies(Body):
     """Several people as one moving set of ellipsoids with one clock.
 

@@ -12,10 +12,10 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body.people import Moving
 from rtradar.errors import InputError
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_runs
+from rtradar.pipeline.prepare import Moving
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.pipeline.view import load_run_view

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body, Person
-from rtradar.body.people import Moving, body_of_people
+from rtradar.body.people import body_of_people
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.processing import Processing
@@ -27,17 +28,20 @@ from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.together import World, build_world, model_of_people
 from rtradar.scatter.validity import warn_of
-from rtradar.scene import Scene
+from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
 
+Moving = Motion | Person | Sequence[Motion | Person | Object]
+"""Who and what moves: one or several, with a bare motion for a person where the scene puts them."""
 
-def prepare(people: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
+
+def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
     """Place people before a radar and settle everything that the first echo needs.
 
     Errors are those of `rtradar.run`.
     """
-    everyone = people_in(scene, people)
+    scene, everyone = people_in(scene, moving)
     reuse_freed_memory()
     processing = Processing.of(radar, settings)
     if settings.snr_db == "physical":
@@ -92,22 +96,26 @@ def prepare(people: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     )
 
 
-def people_in(scene: Scene, given: Moving) -> tuple[Person, ...]:
-    """Return everyone in a scene: those who are given, and then those whom the scene has.
+def people_in(scene: Scene, given: Moving) -> tuple[Scene, tuple[Person, ...]]:
+    """Return a scene with the objects that are given, and everyone in it: the scene's come last.
 
     A bare motion is a person where the scene puts them. InputError if there is nobody.
     """
     several = given if isinstance(given, Sequence) else (given,)
+    objects = tuple(one for one in several if isinstance(one, Object))
+    if objects:
+        scene = replace(scene, objects=objects + scene.objects)
     everyone = tuple(
         one if isinstance(one, Person) else Person(one, scene.person_position_m, scene.heading_deg)
         for one in several
+        if not isinstance(one, Object)
     )
     everyone += scene.people
     if not everyone:
         raise InputError(
             f"scene '{scene.name}': nobody is there; give a motion, or several with their places"
         )
-    return everyone
+    return scene, everyone
 
 
 def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:

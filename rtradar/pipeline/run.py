@@ -7,7 +7,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
-from rtradar.body.people import Moving
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large_maps
@@ -17,7 +16,7 @@ from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
-from rtradar.pipeline.prepare import people_in, prepare
+from rtradar.pipeline.prepare import Moving, people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
@@ -45,9 +44,9 @@ def run(
 
     Parameters
     ----------
-    motion : Motion, Person, or sequence of them
+    motion : Motion, Person, or sequence of them and of Object
         Who moves: a recording, which the run places where the scene has its person, people with
-        places of their own, or several of these.
+        places of their own, or several of these, and objects beside those of the scene.
     radar : Radar
         Radar, which the scene puts at its position.
     scene : Scene, optional
@@ -101,7 +100,7 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
-    refuse_large_maps(people_in(scene, motion), radar, settings)
+    refuse_large_maps(people_in(scene, motion)[1], radar, settings)
     started, rays_before = _start()
     capture = prepare(motion, radar, scene, settings)
     file = BytesIO()

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.people import Moving
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large
-from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import block_chirps
 from rtradar.radar import Radar
 from rtradar.scatter.link_budget import LinkBudget
