@@ -47,6 +47,28 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
     return found
 
 
+def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
+    """Ends (2, 2) [m] of what is left of the foot of a wall between its openings."""
+    way = foot.last - foot.first
+    edges = [np.array(edge)[:2] for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
+    lengths = [np.linalg.norm(edge) for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
+    along_u, along_v = (edge / length for edge, length in zip(edges, lengths, strict=True))
+    corner = np.array(foot.wall.corner_m)[:2]
+    gaps = []
+    for u, v, wide, high in foot.wall.openings:
+        ends = [
+            (corner + a * along_u + b * along_v - foot.first) @ way / (way @ way)
+            for a, b in ((u, v), (u + wide, v), (u, v + high), (u + wide, v + high))
+        ]
+        gaps.append((min(ends), max(ends)))
+    start, left = 0.0, []
+    for low, high in [*sorted(gaps), (1.0, 1.0)]:
+        if low > start:
+            left.append(foot.first + np.array([[start], [low]]) * way)
+        start = max(start, high)
+    return left
+
+
 def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
     (x, y), limits = _place_and_limits(scene, radar)
@@ -125,10 +147,11 @@ def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
         style: dict[str, Any] = {"color": tuple(pale.tolist()), "linewidth": 0.5}
         if faces:
             axes.add_collection(PolyCollection(faces, **style), autolim=False)
-    for first, last, wall in feet_of_walls(scene):
-        behind = wall.thickness_m * wall.normal[:2]
-        axes.fill(*np.array([first, last, last - behind, first - behind]).T, color=theme.wall)
-        axes.plot(*np.array([first, last]).T, color=theme.wall, linewidth=2)
+    for foot in feet_of_walls(scene):
+        behind = foot.wall.thickness_m * foot.wall.normal[:2]
+        for first, last in _between_openings(foot):
+            axes.fill(*np.array([first, last, last - behind, first - behind]).T, color=theme.wall)
+            axes.plot(*np.array([first, last]).T, color=theme.wall, linewidth=2)
     axes.set(xlim=limits[0], ylim=limits[1], xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal")
 

@@ -65,3 +65,15 @@ def test_names_of_a_hall_of_chairs_do_not_overprint() -> None:
     assert not [pair for pair in combinations(boxes, 2) if pair[0].overlaps(pair[1])]
     (note,) = [text.get_text() for text in axes.texts if "not named" in text.get_text()]
     assert f"{len(chairs) - (len(texts) - 2)} pieces" in note
+
+
+def test_a_doorway_is_a_gap_in_the_wall() -> None:
+    scene = rt.Scene.load("doorway")
+    axes = scene.plot(ax=Figure().add_subplot())
+    lines = [line.get_xydata() for line in axes.lines]
+    spans = sorted(
+        tuple(line[:, 1].round(3).tolist())
+        for line in lines
+        if len(line) == 2 and (line[:, 0] == -2.2).all()
+    )
+    assert spans == [(-2.2, -0.3), (0.6, 2.2)]

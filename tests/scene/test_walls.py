@@ -128,3 +128,26 @@ def test_sides_of_a_room_are_where_their_names_say() -> None:
 def test_rooms_without_meaning(size: Any) -> None:
     with pytest.raises(InputError, match="size_m"):
         room_walls(size, (0, 0), surfaces())
+
+
+def test_openings_lie_in_their_wall_and_nowhere_in_each_other() -> None:
+    own = {
+        "name": "front",
+        "corner_m": (0, 0, 0),
+        "edge_u_m": (0, 4, 0),
+        "edge_v_m": (0, 0, 2.5),
+        "material": material("brick"),
+        "thickness_m": 0.1,
+    }
+    door = Wall(**own, openings=[[1, 0, 0.9, 2], [2.5, 1, 1, 1]])
+    assert door.openings == ((1.0, 0.0, 0.9, 2.0), (2.5, 1.0, 1.0, 1.0))
+    points = np.array([[-0.05, 1.5, 1], [-0.05, 0.5, 1], [-0.05, 3, 1.5], [-0.05, 3, 0.5]])
+    np.testing.assert_array_equal(door.holds(points), [False, True, False, True])
+    for openings, told in (
+        (((3.5, 0, 0.9, 2),), "it must lie in the wall of 4 by 2.5 m"),
+        (((1, 0, 0.9, 2), (1.5, 1, 1, 1)), "overlap"),
+        (((1, 0, 0.9),), "it must be 4 numbers"),
+        ("door", "it must be a list"),
+    ):
+        with pytest.raises(InputError, match=told):
+            Wall(**own, openings=openings)
