@@ -354,3 +354,36 @@ def _between_knots(k: Any) -> Calls:
     given = field, rng.integers(0, 7, 100), rng.uniform(0, 1, 100), rng.integers(0, 3, 100)
     call = filled(k.between_knots, *given, out=(np.empty((3, 100, 4, 20), np.complex64),))
     return call, lambda: k.between_knots_reference(*given)
+
+
+# -- static clutter --------------------------------------------------------------------------------
+
+
+@kernel_case(
+    "scatter.silhouettes.occluded_fractions", "shadow of 4 parts on 20 legs, 400 lines", 3e-3
+)
+def _occluded_fractions(k: Any) -> Calls:
+    rng, table = np.random.default_rng(1), k.wave_table()
+    starts = np.array([-4.0, 0, 1.0]) + rng.uniform(-0.3, 0.3, (20, 3))
+    ends = np.array([3.0, 0, 1.2]) + rng.uniform(-0.5, 0.5, (20, 3))
+    length = np.linalg.norm(ends - starts, axis=1)
+    axes, frames = rng.uniform(0.05, 0.25, (4, 3)), np.linalg.qr(rng.normal(size=(4, 3, 3)))[0]
+    centres = np.array([0, 0, 1.1]) + rng.uniform(-0.3, 0.3, (4, 3))
+    maps = np.ascontiguousarray(np.swapaxes(frames, 1, 2) / axes[:, :, None])
+    given = (starts, ends, np.zeros(20), 1.3 * length), 0.0214, (centres, maps, axes.max(axis=1))
+    scales = np.array([0.87, 1.13])
+    out = np.empty((20, 2), dtype=np.complex128)
+    call = filled(k.occluded_fractions, *given, 400, scales, table, out=(out,))
+    return call, lambda: (k.occluded_fractions_reference(*given, scales),)
+
+
+@kernel_case("still_room.add_blended", "four keyframes of a room, blended over 500 chirps", 1e-5)
+def _add_blended(k: Any) -> Calls:
+    rng = np.random.default_rng(0)
+    fields = rng.normal(size=(5, 4, 2, 3000)).view(np.complex128).astype(np.complex64)[..., :1500]
+    keyframes, whole = fields[:4], np.ascontiguousarray(fields[4].reshape(4, -1))
+    keyframes = np.ascontiguousarray(keyframes.reshape(4, 4, -1))
+    weights = k.cubic_weights(np.linspace(0, 1, 500)).astype(np.float32)
+    tx, out = np.arange(500) % 4, np.zeros((500, 3000), dtype=np.complex64)
+    call = filled(k.add_blended, tx, weights, keyframes, whole, out=(out,), adds=True)
+    return call, lambda: (k.add_blended_reference(tx, weights, keyframes, whole),)

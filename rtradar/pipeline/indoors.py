@@ -50,7 +50,7 @@ def indoors(
     paths = model.prune(n_chirps, noise)
     order = max(settings.order, 1)
     clutter = Clutter(radar, scene, variant=variant, seed=settings.seed, order=order).prune(noise)
-    room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body, variant=variant))
+    room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body))
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary = {
         "paths": [asdict(path) for path in paths],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, Protocol
@@ -11,24 +11,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
-from rtradar.kernels.elementary import smoothstep
-from rtradar.kernels.scatter.rooms import Shadow
+from rtradar.kernels.scatter.silhouettes import Shadow
+from rtradar.kernels.still_room import add_blended, cubic_weights
 from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.signal.synthesis import synthesize
+from rtradar.system.threads import thread_map
 
-_Samples = NDArray[np.complex128]
+_Array = NDArray[np.float64]
+_Samples = NDArray[np.complex64]
+
+_FEW = 16
+_CHIRPS_A_THREAD = 16
 
 
 class MovingShadow(Protocol):
     """What of static clutter a body occludes, as `ClutterShadow` computes it.
 
     ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
-    each object of the clutter.
+    each object of the clutter, ``mirrors`` the objects that walls reflect, ``frequency (node,)``
+    the frequencies of their shadow [Hz].
     """
 
     step: int
     starts: NDArray[np.int64]
+    mirrors: tuple[int, ...]
+    frequency: _Array
 
     def at(self, keyframe: int) -> Shadow:
         """Return what is occluded at a keyframe."""
@@ -38,8 +47,7 @@ class MovingShadow(Protocol):
 class _Group(NamedTuple):
     """Objects whose amplitudes are given at the same frequencies, for one sum over all of them.
 
-    ``member (object,)`` says which belong to it, ``first (object,)`` where their echoes begin. The
-    single echo of a wall is a group of its own, whose IF is kept: a person is often before it.
+    ``member (object,)`` says which belong to it, ``first (object,)`` where their echoes begin.
     """
 
     echoes: Echoes
@@ -47,10 +55,11 @@ class _Group(NamedTuple):
     first: NDArray[np.int64]
 
 
-def _grouped(objects: Sequence[Echoes]) -> list[_Group]:
+def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group]:
     counts = np.array([len(own.part) for own in objects], dtype=np.int64)
+    # Mirrors have few echoes. What is few is summed alone, with a shadow and without.
     kinds = [
-        (number,) if counts[number] == 1 else tuple(own.frequency)
+        (number,) if number in mirrors or counts[number] <= _FEW else tuple(own.frequency)
         for number, own in enumerate(objects)
     ]
     groups = []
@@ -71,42 +80,45 @@ def _grouped(objects: Sequence[Echoes]) -> list[_Group]:
 class RoomIf:
     """IF samples of a room.
 
-    The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes 20 ms
-    apart the IF of what the body occludes is computed, from that of the keyframe before by what has
-    changed. Between keyframes it fades as the echoes do, for the sum is linear in them. ``objects``
-    are the echoes of each object for one cycle, as `Clutter.cycle` yields them; without a shadow
-    the room is exactly still.
+    The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes the IF
+    of what the body occludes is computed. Between them a cubic goes through the samples, for the
+    sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object for
+    one cycle, as `Clutter.cycle` yields them; without a shadow the room is exactly still.
     """
 
     def __init__(
         self, radar: Radar, objects: Iterable[Echoes], shadow: MovingShadow | None = None
     ) -> None:
-        self._radar = radar
-        self._groups = _grouped(tuple(objects))
-        self._whole: _Samples = np.zeros(
-            (self._radar.n_tx, self._radar.n_rx, self._radar.samples_per_chirp), np.complex128
-        )
-        self._singles: dict[int, NDArray[np.complex64]] = {}
-        for number, group in enumerate(self._groups):
-            samples = self._synthesized(group.echoes)
-            self._whole += samples
-            if len(group.echoes.part) == 1:
-                self._singles[number] = samples
-        self._shadow = shadow if self._groups else None
-        self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 2)
+        self._radar, objects = radar, tuple(objects)
+        self._shadow = shadow if objects else None
+        mirrors = shadow.mirrors if shadow else ()
+        self._groups = _grouped(objects, mirrors)
+        self._mirrors: dict[int, _Samples] = {}
+        whole = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex128)
+        for group in self._groups:
+            samples, number = self._synthesized(group.echoes), int(group.member.argmax())
+            whole += samples
+            if number in mirrors:
+                self._mirrors[number] = samples
+        self._whole: _Samples = whole.astype(np.complex64)
+        if shadow:
+            frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
+            frequency = radar.start_frequency_hz + radar.slope_hz_per_s * frequency
+            self._sweep = interpolation_weights(shadow.frequency, frequency)
+        self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 
     @property
     def power_m2(self) -> float:
         """Mean power of the room's IF samples without a person [m^2]."""
         return float((np.abs(self._whole) ** 2).mean())
 
-    def clutter_if(self, chirps: NDArray[np.int64]) -> NDArray[np.complex64]:
+    def clutter_if(self, chirps: NDArray[np.int64]) -> _Samples:
         """Return the IF samples of the room (chirp, rx, sample); chirps as in `add`."""
         out = np.zeros((len(chirps), *self._whole.shape[1:]), dtype=np.complex64)
         self.add(out, chirps)
         return out
 
-    def add(self, samples: NDArray[np.complex64], chirps: NDArray[np.int64]) -> None:
+    def add(self, samples: _Samples, chirps: NDArray[np.int64]) -> None:
         """Add the IF samples of the room to ``samples (chirp, rx, sample)`` complex64, in place.
 
         The chirps (chirp,) are numbered from the start of the capture, ascending.
@@ -114,67 +126,60 @@ class RoomIf:
         chirps = np.asarray(chirps, dtype=np.int64)
         tx = self._radar.tx_of_chirp(chirps)
         if self._shadow is None:
-            samples += self._whole.astype(np.complex64)[tx]
+            samples += self._whole[tx]
             return
         keyframes, rest = np.divmod(chirps, self._shadow.step)
-        fractions = smoothstep(rest / self._shadow.step)
+        weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
             inside = np.flatnonzero(keyframes == keyframe)
-            fraction = fractions[inside]
-            before = self._occluded(keyframe)
-            after = self._occluded(keyframe + 1) if (fraction > 0).any() else before
-            kept, changed = (
-                (first - second).astype(np.complex64)
-                for first, second in ((self._whole, before), (before, after))
-            )
-            some = samples[inside[0] : inside[-1] + 1]
-            some += kept[tx[inside]]
-            some += fraction.astype(np.float32)[:, None, None] * changed[tx[inside]]
+            some = slice(int(inside[0]), int(inside[-1]) + 1)
+            lost = [
+                self._lost.get(k, partial(self._find, k)) for k in range(keyframe - 1, keyframe + 3)
+            ]
+            if not any(one.any() for one in lost):
+                samples[some] += self._whole[tx[some]]
+                continue
+            self._blend(samples[some], tx[some], weights[some], np.stack(lost))
 
-    def _occluded(self, keyframe: int) -> _Samples:
-        """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""
-        return self._lost.get(keyframe, partial(self._find, keyframe))
+    def _blend(
+        self,
+        samples: _Samples,
+        tx: NDArray[np.int64],
+        weights: NDArray[np.float32],
+        lost: _Samples,
+    ) -> None:
+        out = samples.reshape(len(tx), -1)
+        rows = lost.reshape(4, len(self._whole), -1), self._whole.reshape(len(self._whole), -1)
+
+        def fill(begin: int) -> None:
+            some = slice(begin, begin + _CHIRPS_A_THREAD)
+            add_blended(tx[some], weights[some], *rows, out[some])
+
+        thread_map(fill, range(0, len(tx), _CHIRPS_A_THREAD))
 
     def _find(self, keyframe: int) -> _Samples:
+        """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""
         assert self._shadow is not None
-        now = self._shadow.at(keyframe)
-        # From scratch where nothing is occluded: then the room is exactly as without a person.
-        if keyframe - 1 in self._lost and len(now.echo):
-            return self._changed(self._lost[keyframe - 1], self._shadow.at(keyframe - 1), now)
-        nothing = Shadow(now.echo[:0], now.fraction[..., :0])
-        return self._changed(np.zeros_like(self._whole), nothing, now)
-
-    def _changed(self, lost: _Samples, then: Shadow, now: Shadow) -> _Samples:
-        """IF of what is occluded now, from that of then."""
-        assert self._shadow is not None
-        echoes = np.union1d(then.echo, now.echo)
-        change = np.zeros((*self._whole.shape[:2], len(echoes)))
-        change[..., np.searchsorted(echoes, now.echo)] = now.fraction
-        change[..., np.searchsorted(echoes, then.echo)] -= then.fraction
-        differs = (change != 0).any(axis=(0, 1))
-        echoes, change = echoes[differs], change[..., differs]
-        starts = self._shadow.starts
-        lost = lost.copy()
-        own = np.searchsorted(starts, echoes, side="right") - 1
-        for number, group in enumerate(self._groups):
+        now, starts = self._shadow.at(keyframe), self._shadow.starts
+        lost = np.zeros(self._whole.shape, dtype=np.complex64)
+        for number, of_mirror in zip(now.mirror.tolist(), now.of_mirror, strict=True):
+            lost += self._mirrors[number] * (of_mirror @ self._sweep.T)
+        own = np.searchsorted(starts, now.echo, side="right") - 1
+        for group in self._groups:
             chosen = np.flatnonzero(group.member[own])
-            if len(chosen) == 0:
-                continue
-            fraction, whole = change[..., chosen], group.echoes
-            if number in self._singles:
-                lost += fraction * self._singles[number]
-                continue
-            which = group.first[own[chosen]] + echoes[chosen] - starts[own[chosen]]
-            some = replace(
-                whole,
-                length=whole.length[..., which],
-                amplitude=whole.amplitude[..., which] * fraction,
-                part=whole.part[which],
-                bounces=whole.bounces[which],
-            )
-            lost += self._synthesized(some)
+            if len(chosen):
+                which = group.first[own[chosen]] + now.echo[chosen] - starts[own[chosen]]
+                whole = group.echoes
+                some = replace(
+                    whole,
+                    length=whole.length[..., which],
+                    amplitude=whole.amplitude[..., which] * now.fraction[..., chosen],
+                    part=whole.part[which],
+                    bounces=whole.bounces[which],
+                )
+                lost += self._synthesized(some)
         return lost
 
-    def _synthesized(self, echoes: Echoes) -> NDArray[np.complex64]:
+    def _synthesized(self, echoes: Echoes) -> _Samples:
         times = self._radar.chirp_times(self._radar.n_tx)
         return np.asarray(synthesize(echoes, self._radar, times, dtype=np.complex64))

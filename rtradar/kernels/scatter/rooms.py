@@ -218,14 +218,3 @@ def delayed_lengths_reference(antennas, tx_index, points, bodies, delays, length
                 inside = passes * np.sqrt(slab[4] - 1 + cosine**2)
                 out[..., column] += slab[3] * (inside - passes % 2 * cosine)
     return out
-
-
-class Shadow(NamedTuple):
-    """What a body occludes of static clutter at one keyframe.
-
-    ``echo (n,)`` counts through the objects of the clutter, one after the other, ascending;
-    ``fraction (tx, rx, n)`` of each is occluded.
-    """
-
-    echo: Indices
-    fraction: Array

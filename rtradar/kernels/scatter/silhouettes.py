@@ -1,0 +1,238 @@
+"""Kirchhoff's diffraction by the silhouette of a body of ellipsoids across straight legs.
+
+Every part is a screen across the leg, where it comes nearest to it. Offsets from the leg are in
+units of sqrt(wavelength * before * after / length), the radius of the first Fresnel zone there, and
+the silhouettes of all parts are one set S of such offsets. The occluded fraction of the field is
+
+    F = (eps - j) integral over S of exp((j - eps) pi (x^2 + y^2)) dx dy,
+
+as for a wave exp(+j k length), the convention of IF samples. Along lines through the leg the
+integral over the radius is closed form, and so are the crossings with ellipses. The small ``eps``
+lets what is many Fresnel zones aside fade: what a round body sends there are echoes of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined
+
+Indices = NDArray[np.int64]
+Field = NDArray[np.complex128]
+
+FADE = 0.1
+"""Damping ``eps``: an edge two Fresnel radii aside has lost two thirds of its fringes."""
+REACH = 3.5
+"""Offset beyond which parts are left out, in Fresnel radii: their fringes are below 0.1 %."""
+_FAR = 4.0
+_STEPS = 64
+"""Entries of the table of the integrand for each unit of a squared radius."""
+_LEAST_M2 = 1e-6
+
+
+class Shadow(NamedTuple):
+    """What a body takes from static clutter at one keyframe.
+
+    ``echo (n,)`` counts through the objects of the clutter, one after the other, ascending;
+    ``fraction (tx, rx, n)`` complex of each is lost. ``mirror (m,)`` are numbers of objects, whose
+    echoes all lose ``of_mirror (m, tx, rx, node)`` complex, at frequencies over the sweep.
+    """
+
+    echo: Indices
+    fraction: Field
+    mirror: Indices
+    of_mirror: Field
+
+
+def wave_table():
+    """Table of exp((j - eps) pi x) for x from 0 on, in steps of 1 / `_STEPS`."""
+    x = np.arange(int(_FAR**2 * _STEPS) + 2) / _STEPS
+    return np.exp((1j - FADE) * np.pi * x)
+
+
+@inlined(fastmath={"contract"})
+def _crossing(rho, scales, table, sign, out):
+    """Add sign(rho) (1 - exp((j - eps) pi rho^2)) at every frequency, times ``sign``."""
+    side = sign if rho > 0 else -sign
+    square = rho * rho * _STEPS
+    for node in range(len(scales)):
+        x = square * scales[node]
+        n = int(x)
+        if n + 1 < len(table):
+            rest = x - n
+            out[node] += side * (1 - (1 - rest) * table[n] - rest * table[n + 1])
+        else:
+            out[node] += side
+
+
+@inlined(fastmath={"contract"})
+def _near_parts(start, way, size, before, length, wavelength, body, near):
+    """Find the parts near a leg: their silhouettes' quadratic forms (part, 6); return how many."""
+    centres, maps, longest = body
+    # Two unit vectors across the leg.
+    axis = 0
+    for i in range(1, 3):
+        if abs(way[i]) < abs(way[axis]):
+            axis = i
+    side, up = np.zeros(3), np.empty(3)
+    for i in range(3):
+        side[i] = (1.0 if i == axis else 0.0) - way[axis] * way[i]
+    norm = math.sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2])
+    for i in range(3):
+        side[i] /= norm
+    up[0] = way[1] * side[2] - way[2] * side[1]
+    up[1] = way[2] * side[0] - way[0] * side[2]
+    up[2] = way[0] * side[1] - way[1] * side[0]
+    count = 0
+    x, y, u, v = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for part in range(len(centres)):
+        g0, g1, g2 = (
+            centres[part, 0] - start[0],
+            centres[part, 1] - start[1],
+            centres[part, 2] - start[2],
+        )
+        along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+        if along < -longest[part] or along > size + longest[part]:
+            continue
+        gap = math.sqrt(max(g0 * g0 + g1 * g1 + g2 * g2 - along * along, 0.0))
+        past = before + min(max(along, 0.0), size)
+        zone = math.sqrt(wavelength * past * max(length - past, 0.0) / length)
+        if gap > longest[part] + REACH * zone:
+            continue
+        m = maps[part]
+        for i in range(3):
+            x[i] = m[i, 0] * g0 + m[i, 1] * g1 + m[i, 2] * g2
+            y[i] = m[i, 0] * way[0] + m[i, 1] * way[1] + m[i, 2] * way[2]
+            u[i] = m[i, 0] * side[0] + m[i, 1] * side[1] + m[i, 2] * side[2]
+            v[i] = m[i, 0] * up[0] + m[i, 1] * up[1] + m[i, 2] * up[2]
+        yy = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
+        xy = x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+        uy = u[0] * y[0] + u[1] * y[1] + u[2] * y[2]
+        vy = v[0] * y[0] + v[1] * y[1] + v[2] * y[2]
+        nearest = xy / yy
+        # A part that an end of the leg is beside counts by what of it is before that end.
+        inside = 0.5 + 0.5 * min(nearest, size - nearest) * math.sqrt(yy)
+        if inside <= 0:
+            continue
+        inside = min(inside, 1.0)
+        past = before + min(max(nearest, 0.0), size)
+        square = max(wavelength * past * max(length - past, 0.0) / length, _LEAST_M2)
+        zone = math.sqrt(square)
+        form = near[count]
+        form[0] = square * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - uy * uy / yy)
+        form[1] = square * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - uy * vy / yy)
+        form[2] = square * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - vy * vy / yy)
+        form[3] = zone * (x[0] * u[0] + x[1] * u[1] + x[2] * u[2] - xy * uy / yy)
+        form[4] = zone * (x[0] * v[0] + x[1] * v[1] + x[2] * v[2] - xy * vy / yy)
+        form[5] = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - xy * xy / yy - inside * inside
+        count += 1
+    return count
+
+
+@inlined(fastmath={"contract"})
+def _mean_root(under, slope):
+    """Mean square root over a cell where ``under`` changes by ``slope`` either way; 0 below 0."""
+    if slope < 0.1 * under:
+        return math.sqrt(under)  # to 0.05 %
+    high, low = max(under + slope, 0.0), max(under - slope, 0.0)
+    return (high * math.sqrt(high) - low * math.sqrt(low)) / (3 * slope)
+
+
+@inlined(fastmath={"contract"})
+def _over_line(cosine, sine, half, near, count, lows, highs):
+    """Find what a line through the leg covers of all silhouettes: disjoint intervals, their number.
+
+    They are merged as they come. A line stands for all in ``half`` an angle about it: chords are
+    their mean there, or those of silhouettes that a line just touches would come out of nothing.
+    """
+    both = cosine * cosine, 2 * cosine * sine, sine * sine
+    n = 0
+    for part in range(count):
+        a0, a1, a2, b0, b1, c = near[part]
+        a = a0 * both[0] + a1 * both[1] + a2 * both[2]
+        b = b0 * cosine + b1 * sine
+        turned = b1 * cosine - b0 * sine
+        wider = (a2 - a0) * both[1] + 2 * a1 * (both[0] - both[2])
+        under, slope = b * b - a * c, abs(half * (2 * b * turned - wider * c))
+        if under + slope <= 0:
+            continue
+        root = _mean_root(under, slope)
+        low, high = max((b - root) / a, -_FAR), min((b + root) / a, _FAR)
+        if low >= high:
+            continue
+        kept = 0
+        for i in range(n):
+            if lows[i] <= high and highs[i] >= low:
+                low, high = min(low, lows[i]), max(high, highs[i])
+            else:
+                lows[kept], highs[kept] = lows[i], highs[i]
+                kept += 1
+        lows[kept], highs[kept] = low, high
+        n = kept + 1
+    return n
+
+
+@compiled(fastmath={"contract"})
+def occluded_fractions(legs, wavelength, body, lines, scales, table, out):
+    """Fill in the occluded fraction (leg, node) complex of legs past a posed body.
+
+    ``legs`` are starts and ends (leg, 3), the path before the start and that of the whole (leg,)
+    [m]; ``body`` is centres (part, 3), the maps (part, 3, 3) to the axes where each part is the
+    unit sphere, and the largest semi-axes (part,) [m]. The integral is taken over ``lines`` lines
+    through each leg; ``scales (node,)`` are frequencies over that of the wavelength, ``table`` is
+    that of `wave_table`.
+    """
+    starts, ends, before, length = legs
+    parts = len(body[0])
+    near, lows, highs = np.empty((parts, 6)), np.empty(parts), np.empty(parts)
+    way = np.empty(3)
+    cosines, sines = np.empty(lines), np.empty(lines)
+    half = 0.5 * math.pi / lines
+    for line in range(lines):
+        angle = (line + 0.5) * math.pi / lines
+        cosines[line], sines[line] = math.cos(angle), math.sin(angle)
+    for leg in range(len(starts)):
+        size = 0.0
+        for i in range(3):
+            way[i] = ends[leg, i] - starts[leg, i]
+            size += way[i] * way[i]
+        size = math.sqrt(size)
+        for i in range(3):
+            way[i] /= size
+        own = out[leg]
+        own[:] = 0
+        count = _near_parts(
+            starts[leg], way, size, before[leg], length[leg], wavelength, body, near
+        )
+        if count == 0:
+            continue
+        for line in range(lines):
+            n = _over_line(cosines[line], sines[line], half, near, count, lows, highs)
+            for i in range(n):
+                _crossing(highs[i], scales, table, 0.5 / lines, own)
+                _crossing(lows[i], scales, table, -0.5 / lines, own)
+
+
+def occluded_fractions_reference(legs, wavelength, body, scales, step=0.01):
+    """`occluded_fractions` by a sum over a grid of offsets, which it has to converge to."""
+    across, found = np.arange(-_FAR, _FAR, step) + step / 2, []
+    for start, end, before, length in zip(*legs, strict=True):
+        way = (end - start) / np.linalg.norm(end - start)
+        side = np.cross(way, np.eye(3)[np.abs(way).argmin()])
+        side /= np.linalg.norm(side)
+        plane = across[:, None, None] * side + across[:, None] * np.cross(way, side)
+        covered = np.zeros(plane.shape[:2], dtype=bool)
+        for centre, to_sphere in zip(*body[:2], strict=True):
+            x, y = to_sphere @ (centre - start), to_sphere @ way
+            past = before + x @ y / (y @ y)
+            zone = np.sqrt(wavelength * past * (length - past) / length)
+            offset = x - zone * plane @ to_sphere.T
+            covered |= (offset**2).sum(axis=-1) - (offset @ y) ** 2 / (y @ y) <= 1
+        square = np.add.outer(across**2, across**2)[covered]
+        wave = [np.exp((1j - FADE) * np.pi * square * scale).sum() * scale for scale in scales]
+        found.append((FADE - 1j) * step**2 * np.array(wave))
+    return np.array(found)
