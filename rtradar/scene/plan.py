@@ -1,4 +1,4 @@
-"""The plan of a scene: walls, furniture and radar seen from above."""
+"""The plan of a scene: walls, furniture and radar seen from above, objects where they begin."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:
     """
     corners = [np.asarray(points, dtype=np.float64)]
     corners += [np.concatenate(foot[:2]).reshape(2, 2) for foot in feet_of_walls(scene)]
-    corners += [piece.triangles().vertices[:, :2] for piece in scene.furniture]
+    corners += [piece.triangles().vertices[:, :2] for piece in (*scene.furniture, *scene.objects)]
     every = np.concatenate(corners)
     low, high = every.min(axis=0), every.max(axis=0)
     span = high - low
@@ -131,7 +131,7 @@ def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
     """Draw walls, furniture and reflectors without their names, which `name_parts` writes."""
     theme = theme_of(axes)
     covering: dict[str, list[NDArray[np.float64]]] = {theme.furniture: [], theme.reflector: []}
-    for piece in scene.furniture:
+    for piece in (*scene.furniture, *scene.objects):
         triangles = piece.triangles()
         corners = triangles.corners[..., :2]
         (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
@@ -175,7 +175,7 @@ def name_parts(
     """
     theme = theme_of(axes)
     feet, pieces = feet_of_walls(scene), []
-    for piece in scene.furniture:
+    for piece in (*scene.furniture, *scene.objects):
         triangles = piece.triangles()
         low, high = triangles.vertices[:, :2].min(axis=0), triangles.vertices[:, :2].max(axis=0)
         x, y = ((low + high) / 2).tolist()
