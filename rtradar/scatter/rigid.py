@@ -8,20 +8,22 @@ keyframes, for the middle of each facet, and fades smoothly in between; so do th
 
 An object is seen over some lengths, one echo each, about that over its point of reference; each
 facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
-phases change slowly against those at the point of reference, the field is computed at knots in time
-for all pairs of antennas, with polynomials in between; else at every chirp.
+phases change slowly against those at the point of reference, the field is computed at knots in
+time for all pairs of antennas, with polynomials in between; else at every chirp. A sheet reflects
+several times, too (`rtradar.scatter.rigid_bounces`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets_by_length import (
     LengthGrid,
@@ -35,6 +37,7 @@ from rtradar.scatter.clutter.furniture import small_facets
 from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import antenna_field, copolar, unit
+from rtradar.scatter.rigid_bounces import SheetBounces
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, reflection
 from rtradar.system.threads import thread_map
@@ -47,8 +50,8 @@ Indices = NDArray[np.int64]
 _NODES = 3
 """Frequencies over the sweep: one pass of `synthesize` in float32 takes as many."""
 
-_LENGTHS_A_CELL = 3.0
-"""Echoes to a range cell of path, c / bandwidth: at three nodes, 0.3 % of a facet's field is lost
+_LENGTHS_A_CELL = 4.0
+"""Echoes to a range cell of path, c / bandwidth: at three nodes, 0.1 % of a facet's field is lost
 at the ends of the sweep."""
 
 _BOW_RAD = 0.3
@@ -79,9 +82,14 @@ class _Keyframe(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What may hide an object: the tracer of the room, and people with theirs, if there are any."""
+    """What may hide an object: Mitsuba, tracers of all in the room and of the others, and people.
 
+    ``others`` are furniture and the objects but for this one.
+    """
+
+    mi: Any
     room: RoomTracer
+    others: RoomTracer
     body: Body
     people: BodyTracer
 
@@ -114,7 +122,8 @@ class RigidEchoes:
         k = wavenumber[-1]
         bow_m = 2 * math.sqrt(_BOW_RAD * nearest / k)
         edge = min(bow_m, _OF_OBJECT * float((high - low).max()))
-        self._facets = _rigid_facets(small_facets(own, 0, edge).corners, not shape.closed)
+        small = small_facets(own, 0, edge)
+        self._facets = _rigid_facets(small.corners, not shape.closed)
         step = SPEED_OF_LIGHT_MPS / (_LENGTHS_A_CELL * radar.bandwidth_hz)
         half = math.ceil(2 * radius / step) + 1
         sweep = radar.bandwidth_hz / (2 * radar.centre_frequency_hz)
@@ -127,6 +136,20 @@ class RigidEchoes:
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
         self._places, self._tx_weight, self._rx_weight = shadow_nodes(radar)
         self.limits = tuple(self._limits(speeds))
+        self._bounces = None
+        if past is not None and not shape.closed:
+            self._bounces = SheetBounces(
+                past.mi,
+                radar,
+                own,
+                small,
+                pose=self._pose,
+                open_at=self._open_at,
+                frequency=self.frequency,
+                step=step,
+                knot_s=self._knot_s / 2,
+                spreading=spreading,
+            )
 
     def _kinematics(self, duration_s: float) -> tuple[float, float, Array, float]:
         """Least distance [m], largest rates, and range rates of the mesh over the capture.
@@ -184,8 +207,8 @@ class RigidEchoes:
 
     # -- echoes ------------------------------------------------------------------------------------
 
-    def echoes(self, chirps: Indices) -> tuple[Array, NDArray[np.complex64]]:
-        """Lengths (chirp, rx, echo) [m] and amplitudes (node, chirp, rx, echo) as of `Echoes` [m].
+    def echoes(self, chirps: Indices) -> Echoes:
+        """Echoes of the object at these chirps, all of part 0.
 
         Only lengths at which something is seen are there, so their number changes from call to
         call.
@@ -207,9 +230,20 @@ class RigidEchoes:
             field = self._field(times, tx)
             used = field.any(axis=(0, 1, 2))
             amplitude = np.moveaxis(field[..., used], 2, 0).astype(np.complex64)
-        over = self._over_reference(times, tx)
         steps = (self._grid.first + np.flatnonzero(used)) * self._grid.step
-        return over[..., None] + steps, np.ascontiguousarray(amplitude)
+        bounces = np.ones(len(steps), dtype=np.int64)
+        if self._bounces is not None:
+            more, field_of, order = self._bounces.echoes(times, tx)
+            steps, bounces = np.append(steps, more), np.append(bounces, order)
+            amplitude = np.concatenate([amplitude, field_of], axis=3)
+        return Echoes(
+            length=self._over_reference(times, tx)[..., None] + steps,
+            amplitude=np.ascontiguousarray(amplitude),
+            frequency=self.frequency,
+            tx=tx,
+            part=np.zeros(len(steps), dtype=np.int64),
+            bounces=bounces,
+        )
 
     def _pose(self, times: Array) -> tuple[Array, Array]:
         """Rotations (time, 3, 3), and the point of reference (time, 3), world [m]."""
@@ -270,12 +304,26 @@ class RigidEchoes:
         seen = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
         if self._past is not None:
             place, facet = np.nonzero(seen)
-            seen[place, facet] = self._clear(time_s, places[place], middles[facet])
+            room = self._past.room
+            seen[place, facet] = self._clear(room, time_s, places[place], middles[facet])
         return _Keyframe(seen.astype(np.float32), self._factor(middles, normals))
 
-    def _clear(self, time_s: float, origins: Array, targets: Array) -> NDArray[np.bool_]:
+    def _open_at(self, time_s: float) -> tuple[Array, Array]:
+        """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times their gain."""
+        (rotation,), (at,) = self._pose(np.array([time_s]))
+        middles = self._facets.vertices[:, -len(self._facets.faces) :].T @ rotation.T + at
+        places = np.repeat(self._places, len(middles), axis=0)
+        targets, others = np.tile(middles, (len(self._places), 1)), self._past and self._past.others
+        assert others is not None
+        clear = self._clear(others, time_s, places, targets).reshape(-1, len(middles)).mean(axis=1)
+        gain = math.sqrt(float(self._gain(unit(at - np.array(self._radar.position_m)))))
+        return self._tx_weight @ clear * gain, self._rx_weight @ clear * gain
+
+    def _clear(
+        self, room: RoomTracer, time_s: float, origins: Array, targets: Array
+    ) -> NDArray[np.bool_]:
         assert self._past is not None
-        room, body, people = self._past
+        body, people = self._past.body, self._past.people
         room.pose(time_s)
         clear = ~room.blocked(origins, targets)
         poses = body.at([min(max(time_s, 0.0), body.duration_s)])
@@ -283,6 +331,14 @@ class RigidEchoes:
         on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
         clear[clear] = people.sees(origins[clear], targets[clear], on_none)
         return clear
+
+    def _gain(self, way: Array) -> Array:
+        """Field (...) that the patterns of both antennas leave in directions ``way (..., 3)``."""
+        radar, gain = self._radar, np.ones(way.shape[:-1])
+        for antenna in (radar.tx_antenna, radar.rx_antenna):
+            if antenna is not None:
+                gain = gain * np.sqrt(antenna.relative(way, radar.polarization))
+        return gain
 
     def _factor(self, middles: Array, normals: Array) -> NDArray[np.complex128]:
         """Field of each facet over that of a conductor between isotropic antennas, (facet,).
@@ -292,10 +348,7 @@ class RigidEchoes:
         of TM.
         """
         radar, way = self._radar, unit(middles - np.array(self._radar.position_m))
-        factor = np.asarray(copolar(-way, -way, radar.polarization), dtype=np.complex128)
-        for antenna in (radar.tx_antenna, radar.rx_antenna):
-            if antenna is not None:
-                factor *= np.sqrt(antenna.relative(way, radar.polarization))
+        factor = np.asarray(self._gain(way) * copolar(-way, -way, radar.polarization), complex)
         if self.moving.material.conducts:
             return factor
         cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)

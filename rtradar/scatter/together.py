@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,11 +57,8 @@ class World:
     ``limits`` are those of the objects.
     """
 
-    def __init__(
-        self, person: EchoModel, parts: int, radar: Radar, objects: Sequence[RigidEchoes]
-    ) -> None:
-        self.person, self.objects = person, tuple(objects)
-        self._parts, self._radar = parts, radar
+    def __init__(self, person: EchoModel, parts: int, objects: Sequence[RigidEchoes]) -> None:
+        self.person, self.objects, self._parts = person, tuple(objects), parts
         self.variant = person.variant
 
     @property
@@ -75,20 +73,10 @@ class World:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps, those of the people first."""
         chirps = np.asarray(chirps, dtype=np.int64)
-        tx, found = self._radar.tx_of_chirp(chirps), [self.person.echoes(chirps)]
-        for number, own in enumerate(self.objects):
-            length, amplitude = own.echoes(chirps)
-            count = length.shape[2]
-            found.append(
-                Echoes(
-                    length=length,
-                    amplitude=amplitude,
-                    frequency=own.frequency,
-                    tx=tx,
-                    part=np.full(count, self._parts + number),
-                    bounces=np.ones(count, dtype=np.int64),
-                )
-            )
+        found = [self.person.echoes(chirps)]
+        for number, own in enumerate(self.objects, start=self._parts):
+            echoes = own.echoes(chirps)
+            found.append(replace(echoes, part=echoes.part + number))
         return together(found)
 
 
@@ -111,15 +99,19 @@ def build_world(
     model = build_model(fidelity, radar, body, **given)
     if not scene.objects:
         return model
-    past = None
+    objects = []
+    tracers = None
     if model.variant is not None:
         mi = use(select(variant))
-        past = Past(RoomTracer(mi, scene), body, BodyTracer(mi, body.semi_axes))
-    objects = [
-        RigidEchoes(radar, moving, body.duration_s, past, spreading=spreading)
-        for moving in scene.objects
-    ]
-    return World(model, len(body.part_names), radar, objects)
+        tracers = mi, RoomTracer(mi, scene), BodyTracer(mi, body.semi_axes)
+    for moving in scene.objects:
+        past = None
+        if tracers is not None:
+            mi, room, people = tracers
+            others = tuple(other for other in scene.objects if other is not moving)
+            past = Past(mi, room, RoomTracer(mi, replace(scene, objects=others)), body, people)
+        objects.append(RigidEchoes(radar, moving, body.duration_s, past, spreading=spreading))
+    return World(model, len(body.part_names), objects)
 
 
 def model_of_people(model: EchoModel) -> EchoModel:

@@ -13,6 +13,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
+from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.rigid import RigidEchoes
 from rtradar.scatter.together import build_world, together
 from rtradar.scene import material, reflection
@@ -22,15 +23,11 @@ RADAR = dataclasses.replace(
 )
 
 
-def field(
-    echoes: tuple[NDArray[np.float64], NDArray[np.complex64]], nodes: NDArray[np.float64]
-) -> NDArray[np.complex128]:
+def field(echoes: rt.Echoes) -> NDArray[np.complex128]:
     """Field (node, chirp, rx) of all echoes of an object."""
-    length, amplitude = echoes
-    k = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
-    return np.asarray(
-        (amplitude.conj() * np.exp(-1j * k[:, None, None, None] * length)).sum(axis=3)
-    )
+    k = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
+    turns = np.exp(-1j * k[:, None, None, None] * echoes.length)
+    return np.asarray((echoes.amplitude.conj() * turns).sum(axis=3))
 
 
 def box(motion: rt.Turning | rt.FollowingPath | None, made_of: str = "metal") -> rt.Object:
@@ -42,7 +39,7 @@ def box(motion: rt.Turning | rt.FollowingPath | None, made_of: str = "metal") ->
 def test_it_returns_what_physical_optics_of_the_posed_mesh_does(yaw_deg: float) -> None:
     still = dataclasses.replace(box(None), yaw_deg=yaw_deg)
     model = RigidEchoes(RADAR, still, 0.1, None)
-    found = field(model.echoes(np.arange(2)), model.frequency)
+    found = field(model.echoes(np.arange(2)))
     posed = trimesh.Trimesh(still.triangles().vertices, still.shape.faces, process=False)
     tx = np.repeat(RADAR.tx[RADAR.tx_of_chirp(np.arange(2))], RADAR.n_rx, axis=0)
     rx = RADAR.rx[RADAR.rx_of_tx[RADAR.tx_of_chirp(np.arange(2))]].reshape(-1, 3)
@@ -59,37 +56,27 @@ def test_it_returns_what_physical_optics_of_the_posed_mesh_does(yaw_deg: float) 
 
 def test_between_its_nodes_the_sweep_is_met_as_well() -> None:
     still = dataclasses.replace(box(None), yaw_deg=25.0)
-    radar = dataclasses.replace(RADAR, bandwidth_hz=RADAR.bandwidth_hz * 0.999)
+    radar = dataclasses.replace(RADAR, bandwidth_hz=RADAR.bandwidth_hz * 1.07)
     models = [RigidEchoes(one, still, 0.1, None) for one in (RADAR, radar)]
-    length, amplitude = models[0].echoes(np.arange(1))
-    # Another sweep has other nodes; at its ends the polynomial of the first is extrapolated least.
-    weights = np.array(
-        [
-            np.prod(
-                [
-                    (models[1].frequency - other) / (own - other)
-                    for other in models[0].frequency
-                    if other != own
-                ],
-                axis=0,
-            )
-            for own in models[0].frequency
-        ]
-    ).T
-    between = np.tensordot(weights, amplitude, axes=1)
-    found = field((length, between), models[1].frequency)
-    expected = field(models[1].echoes(np.arange(1)), models[1].frequency)
-    np.testing.assert_allclose(found, expected, atol=0.005 * np.abs(expected).max())
+    own = models[0].echoes(np.arange(1))
+    # Another sweep has other nodes.
+    weights = interpolation_weights(models[0].frequency, models[1].frequency)
+    between = dataclasses.replace(
+        own,
+        amplitude=np.tensordot(weights, own.amplitude, axes=1),
+        frequency=models[1].frequency,
+    )
+    expected = field(models[1].echoes(np.arange(1)))
+    np.testing.assert_allclose(field(between), expected, atol=0.005 * np.abs(expected).max())
 
 
 def test_knots_in_time_give_what_every_chirp_gives() -> None:
     turning = box(rt.Turning(rate_hz=0.2))
     model = RigidEchoes(RADAR, turning, 0.5, None)
     chirps = np.arange(1200)
-    length, amplitude = model.echoes(chirps)
     assert model._knot_s > 3 * RADAR.cycle_duration_s
-    found = field((length, amplitude), model.frequency)[:, 700:712]
-    expected = field(model.echoes(chirps[700:712]), model.frequency)
+    found = field(model.echoes(chirps))[:, 700:712]
+    expected = field(model.echoes(chirps[700:712]))
     np.testing.assert_allclose(found, expected, atol=0.003 * np.abs(expected).max())
 
 
@@ -99,7 +86,7 @@ def test_a_plate_of_wood_reflects_by_its_coefficient() -> None:
         RigidEchoes(RADAR, dataclasses.replace(ahead, material=material(name)), 0.1, None)
         for name in ("perfect-conductor", "wood")
     ]
-    conductor, wood = (field(own.echoes(np.arange(1)), own.frequency) for own in plates)
+    conductor, wood = (field(own.echoes(np.arange(1))) for own in plates)
     eta = material("wood").eta(np.array([RADAR.centre_frequency_hz]))[0]
     expected = -reflection(eta, 1.0, "te")
     np.testing.assert_allclose(wood / conductor, expected, atol=0.02 * abs(expected))
@@ -159,3 +146,34 @@ def test_echoes_together_are_the_sum_of_each() -> None:
     found = rt.signal.synthesize(together(several), RADAR, times)
     expected = sum(rt.signal.synthesize(own, RADAR, times) for own in several)
     np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
+def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
+    radar = dataclasses.replace(
+        RADAR, tx_y=1, tx_z=0, rx_y=1, rx_z=0, start_frequency_hz=11.9e9, bandwidth_hz=0.2e9
+    )
+    radar = dataclasses.replace(radar, position_m=(-4.0, 3.0, 1.0))
+    cart = rt.Object(
+        "cart",
+        "trihedral",
+        "metal",
+        position_m=(96, 3, 1),
+        yaw_deg=180,
+        motion=rt.FollowingPath(velocity_mps=(-1, 0, 0)),
+    )
+    body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.1))
+    world = build_world("specular", radar, body, scene=rt.Scene(objects=(cart,)))
+    echoes = world.echoes(np.arange(4))
+    own = echoes.part == len(body.part_names)
+    assert set(echoes.bounces[own]) == {1, 2, 3}
+    only = dataclasses.replace(
+        echoes,
+        length=echoes.length[..., own],
+        amplitude=echoes.amplitude[..., own],
+        part=echoes.part[own],
+        bounces=echoes.bounces[own],
+    )
+    power = np.abs(field(only)[1, :, 0]) ** 2 * 100.0**4
+    wavelength = SPEED_OF_LIGHT_MPS / 12e9
+    closed = 4 * np.pi * 0.4**4 / (3 * wavelength**2)
+    np.testing.assert_allclose(10 * np.log10(power / closed), 0, atol=0.3)
