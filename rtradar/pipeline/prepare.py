@@ -56,7 +56,11 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
             n_chirps, frame_starts = _frames(radar, body)
             warm_up_start = time.perf_counter()
             model = _echo_model(radar, body, scene, settings)
-            echoes = model.echoes(np.arange(2 * radar.n_tx))
+            chirps = np.arange(2 * radar.n_tx)
+            around = model.person if isinstance(model, World) else model
+            # Which paths need a model of their own is not yet known.
+            quick = around.optical_echoes if isinstance(around, RoomModel) else model.echoes
+            echoes = quick(chirps)
             # Not every model has specular points; the report shows them of all.
             geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
             solve_specular_points(geometry, points=True)
@@ -132,14 +136,6 @@ def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
 
 
 def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> EchoModel:
-    options = dict(settings.model_options or {})
-    materials = set(body.materials)
-    if len(materials) > 1:
-        raise InputError(
-            f"people of {' and '.join(sorted(materials))}: their materials must be the same"
-        )
-    if (material := materials.pop()) != "perfect-conductor":
-        options["material"] = material
     return build_world(
         settings.fidelity,
         radar,
@@ -148,7 +144,8 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
         order=settings.order,
         variant=settings.variant,
         spreading=settings.spreading,
-        **options,
+        materials=body.materials,
+        **(settings.model_options or {}),
     )
 
 

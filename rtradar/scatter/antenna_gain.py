@@ -1,18 +1,18 @@
-"""Echoes through antennas with patterns: any model, weighted by the directions of its legs."""
+"""Echoes over legs in free space: any model, through antenna patterns, off any material."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import unit
+from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces, is_shaped, unit
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 
 
@@ -48,23 +48,38 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
     return gain
 
 
-def through_antennas(model: EchoModel, radar: Radar, body: Body) -> EchoModel:
-    """Wrap the model by the patterns of the antennas, unless these are isotropic."""
-    shaped = is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna)
-    return _ThroughAntennas(model, radar, body) if shaped else model
+def over_legs(
+    model: EchoModel, radar: Radar, body: Body, materials: Sequence[str] = ()
+) -> EchoModel:
+    """Wrap the model of a conductor before isotropic antennas by what legs in free space do.
+
+    These are the patterns of the antennas, and the reflection of the body's ``materials (part,)``,
+    which are perfect conductors if they are left out.
+    """
+    surfaces = Surfaces(materials or (CONDUCTOR,) * len(body.part_names), radar)
+    plain = not (is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna))
+    return model if plain and surfaces.conduct else _OverLegs(model, radar, body, surfaces)
 
 
-def is_shaped(antenna: Antenna | None) -> bool:
-    """Whether the antenna looks more into some directions than into others."""
-    return antenna is not None and antenna.pattern != "isotropic"
+class _OverLegs:
+    """Echoes of several bounces are given the directions of the part they bounce off last.
 
+    Each part reflects with one coefficient, that of the angle at its specular point: what comes
+    from far beside it, and bounces at other angles, are approximated so.
+    """
 
-class _ThroughAntennas:
-    """Echoes of several bounces are given the directions of the part they bounce off last."""
+    def __init__(self, model: EchoModel, radar: Radar, body: Body, surfaces: Surfaces) -> None:
+        self._model, self._radar, self._body, self._surfaces = model, radar, body, surfaces
 
-    def __init__(self, model: EchoModel, radar: Radar, body: Body) -> None:
-        self._model, self._radar, self._body = model, radar, body
-        self.variant = model.variant
+    @property
+    def variant(self) -> str | None:
+        """Backend of the model."""
+        return self._model.variant
+
+    @property
+    def traces(self) -> bool:
+        """Whether the model traces."""
+        return bool(getattr(self._model, "traces", False))
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model did."""
@@ -73,5 +88,11 @@ class _ThroughAntennas:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         echoes = self._model.echoes(chirps)
-        gain = leg_gain(self._radar, chirp_poses(self._radar, self._body, chirps))
-        return dataclasses.replace(echoes, amplitude=echoes.amplitude * gain[..., echoes.part])
+        at = chirp_poses(self._radar, self._body, chirps)
+        amplitude = echoes.amplitude
+        if is_shaped(self._radar.tx_antenna) or is_shaped(self._radar.rx_antenna):
+            amplitude = amplitude * leg_gain(self._radar, at)[..., echoes.part]
+        if not self._surfaces.conduct:
+            factor = self._surfaces.factor(at)[:, echoes.part] ** echoes.bounces
+            amplitude = amplitude * factor[:, None]
+        return dataclasses.replace(echoes, amplitude=amplitude)

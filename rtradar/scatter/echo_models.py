@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -15,7 +15,7 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import ExtensionError, InputError
 from rtradar.radar import Radar
-from rtradar.scatter.antenna_gain import is_shaped, through_antennas
+from rtradar.scatter.antenna_gain import over_legs
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scene import Scene
 from rtradar.system.registries import MODELS
@@ -34,9 +34,13 @@ def build_model(
     order: int = 1,
     variant: str = "auto",
     spreading: bool = True,
+    materials: Sequence[str] = (),
     **model_options: Any,
 ) -> EchoModel:
     """Build the model of that name for this body, radar and scene, through the radar's antennas.
+
+    A model answers for a conductor before isotropic antennas. Patterns of antennas, the material of
+    the body, and what walls and furniture do come from the legs, the same for every model.
 
     Parameters
     ----------
@@ -47,13 +51,16 @@ def build_model(
     body : Body
         Person, or another moving body of ellipsoids.
     scene : Scene, optional
-        Walls and furniture. In a room the model is a `RoomModel` around the one of that name.
+        Walls, furniture and moving objects. With any of them the model is a `RoomModel` around the
+        one of that name.
     order : int
         Largest number of reflections at walls on a path, 0 to 3.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, for models that trace.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
+    materials : (part,) sequence of str, optional
+        Material of each part, ``perfect-conductor`` or ``skin``; by default perfect conductors.
     **model_options
         Settings of that model, such as ``shadow_rays`` of ``fresnel``; its class documents them.
 
@@ -64,7 +71,7 @@ def build_model(
     Raises
     ------
     InputError
-        If there is no such model, it has no such option, or it cannot be used in such a scene.
+        If there is no such model, it has no such option, or a body is not made of that material.
     BackendError
         Where it traces and no backend of that kind works here.
     ExtensionError
@@ -72,8 +79,6 @@ def build_model(
     """
     kind = MODELS.find(fidelity)
     room = scene if scene is not None and not scene.is_empty else None
-    if room is not None:
-        _check_for_room(fidelity, radar, room)
     with MODELS.guarded(fidelity):
         taken = inspect.signature(kind).parameters
         known = [name for name in taken if name not in _COMMON]
@@ -85,28 +90,19 @@ def build_model(
                 )
         # What traces nothing takes no backend.
         backend = {"variant": variant} if takes_backend(fidelity) else {}
-        model: EchoModel = kind(radar, body, spreading=spreading, **backend, **model_options)
-    if room is not None:
-        from rtradar.scatter.multipath.room_model import RoomModel  # which takes long to import
 
-        return RoomModel(model, room, radar, body, order=order)  # type: ignore[arg-type]
-    return through_antennas(
-        model if fidelity in MODELS.built_in else _Checked(fidelity, model, radar, body),
-        radar,
-        body,
-    )
+    def conductor(before: Radar) -> EchoModel:
+        with MODELS.guarded(fidelity):
+            model: EchoModel = kind(before, body, spreading=spreading, **backend, **model_options)
+        built_in = fidelity in MODELS.built_in
+        return model if built_in else _Checked(fidelity, model, before, body)
 
+    if room is None:
+        return over_legs(conductor(radar), radar, body, materials)
+    from rtradar.scatter.multipath.room_model import Level, RoomModel  # which takes long to import
 
-def _check_for_room(fidelity: str, radar: Radar, scene: Scene) -> None:
-    if not getattr(MODELS.find(fidelity), "supports_rooms", False):
-        allowed = ", ".join(models_that("supports_rooms", MODELS))
-        raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: {allowed}")
-    if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
-        raise InputError(
-            f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths "
-            "over walls, whose directions at the antennas are not followed; take free-space, or "
-            "antennas with pattern = 'isotropic'"
-        )
+    level = Level(conductor, takes_backend(fidelity), spreading)
+    return RoomModel(level, room, radar, body, materials, order=order)
 
 
 def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import interpolation_weights
+from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.room_model import RoomModel
@@ -22,32 +22,6 @@ from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
-
-
-def together(several: Sequence[Echoes]) -> Echoes:
-    """Put the echoes of several targets, of the same chirps, one after the other.
-
-    The nodes are those of the echoes with the most of them; the polynomials of the others are
-    evaluated there, which changes nothing. Parts keep their numbers.
-    """
-    first = several[0]
-    nodes = max((own.frequency for own in several), key=len)
-    amplitudes = []
-    for own in several:
-        same = np.array_equal(own.frequency, nodes)
-        weights = None if same else interpolation_weights(own.frequency, nodes)
-        amplitude = own.amplitude
-        if weights is not None:
-            amplitude = np.tensordot(weights.astype(amplitude.real.dtype), amplitude, axes=1)
-        amplitudes.append(amplitude)
-    return Echoes(
-        length=np.concatenate([own.length for own in several], axis=2),
-        amplitude=np.concatenate(amplitudes, axis=3),
-        frequency=nodes,
-        tx=first.tx,
-        part=np.concatenate([own.part for own in several]),
-        bounces=np.concatenate([own.bounces for own in several]),
-    )
 
 
 class World:

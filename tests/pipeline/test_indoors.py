@@ -126,7 +126,6 @@ def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(
 ) -> None:
     motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
     for given, word in (
-        ({"fidelity": "fresnel"}, "knows no walls"),
         ({"fidelity": "analytic", "spreading": False}, "free space only"),
         ({"fidelity": "analytic", "model_options": {"tolerance_db": 1.0}}, "tolerance_db"),
         ({"fidelity": "analytic", "clutter_removal": "magic"}, "magic"),

@@ -26,7 +26,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes, behind_walls
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.polarization import apply_te_tm
+from rtradar.scatter.common.polarization import apply_te_tm, is_shaped
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
@@ -246,6 +246,7 @@ def _returns(
         bounces=bounces,
         wavenumber=wavenumber,
         polarization=radar.polarization,
+        antenna=radar.tx_antenna,
         two_sided=not closed,
     )
     groups = FacetGroups(places[:, 3], radar)
@@ -257,6 +258,10 @@ def _returns(
     if not amplitude.any():
         return None
     centres = np.concatenate([groups.centres, *(chain.centres() for chain in chains)])
+    if is_shaped(radar.rx_antenna):
+        # A group, which its bounces leave last, is small against what a pattern resolves.
+        ways = centres - radar.rx[radar.rx_of_tx][:, :, None]
+        amplitude *= np.sqrt(radar.rx_antenna.relative(ways, radar.polarization))
     orders = [1, *(chain.order for chain in chains)]
     counts = [len(groups.centres), *(chain.count for chain in chains)]
     returns = RoomEchoes(

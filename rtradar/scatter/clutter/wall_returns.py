@@ -34,6 +34,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import (
@@ -44,7 +45,7 @@ from rtradar.scatter.clutter.returns import (
     delayed,
 )
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.polarization import antenna_field
+from rtradar.scatter.common.polarization import sent_field
 from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain
 from rtradar.scatter.multipath.slab_series import DENSE_NODES, whole_walls
 from rtradar.scatter.multipath.wall_edges import WallEdges
@@ -112,10 +113,9 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
     sources = [image.reshape(-1, 3)[which] for image in images]
     ways = [end - source for source, end in zip(sources, ends[1:], strict=True)]
     ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
-    sent = (
-        antenna_field(ways[0], radar.polarization, x_for_steep=True) * weight.ravel()[which, None]
-    )
-    received = antenna_field(-ways[-1], radar.polarization, x_for_steep=True)
+    ahead = sent_field(radar.tx_antenna, ways[0], radar.polarization, x_for_steep=True)
+    sent = ahead * weight.ravel()[which, None]
+    received = sent_field(radar.rx_antenna, -ways[-1], radar.polarization, x_for_steep=True)
     spread = -2 * sqrt(pi) / length.ravel()[which]
     frequency = sweep_nodes(radar, DENSE_NODES)
     best = None
@@ -191,19 +191,20 @@ def _rough_face(
     smooth = replace(wall, roughness_m=0.0)
     normal = -wall.normal if face.back else wall.normal
 
-    def legs(antennas: Array) -> tuple[Array, Array, Array]:
+    def legs(antennas: Array, element: Antenna | None) -> tuple[Array, Array, Array]:
         """Distances, cosines and fields that a smooth wall would reflect, (antenna, point)."""
         ways = points - antennas[:, None]
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
-        sent = antenna_field(ways, radar.polarization, x_for_steep=True).astype(np.complex128)
-        field = reflect(smooth, sent, ways, frequency)[0]
+        sent = sent_field(element, ways, radar.polarization, x_for_steep=True)
+        field = reflect(smooth, sent.astype(np.complex128), ways, frequency)[0]
         clear = ~tracer.blocked(antennas[:, None], points)
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear
         return distance, np.maximum(-(ways @ normal), 0.0), strength
 
     kept = radar.rx_of_tx
-    (far_t, cos_t, field_t), (far_r, cos_r, field_r) = legs(radar.tx), legs(radar.rx)
+    far_t, cos_t, field_t = legs(radar.tx, radar.tx_antenna)
+    far_r, cos_r, field_r = legs(radar.rx, radar.rx_antenna)
     cosines = cos_t[:, None] * cos_r[kept]
     waves = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * wall.roughness_m
     scattered = -np.expm1(-((2 * waves) ** 2) * cosines)

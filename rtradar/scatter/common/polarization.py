@@ -6,11 +6,13 @@ is a perfect conductor, or a half-space such as skin.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.antenna import Antenna
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses
@@ -19,7 +21,8 @@ from rtradar.scene import Material, material, reflection
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 
-BODY_MATERIALS = ("perfect-conductor", "skin")
+CONDUCTOR = "perfect-conductor"
+BODY_MATERIALS = (CONDUCTOR, "skin")
 
 STEEP = 1e-9
 """Sine of the angle from the vertical below which v has no direction of its own."""
@@ -48,6 +51,28 @@ def antenna_field(
         up = np.where(steep[..., None], [1.0, 0.0, 0.0], up)
     along = np.sum(up * directions, axis=-1, keepdims=True)
     return unit(up - along * directions if polarization == "v" else np.cross(directions, up))
+
+
+def sent_field(
+    antenna: Antenna | None,
+    directions: Array,
+    polarization: Literal["v", "h"],
+    *,
+    x_for_steep: bool = False,
+) -> Array:
+    """Compute the field that an antenna sends, `antenna_field` times the root of its pattern.
+
+    The pattern is that of the power, relative to its peak; no antenna is isotropic.
+    """
+    field = antenna_field(directions, polarization, x_for_steep=x_for_steep)
+    if not is_shaped(antenna):
+        return field
+    return field * np.sqrt(antenna.relative(directions, polarization))[..., None]
+
+
+def is_shaped(antenna: Antenna | None) -> TypeGuard[Antenna]:
+    """Whether the antenna looks more into some directions than into others."""
+    return antenna is not None and antenna.pattern != "isotropic"
 
 
 def bisector(to_tx: Array, to_rx: Array) -> Array:
@@ -163,31 +188,60 @@ def over_copolar(
     return np.asarray(np.where(known, field / np.where(known, own, 1.0), 1.0))
 
 
-class Surface:
-    """The surface of the body in free space, for models whose amplitudes are those of a conductor.
+class Surfaces:
+    """The surfaces of parts, each a perfect conductor or skin.
 
-    It is a perfect conductor or skin. An `InputError` is raised for other names, and if the
+    ``materials (part,)`` are their names. An `InputError` is raised for other names, and if a
     material is not known over the radar's sweep.
     """
 
-    def __init__(self, name: str, radar: Radar) -> None:
+    def __init__(self, materials: Sequence[str], radar: Radar) -> None:
         ends = radar.start_frequency_hz + np.array([0.0, radar.bandwidth_hz])
-        self.material = body_material(name, ends)
+        self._of_part = np.array(materials)
+        self._kinds = {name: body_material(name, ends) for name in dict.fromkeys(materials)}
         # Over a sweep the reflection of skin changes by a few hundredths: that at its middle
         # serves for all of it.
-        self._eta = self.material.eta(np.array([radar.centre_frequency_hz]))
+        self._centre_hz = np.array([radar.centre_frequency_hz])
         self._polarization = radar.polarization
 
-    def echo(self, at: ChirpPoses, amplitude: NDArray[Any]) -> NDArray[Any]:
-        """Compute amplitudes (chirp, rx, part) of `Echoes` from those of a conductor.
+    @property
+    def conduct(self) -> bool:
+        """Whether all of them are perfect conductors."""
+        return all(kind.conducts for kind in self._kinds.values())
+
+    def reflected(
+        self, part: NDArray[np.int64], field: Field, directions: Array, normals: Array, nodes: Array
+    ) -> Field:
+        """Compute fields after reflection by some parts (echo,), see `body_reflection`.
+
+        The field is (node, ..., echo, 3) at the frequencies ``nodes (node,)`` [Hz].
+        """
+        alike = [
+            (np.flatnonzero(self._of_part[part] == name), kind.eta(nodes))
+            for name, kind in self._kinds.items()
+        ]
+        if len(alike) == 1:
+            return body_reflection(field, directions, normals, alike[0][1])
+        shape = np.broadcast_shapes(field.shape, directions.shape, normals.shape)
+        out = np.empty((len(nodes), *shape[1:]), dtype=np.complex128)
+        for own, eta in alike:
+            arriving, ways = field[..., own, :], directions[..., own, :]
+            out[..., own, :] = body_reflection(arriving, ways, normals[..., own, :], eta)
+        return out
+
+    def factor(self, at: ChirpPoses) -> NDArray[np.complex128]:
+        """Compute amplitudes (chirp, part) of `Echoes` over those of conductors.
 
         The angle of incidence is that at the centre of each part, for the middle of the receivers:
         a line of them is short, and so near the normal a degree changes the reflection by less than
         0.1 %.
         """
-        if self.material.conducts:
-            return amplitude
         to_tx = at.tx[:, None] - at.centres
         to_rx = at.rx.mean(axis=1)[:, None] - at.centres
-        factor = material_factor(to_tx, to_rx, self._eta, self._polarization)[0]
-        return np.asarray(amplitude * factor.conj()[:, None])
+        out = np.ones(to_tx.shape[:2], dtype=np.complex128)
+        for name, kind in self._kinds.items():
+            if not kind.conducts:
+                own = np.flatnonzero(self._of_part == name)
+                ways, eta = (to_tx[:, own], to_rx[:, own]), kind.eta(self._centre_hz)
+                out[:, own] = material_factor(*ways, eta, self._polarization)[0].conj()
+        return out

@@ -34,8 +34,9 @@ class BuiltInModel:
     traces: ClassVar[bool] = True
     """Whether the model traces rays, so that parts of the body occlude each other."""
 
-    supports_rooms: ClassVar[bool] = False
-    """Whether `RoomModel` can put the model into scenes with walls."""
+    fast_over_walls: ClassVar[bool] = False
+    """Whether one model computes all paths of a room, as `RoomReady` says; else each path has one
+    of its own, before images of the antennas."""
 
     accepts_meshes: ClassVar[bool] = False
     """Whether `scattering_length` by this model takes meshes as well as ellipsoids."""
@@ -54,7 +55,8 @@ class EchoModel(Protocol):
     ``variant`` is the backend that traces, in the words of the command line; None for no tracing.
     """
 
-    variant: str | None
+    @property
+    def variant(self) -> str | None: ...  # noqa: D102
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes at some chirps.

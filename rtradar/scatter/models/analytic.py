@@ -14,7 +14,7 @@ from rtradar.kernels.scatter.far_field import far_field
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
-from rtradar.scatter.common.polarization import Surface
+from rtradar.scatter.common.polarization import unit
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 
@@ -44,22 +44,26 @@ def plane_wave_echo(
     """Echo of each ellipsoid as the paper has it (eqs 8 to 11).
 
     The range is that of the centre, and waves are plane over the array. Parameters and returns are
-    those of `far_field_echo`. The cross-section is the right one, not the paper code's.
+    those of `far_field_echo`. The cross-section is the right one, not the paper code's. Where walls
+    mirror Tx and Rx differently, it is that for the direction half-way between both arrays.
     """
-    place = np.asarray(radar.position_m)
-    sight = at.centres - place
-    distance = np.linalg.norm(sight, axis=-1)
-    sight = sight / distance[..., None]
-    lead = np.einsum("ci,cpi->cp", at.tx - place, sight)[:, None]
-    lead = lead + np.einsum("cri,cpi->crp", at.rx - place, sight)
-    normal = np.einsum("cpji,cpj->cpi", at.frames, -sight)
+    places = radar.tx.mean(axis=0), radar.rx.mean(axis=0)
+    distances, sights = [], []
+    for place in places:
+        sight = at.centres - place
+        distances.append(np.linalg.norm(sight, axis=-1))
+        sights.append(sight / distances[-1][..., None])
+    lead = np.einsum("ci,cpi->cp", at.tx - places[0], sights[0])[:, None]
+    lead = lead + np.einsum("cri,cpi->crp", at.rx - places[1], sights[1])
+    normal = np.einsum("cpji,cpj->cpi", at.frames, -unit(sights[0] + sights[1]))
     theta = np.arccos(np.clip(normal[..., 2], -1, 1))
     phi = np.arctan2(normal[..., 1], normal[..., 0])
     a, b, c = at.semi_axes.T
     amplitude = np.sqrt(ellipsoid(a, b, c, theta, phi))
     if spreading:
-        amplitude = amplitude / distance**2
-    return 2 * distance[:, None] - lead, np.broadcast_to(amplitude[:, None], lead.shape)
+        amplitude = amplitude / (distances[0] * distances[1])
+    length = (distances[0] + distances[1])[:, None] - lead
+    return length, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
 class FormulaModel(BuiltInModel, ABC):
@@ -67,20 +71,10 @@ class FormulaModel(BuiltInModel, ABC):
 
     Its echoes in free space follow from the formula, and in rooms the direct echoes and those over
     walls.
-
-    Parameters
-    ----------
-    material : {"perfect-conductor", "skin"}
-        Material of the body's surface.
-
-    Raises
-    ------
-    InputError
-        Where a body is not made of that, or it is not known over the sweep.
     """
 
     traces = False
-    supports_rooms = True
+    fast_over_walls = True
     relative_cost = 1.0
     tracer = None
 
@@ -90,10 +84,8 @@ class FormulaModel(BuiltInModel, ABC):
         body: Body,
         *,
         spreading: bool = True,
-        material: str = "perfect-conductor",
     ) -> None:
         self._radar, self._body, self.spreading = radar, body, spreading
-        self.surface = Surface(material, radar)
         self.variant: str | None = None
 
     @abstractmethod
@@ -118,8 +110,7 @@ class FormulaModel(BuiltInModel, ABC):
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude = self.conductor_echo(Geometry.of(at))
-        echo = self.surface.echo(at, amplitude)
-        return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
+        return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
 
 
 class Analytic(FormulaModel):
@@ -145,7 +136,7 @@ class Analytic(FormulaModel):
 class AnalyticPaper(FormulaModel):
     """`analytic-paper`: ranges of centres and plane waves over the array, as in the paper."""
 
-    supports_rooms = False
+    fast_over_walls = False
 
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes as the paper has them."""

@@ -16,7 +16,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import interpolation_weights
+from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import BEND, ZoneFractions
@@ -162,7 +162,8 @@ class Auto(BuiltInModel):
         for group, weight in found:
             own = slice(begin, begin + len(group.part))
             length[..., own] = group.length
-            np.multiply(_at_nodes(group, frequency), weight[:, None], out=amplitude[..., own])
+            values = at_nodes(group.amplitude, group.frequency, frequency)
+            np.multiply(values, weight[:, None], out=amplitude[..., own])
             begin = own.stop
         return Echoes(
             length=length,
@@ -342,13 +343,3 @@ class Auto(BuiltInModel):
         model = kind(self._radar, self._body, variant=self._variant, spreading=self._spreading)
         self.variant = model.variant
         return model
-
-
-def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:
-    """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through nodes."""
-    if len(echoes.frequency) == 1:
-        return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
-    if np.array_equal(echoes.frequency, frequency):
-        return echoes.amplitude
-    weights = interpolation_weights(echoes.frequency, frequency)
-    return np.asarray(np.tensordot(weights, echoes.amplitude, axes=1))

@@ -31,6 +31,7 @@ from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.common.interpolation import array_nodes
+from rtradar.scatter.common.polarization import bisector, unit
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
@@ -117,29 +118,40 @@ def error_budget(
 def _views(
     radar: Radar, poses: Poses, tracer: BodyTracer, wavenumber: float, shadow_rays: int
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64]]:
-    """Look at the parts (time, part) from the middle of the array.
+    """Look at the parts (time, part) from the middle of the array, or of both images of it.
 
     Returned are V, whether the specular point is seen, and the mean radius of curvature there [m].
     """
     times, parts = poses.centres.shape[:2]
-    eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
-    eyes = np.tile(eye, (times, 1))
-    points = solve_specular_points(Geometry(eyes, eyes[:, None], *poses), points=True)[2][:, 0]
-    sight = np.einsum("tpji,tpj->tpi", poses.frames, eye - points)
-    normal = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
+    # Over a wall out and another back, Tx and Rx look from two places.
+    eyes = [radar.tx.mean(axis=0), radar.rx.mean(axis=0)]
+    if np.linalg.norm(eyes[1] - eyes[0]) < _ONE_PLACE_M:
+        eyes = [np.concatenate([radar.tx, radar.rx]).mean(axis=0)]
+    first, last = (np.tile(eye, (times, 1)) for eye in (eyes[0], eyes[-1]))
+    points = solve_specular_points(Geometry(first, last[:, None], *poses), points=True)[2][:, 0]
+    half_way = bisector(*(unit(eye - points) for eye in (eyes[0], eyes[-1])))
+    normal = np.einsum("tpji,tpj->tpi", poses.frames, half_way)
     angles = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
     a, b, c = poses.semi_axes.T
     smaller, larger = ellipsoid_radii(a, b, c, *angles)
     # One zone a part, those of one pose after the other.
     pose, part = np.divmod(np.arange(times * parts), parts)
-    here, targets = np.tile(eye, (len(part), 1)), points.reshape(-1, 3)
-    seen = tracer.clear(here, targets, np.arange(len(part)), part, pose, poses)
+    targets, group = points.reshape(-1, 3), np.arange(len(part))
+    sights = [np.tile(eye, (len(part), 1)) for eye in eyes]
+    seen = np.logical_and.reduce(
+        [tracer.clear(here, targets, group, part, pose, poses) for here in sights]
+    )
     k = np.full(len(part), wavenumber)
-    zones = Zones(here, here, targets, part, pose, here[:, None], k)
-    pair = np.zeros((1, 2), dtype=np.int64)
+    ends, antennas = (sights[0], sights[-1]), np.stack(sights, axis=1)
+    zones = Zones(*ends, targets, part, pose, antennas, k)
+    pair = np.array([[0, len(eyes) - 1]])
     fraction = zone_fractions(tracer, zones, poses, pair, k[:, None], shadow_rays)[:, 0, 0]
     shape = (times, parts)
     return fraction.reshape(shape), seen.reshape(shape), np.asarray(np.sqrt(smaller * larger))
+
+
+_ONE_PLACE_M = 1e-6
+"""Distance of two places up to which they are one: the middle of Tx and that of Rx [m]."""
 
 
 # -- selection -------------------------------------------------------------------------------------

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import Surface
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
@@ -20,20 +19,9 @@ from rtradar.trace.body_tracer import BodyTracer
 
 
 class Specular(BuiltInModel):
-    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
+    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba."""
 
-    Parameters
-    ----------
-    material : {"perfect-conductor", "skin"}
-        Material of the body's surface.
-
-    Raises
-    ------
-    InputError
-        Where a body is not made of that, or it is not known over the sweep.
-    """
-
-    supports_rooms = True
+    fast_over_walls = True
     relative_cost = 1.5
 
     @staticmethod
@@ -62,10 +50,8 @@ class Specular(BuiltInModel):
         *,
         variant: str = "auto",
         spreading: bool = True,
-        material: str = "perfect-conductor",
     ) -> None:
         self._radar, self._body, self.spreading = radar, body, spreading
-        self.surface = Surface(material, radar)
         backend = select(variant)
         self.variant: str | None = backend.kind
         self.tracer = BodyTracer(use(backend), body.semi_axes)
@@ -75,8 +61,7 @@ class Specular(BuiltInModel):
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude = self.specular_echo(chirps, at)
-        echo = self.surface.echo(at, amplitude)
-        return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
+        return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
 
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None

@@ -11,19 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.antenna import Antenna
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
-    antenna_field,
+    Surfaces,
     bisector,
-    body_reflection,
     over_copolar,
+    sent_field,
     unit,
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
@@ -61,14 +63,20 @@ class PathKeyframes(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """Walls, the tracers of body and furniture (None for no occlusion), antennas and surface."""
+    """What a path meets: walls, occluders, antennas and the surfaces of the body.
 
+    The ``tracers`` are those of the body and of furniture, None for no occlusion. ``whole_level``
+    says that bare returns over walls are those of a model before images of the antennas: then they
+    hold the co-polar fraction of a conductor, and what the body occludes of the last section.
+    """
+
+    radar: Radar
     walls: WallResponse
     tracers: tuple[BodyTracer, RoomTracer] | None
-    body_eta: Field
+    surfaces: Surfaces
     ends: ArrayEnds
     paths: Sequence[WallPath]
-    polarization: Literal["v", "h"]
+    whole_level: bool
 
 
 def path_keyframes(
@@ -86,12 +94,18 @@ def path_keyframes(
             [getattr(around.paths[path], side) for path in columns.path.tolist()],
             at,
             points,
+            antenna,
         )
-        for side, at in (("out", around.ends.tx), ("back", around.ends.rx))
+        for side, at, antenna in (
+            ("out", around.ends.tx, around.radar.tx_antenna),
+            ("back", around.ends.rx, around.radar.rx_antenna),
+        )
     ]
-    direct = np.flatnonzero(columns.direct)
+    # Echoes whose bare return holds what the model itself knows of the last sections.
+    known = np.ones(len(columns.path), bool) if around.whole_level else columns.direct
+    direct = np.flatnonzero(known)
     factors = [
-        (chosen, met, _left(around, legs, direct, chosen, *fields))
+        (chosen, met, _left(around, legs, direct, columns.part[chosen], chosen, *fields))
         for chosen, met, fields in _pairs(around.paths, columns.path, legs)
     ]
     strength = np.zeros((*exists.shape[:2], 2, around.ends.rx.shape[1], len(columns.path)))
@@ -183,7 +197,13 @@ class _Carried(NamedTuple):
     sections: list[tuple[NDArray[np.int64], Array, Array, bool]]
 
 
-def _carry(around: Surroundings, legs: Sequence[Leg], antennas: Array, points: Array) -> _Carried:
+def _carry(
+    around: Surroundings,
+    legs: Sequence[Leg],
+    antennas: Array,
+    points: Array,
+    antenna: Antenna | None,
+) -> _Carried:
     shape = (points.shape[0], *antennas.shape[:2], points.shape[2])
     field = np.zeros((len(around.walls.frequency), *shape, 3), dtype=np.complex128)
     arriving, valid = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
@@ -195,7 +215,7 @@ def _carry(around: Surroundings, legs: Sequence[Leg], antennas: Array, points: A
         along, extent = around.walls.edges.leg(leg, *ends)
         valid[..., chosen] = extent != 0
         ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        sent = antenna_field(ways[0], around.polarization)
+        sent = sent_field(antenna, ways[0], around.radar.polarization)
         waves = around.walls.along(leg, along, ways, sent * extent[..., None])
         for step, (origins, targets) in enumerate(pairwise(along)):
             start, end = np.broadcast_arrays(origins, targets)
@@ -227,6 +247,7 @@ def _left(
     around: Surroundings,
     legs: Sequence[_Carried],
     direct: NDArray[np.int64],
+    part: NDArray[np.int64],
     chosen: NDArray[np.int64],
     sent: Field,
     received: Field,
@@ -234,14 +255,15 @@ def _left(
     """Co-polar field over that of the bare return, (node, keyframe, line, 2, rx_end, echo)."""
     out, back = (leg.arriving[..., chosen, :] for leg in legs)
     out, back = out[:, :, :, None], back[:, :, None]
-    returned = body_reflection(sent[:, :, :, :, None], out, bisector(-out, -back), around.body_eta)
+    arrives = sent[:, :, :, :, None], out, bisector(-out, -back)
+    returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
     # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
     factor = np.asarray(-np.sum(received[:, :, :, None] * returned, axis=-1))
     own = np.flatnonzero(np.isin(chosen, direct))
     if len(own):
         # The bare return of a direct echo holds the co-polar fraction of a conductor.
         ways = -out[..., own, :], -back[..., own, :]
-        factor[..., own] = over_copolar(factor[..., own], *ways, around.polarization)
+        factor[..., own] = over_copolar(factor[..., own], *ways, around.radar.polarization)
     return factor
 
 
@@ -287,10 +309,14 @@ def _clear_of_body(
     part: NDArray[np.int64],
     direct: NDArray[np.int64],
 ) -> None:
-    """Take out of ``clear (line, end, echo)`` what the posed body occludes, but direct echoes."""
+    """Take out of ``clear (line, end, echo)`` what the posed body occludes.
+
+    Of the last sections of ``direct`` echoes the model knows that itself.
+    """
     rays = []
     for chosen, origins, targets, last in leg.sections:
-        line, end, echo = np.nonzero(clear[..., chosen] & ~np.isin(chosen, direct))
+        asked = ~np.isin(chosen, direct) if last else np.ones(len(chosen), dtype=bool)
+        line, end, echo = np.nonzero(clear[..., chosen] & asked)
         # At the specular point the part itself cannot be in the way, before a wall it can.
         own = part[chosen[echo]] if last else np.full(len(echo), -1)
         ends = (places[keyframe, line, end, echo] for places in (origins, targets))

@@ -9,7 +9,9 @@ and what appears or vanishes fades smoothly.
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +24,21 @@ from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
+from rtradar.scatter.antenna_gain import over_legs
+from rtradar.scatter.common.echo_sets import take, times_factor, together
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
-from rtradar.scatter.common.polarization import Surface
-from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
+from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
+from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.multipath.image_paths import corners, wall_paths
+from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
 from rtradar.trace.backends.backend import select, use
@@ -58,21 +64,20 @@ _KEYFRAMES_AT_ONCE = 32
 _CHIRPS_AT_ONCE = 64
 
 
-class RoomReady(EchoModel, Protocol):
-    """What `RoomModel` asks of the model that it wraps, one whose ``supports_rooms`` is True.
+class Level(NamedTuple):
+    """A fidelity level: ``before(radar)`` builds its model of a conductor before that radar.
 
-    ``spreading`` says whether amplitudes hold 1 / (R1 R2); ``surface`` is that of the body;
-    ``tracer`` is that of the body, which occludes legs, or None if nothing occludes anything. The
-    model also has the method of `HasFormula` or that of `HasSpecularPoints`.
+    ``traces`` says whether parts and furniture occlude each other, ``spreading`` whether amplitudes
+    hold 1 / (R1 R2).
     """
 
+    before: Callable[[Radar], EchoModel]
+    traces: bool
     spreading: bool
-    surface: Surface
-    tracer: BodyTracer | None
 
 
 @runtime_checkable
-class HasFormula(RoomReady, Protocol):
+class HasFormula(EchoModel, Protocol):
     """A model with one formula for all echoes: direct ones, and with images those over walls."""
 
     def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
@@ -83,7 +88,7 @@ class HasFormula(RoomReady, Protocol):
         ...
 
 
-class HasSpecularPoints(RoomReady, Protocol):
+class HasSpecularPoints(EchoModel, Protocol):
     """A model of the specular points of ellipsoids, which the room follows over walls itself."""
 
     def specular_echo(
@@ -99,84 +104,110 @@ class HasSpecularPoints(RoomReady, Protocol):
 
 
 class RoomModel:
-    """An echo model in a room, around that of the ``person`` alone.
+    """A fidelity level in a room; its model of the ``person`` alone is that of free space.
 
-    Radar and body are those of the model, at their positions in the scene. ``order`` is the largest
-    number of reflections at walls on both legs together, 0 to 3; 0 leaves the direct echoes,
-    through walls and behind furniture. ``paths`` are all paths, the direct one first;
+    Radar and body are at their positions in the scene; ``materials (part,)`` are those of the
+    parts, by default perfect conductors. ``order`` is the largest number of reflections at walls
+    on both legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
+
+    A model whose class says ``fast_over_walls`` computes the echoes over all paths, with points or
+    a formula of its own. Of any other level each path has a model before the images of the antennas
+    over its legs. ``paths`` are all paths, the direct one first;
     ``not_followed``, known after `prune`, are the walls whose frequency response is not known to
     `FIELD_ERROR`, with the fraction of the echo power that meets each.
     """
 
     def __init__(
         self,
-        model: HasFormula | HasSpecularPoints,
+        level: Level,
         scene: Scene,
         radar: Radar,
         body: Body,
+        materials: Sequence[str] = (),
         *,
         order: int = 1,
     ) -> None:
-        if not model.spreading and not scene.is_empty:
+        if not level.spreading and not scene.is_empty:
             raise InputError(
                 f"scene '{scene.name}': spreading may be off in free space only; leave "
                 "--no-spreading out"
             )
         check_order(order)
-        self.person, self._radar, self._body = model, radar, body
-        self.variant = model.variant
+        self._level, self._radar, self._body = level, radar, body
+        self._conductor = conductor = level.before(radar)
+        self.person = over_legs(conductor, radar, body, materials)
+        self._fast = bool(getattr(conductor, "fast_over_walls", False))
+        self._models: dict[int, EchoModel] = {0: conductor}
+        self._column = np.empty(0, dtype=np.int64)
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
         walls = WallResponse(WallEdges.of(scene.walls, radar), series.walls, series.frequency)
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order)
-        self._empty = scene.is_empty
         self._legs = LegImages(radar, self.paths)
         self._columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         tracers = None
-        if model.tracer is not None:
-            backend = use(select(model.variant or "auto"))
-            tracers = model.tracer, RoomTracer(backend, scene)
+        if level.traces:
+            backend = use(select(conductor.variant or "auto"))
+            tracers = BodyTracer(backend, body.semi_axes), RoomTracer(backend, scene)
         self._around = Surroundings(
+            radar,
             walls,
             tracers,
-            model.surface.material.eta(series.frequency),
+            Surfaces(materials or (CONDUCTOR,) * len(body.part_names), radar),
             ArrayEnds.of(radar),
             self.paths,
-            radar.polarization,
+            # A formula alone knows neither polarisation nor occlusion.
+            whole_level=not (self._fast or isinstance(conductor, HasFormula)),
         )
         self._step = keyframe_step(radar, KEYFRAMES_S)
         self._keyframes: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
         self.not_followed: dict[str, float] = {}
 
     @property
+    def variant(self) -> str | None:
+        """Backend that traces, None for no tracing."""
+        return self._conductor.variant
+
+    @property
     def path_names(self) -> tuple[str, ...]:
         """Path of each echo that `echoes` gave last; before `prune`, more may come."""
         columns = self._columns
-        return tuple(self.paths[columns.path[echo]].name for echo in columns.echo)
+        which = np.arange(len(columns)) if self._fast else self._column
+        paths = columns.path[np.array(columns.echo)[which]]
+        return tuple(self.paths[path].name for path in paths)
+
+    def account(self) -> dict[str, Any] | None:
+        """Report what the model of the direct echoes did."""
+        return account_of(self._conductor)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes at some chirps.
 
-        The direct echo of each part comes first, then those over walls, then what slabs delay.
+        Of a fast model the direct echo of each part comes first, then those over walls, then what
+        slabs delay; of any other the echoes come path by path.
         """
-        if self._empty:
-            return self.person.echoes(chirps)
+        chirps = np.asarray(chirps, dtype=np.int64)
+        return self.optical_echoes(chirps) if self._fast else self._by_paths(chirps)
+
+    def optical_echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Compute the echoes as `echoes` of a fast model, by geometric optics for any other."""
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
         at = chirp_poses(self._radar, self._body, chirps)
         blend, before, after = self._around_chirps(chirps, at.tx_index)
-        interval, fraction, line, tx_weight, _ = blend
-        wanted = np.any(before.seen | after.seen, axis=(2, 3))
-        near = Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
+        near = self._near(blend, before, after)
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
         n_direct, n_echoes = at.centres.shape[1], len(columns.part)
-        person, formula = self.person, None
-        if isinstance(person, HasFormula):
-            formula = person.conductor_echo
+        model, formula = self._conductor, None
+        if self._fast and isinstance(model, HasFormula):
+            formula = model.conductor_echo
             found = [formula(Geometry.of(at))]
         else:
             start = near.take(slice(n_direct)).places()
-            found = [person.specular_echo(chirps, at, start)]
+            if self._fast:
+                found = [cast(HasSpecularPoints, model).specular_echo(chirps, at, start)]
+            else:
+                found = [solve_specular_points(at, start=start)[:2]]
         if n_echoes > n_direct:
             ghosts = slice(n_direct, n_echoes)
             own = columns.path[ghosts], columns.part[ghosts]
@@ -203,6 +234,43 @@ class RoomModel:
             bounces=bounces[echo],
         )
 
+    def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes of the models of all paths, times what walls, materials and occluders leave."""
+        columns = self._columns
+        at = chirp_poses(self._radar, self._body, chirps)
+        blend, before, after = self._around_chirps(chirps, at.tx_index)
+        factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
+        echo = np.array(columns.echo)
+        extra = np.zeros((*at.rx.shape[:2], len(columns)))
+        if columns.delayed:
+            factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
+            extra = columns.lengths(at, self._near(blend, before, after).places(), extra)
+        nodes = self._around.walls.frequency
+        left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
+        path_amplitudes(np.ones(extra.shape), *factors, blend, left)
+        found, numbers = [], []
+        for path in np.unique(columns.path[echo]).tolist():
+            own = self._model(path).echoes(chirps)
+            # Each of its echoes in each column of its part.
+            column = np.flatnonzero(columns.path[echo] == path)
+            which, place = np.nonzero(own.part[:, None] == columns.part[echo[column]])
+            factor, column = (nodes, left[..., column[place]]), column[place]
+            found.append(
+                replace(
+                    times_factor(take(own, which), *factor),
+                    length=own.length[..., which] + extra[..., column],
+                    bounces=own.bounces[which] + self.paths[path].order,
+                )
+            )
+            numbers.append(column)
+        self._column = np.concatenate(numbers)
+        return together(found)
+
+    def _model(self, path: int) -> EchoModel:
+        if path not in self._models:
+            self._models[path] = self._level.before(ImageRadar.over(self._radar, self.paths[path]))
+        return self._models[path]
+
     def course(self, name: str, point: Array) -> Array:
         """Return the corners (corner, 3) of a path over a point (3,) and back [m].
 
@@ -212,6 +280,13 @@ class RoomModel:
         middle = np.asarray(self._radar.position_m, dtype=np.float64)
         out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
         return np.array([*out, *reversed(back[:-1])])
+
+    @staticmethod
+    def _near(blend: Blend, before: PathKeyframes, after: PathKeyframes) -> Nearby:
+        """Expected specular points."""
+        wanted = np.any(before.seen | after.seen, axis=(2, 3))
+        interval, fraction, line, tx_weight, _ = blend
+        return Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
 
     def _around_chirps(
         self, chirps: NDArray[np.int64], tx: NDArray[np.int64]
@@ -256,7 +331,8 @@ class RoomModel:
         """Leave out echoes over walls that stay below the noise, and summarize each path.
 
         One chirp every 20 ms of the capture is evaluated. Left out is an echo whose mean power,
-        after the gain of the samples, cycles and channels of a frame, is more than `MARGIN_DB`
+        after the gain of the samples, cycles and channels of a frame, is more than `MARGIN_DB`,
+        by geometric optics,
         below the noise of one IF sample [m^2]; without noise, what is never visible. Window
         functions, which lose 1.8 dB each (Hann), are not counted: what is left out is weaker than
         that. Direct echoes always stay.
@@ -265,7 +341,7 @@ class RoomModel:
         evaluated = np.arange(0, n_chirps, self._step)
         power = np.zeros(len(columns))
         for first in range(0, len(evaluated), _CHIRPS_AT_ONCE):
-            echoes = self.echoes(evaluated[first : first + _CHIRPS_AT_ONCE])
+            echoes = self.optical_echoes(evaluated[first : first + _CHIRPS_AT_ONCE])
             found = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2)).sum(axis=0)
             found[: len(power)] += power
             power = found

@@ -22,7 +22,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.scatter.common.polarization import antenna_field
+from rtradar.antenna import Antenna
+from rtradar.scatter.common.polarization import sent_field
 from rtradar.scatter.ray_tubes.footprints import Footprints
 from rtradar.scatter.ray_tubes.tubes import Grid
 from rtradar.trace.bounces import Surfaces
@@ -46,8 +47,8 @@ class Shooter:
 
     Rays are aimed at a ``grid`` and meet ``surfaces``, with up to so many ``bounces``;
     ``wavenumber`` is the largest that the footprints have to serve [1/m], ``polarization`` that of
-    the transmitting antenna. With ``spreading`` the first leg's 1 / R1 is in the field;
-    ``two_sided`` facets are lit from behind as well.
+    the transmitting ``antenna``, isotropic if there is none. With ``spreading`` the first leg's
+    1 / R1 is in the field; ``two_sided`` facets are lit from behind as well.
     """
 
     surfaces: Surfaces
@@ -55,6 +56,7 @@ class Shooter:
     bounces: int
     wavenumber: float
     polarization: Literal["v", "h"]
+    antenna: Antenna | None = None
     spreading: bool = True
     two_sided: bool = False
 
@@ -90,7 +92,8 @@ class Shooter:
         directions = places - tx
         path = np.linalg.norm(directions, axis=-1)
         directions /= path[..., None]
-        field = antenna_field(directions[:, 3], self.polarization, x_for_steep=True)
+        ahead = directions[:, 3]
+        field = sent_field(self.antenna, ahead, self.polarization, x_for_steep=True)
         if self.spreading:
             field = field / path[:, 3:]
         return Footprints(places, path, directions, normals, field, tubes.surface[lit]), lit

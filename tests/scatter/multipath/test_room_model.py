@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,10 @@ from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.common.poses import chirp_poses
-from rtradar.scatter.echo_models import models_that
 from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
-from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
+from rtradar.scatter.multipath.room_model import KEYFRAMES_S, Level, RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.trace.backends.backend import Backend
@@ -38,19 +38,6 @@ def by_name(model: RoomModel, name: str) -> int:
 
 
 # -- what occludes and what transmits --------------------------------------------------------------
-
-
-def test_an_empty_scene_is_specular_itself(backend: Backend, one: Make) -> None:
-    body, radar, chirps = (
-        one(velocity=(-1.0, 0.0, 0.0)),
-        Radar.preset("paper-12ghz"),
-        np.arange(100),
-    )
-    alone = Specular(radar, body, variant=backend.kind)  # type: ignore[arg-type]
-    ours = RoomModel(alone, Scene(), radar, body).echoes(chirps)  # type: ignore[arg-type]
-    free = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(ours.length, free.length)
-    np.testing.assert_array_equal(ours.amplitude, free.amplitude)
 
 
 def test_a_slab_before_the_radar_lets_its_square_through(
@@ -260,8 +247,7 @@ def test_without_noise_only_what_is_never_seen_is_left_out(
         ({"spreading": False}, "spreading may be off in free space only"),
         ({"order": -1}, "order = -1"),
         ({"order": True}, "order = True"),
-        ({"fidelity": "rays"}, f"allowed in a room: {', '.join(models_that('supports_rooms'))}$"),
-        ({"material": "wood"}, "allowed: perfect-conductor, skin"),
+        ({"materials": ["wood"]}, "allowed: perfect-conductor, skin"),
     ],
 )
 def test_what_has_no_meaning_is_refused(
@@ -285,7 +271,12 @@ def test_direct_echoes_and_ghosts_follow_from_one_formula(
     body, radar, chirps = one(), single(), np.arange(5)
     for walls in ((), (wall("left"),)):
         usual, double = (
-            RoomModel(kind(radar, body), Scene(walls=walls), radar, body).echoes(chirps)
+            RoomModel(
+                Level(partial(kind, body=body), traces=False, spreading=True),
+                Scene(walls=walls),
+                radar,
+                body,  # type: ignore[arg-type]
+            ).echoes(chirps)
             for kind in (Analytic, Double)
         )
         assert double.length.shape[2] == 1 + 2 * len(walls)
@@ -342,8 +333,9 @@ def test_the_person_alone_is_specular_in_free_space(
         np.arange(100),
     )
     scene = Scene(walls=(wall("floor", "concrete"),))
-    room = build_model("specular", radar, body, scene=scene, variant=backend.kind, material=name)  # type: ignore[arg-type]
-    free = Specular(radar, body, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
+    room = build_model("specular", radar, body, scene=scene, variant=backend.kind, materials=[name])  # type: ignore[arg-type]
+    free = build_model("specular", radar, body, variant=backend.kind, materials=[name])  # type: ignore[arg-type]
+    free = free.echoes(chirps)
     alone = room.person.echoes(chirps)
     np.testing.assert_array_equal(alone.length, free.length)
     np.testing.assert_array_equal(alone.amplitude, free.amplitude)
@@ -361,7 +353,7 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(
     body = one((0.2, 0.2, 0.2))
     metal, skin = (
         build_model(
-            "specular", single(), body, scene=scene, variant=backend.kind, material=name
+            "specular", single(), body, scene=scene, variant=backend.kind, materials=[name]
         ).echoes(chirps)  # type: ignore[arg-type]
         for name in ("perfect-conductor", "skin")
     )
