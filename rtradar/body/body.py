@@ -10,11 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.body.human import HumanMesh
 from rtradar.errors import InputError
 from rtradar.kernels.motion import pose_ellipsoids
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODES, to_nodes
 from rtradar.settings import Breathing
+
+_Array = NDArray[np.float64]
 
 _SAME = 1e-4
 """Distance of two parts, relative to the least semi-axis, at which rays find the same surface."""
@@ -169,6 +172,9 @@ class Body:
         hardly moves, it is too much.
     material : str
         Name of the material of the surface.
+    mesh : HumanMesh, optional
+        Mesh of human shape on the same motion, which then scatters in place of the ellipsoids;
+        these still hide what is behind the person.
 
     Raises
     ------
@@ -180,6 +186,7 @@ class Body:
     semi_axes: NDArray[np.float64]
     breathing: Breathing | None = None
     material: str = "perfect-conductor"
+    mesh: HumanMesh | None = None
 
     def __post_init__(self) -> None:
         if self.motion.joints != NODES:
@@ -290,14 +297,50 @@ class Body:
         centres, frames = np.empty(shape), np.empty((*shape, 3))
         parents = np.array(self.motion.parents)
         pose_ellipsoids(positions, quaternions, parents, self._rest_frames, centres, frames)
-        if self.breathing is not None:
-            left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
-            ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
-            ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
-            turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(breath_times, np.float64)
-            breath = np.sin(turned + np.radians(self.breathing.phase_deg))
-            centres[:, _CHEST] += 1e-3 * self.breathing.amplitude_mm * breath[:, None, None] * ahead
+        centres[:, _CHEST] += self._breath(positions, frames, breath_times)
         return Poses(centres, frames, self.semi_axes)
+
+    def _breath(self, positions: _Array, frames: _Array, times: ArrayLike) -> _Array:
+        """Displacement (time, 2, 3) of the `_CHEST` by breath, 0 without it [m]."""
+        if self.breathing is None:
+            return np.zeros((len(positions), len(_CHEST), 3))
+        left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
+        ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
+        ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
+        turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(times, np.float64)
+        breath = np.sin(turned + np.radians(self.breathing.phase_deg))
+        return np.asarray(1e-3 * self.breathing.amplitude_mm * breath[:, None, None] * ahead)
+
+    def skin(self, times: ArrayLike, divisions: int = 0) -> _Array:
+        """Pose the vertices of the mesh at any times; past the end of the motion it rests.
+
+        Parameters
+        ----------
+        times : (time,) array_like
+            Times since the start of the motion, not negative [s].
+        divisions : int
+            Number of times that each triangle of the mesh is divided in four, 0 to 4.
+
+        Returns
+        -------
+        (time, vertex, 3) float64
+            World [m].
+
+        Raises
+        ------
+        InputError
+            Where the body has no mesh.
+        """
+        if self.mesh is None:
+            raise InputError(f"body of {self.motion.name}: it has no mesh; give one as mesh=")
+        instants = np.asarray(times, np.float64)
+        moving = np.minimum(instants, self.duration_s)
+        vertices = self.mesh.vertices(moving, divisions)
+        if self.breathing is not None:
+            poses = self._posed(moving, moving)
+            moved = self._breath(self.motion.at(moving)[0], poses.frames, instants)
+            vertices += np.einsum("vp,tpx->tvx", self.mesh.weights(divisions)[:, _CHEST], moved)
+        return vertices
 
     def ellipsoids(self, time: float) -> Ellipsoids:
         """Pose the ellipsoids at one time.

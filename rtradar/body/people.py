@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -266,10 +266,6 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
         duration_s = min(left)
     bodies = []
     for person, rest in zip(people, left, strict=True):
-        if person.body != "ellipsoids":
-            raise InputError(
-                f"person '{person.motion.name}': body = 'mesh' is not available; use 'ellipsoids'"
-            )
         # Who ends early rests, unless nobody lasts that long.
         rests = duration_s is not None and 0 <= rest < duration_s <= max(left)
         placed = place(
@@ -281,5 +277,6 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
         placed = placed.shifted([*person.position_m, 0.0])
         material = settings.body_material if person.material is None else person.material
         breathing = settings.breathing if person.breathing is None else person.breathing
-        bodies.append(Body.from_motion(placed, breathing, material))
+        body = Body.from_motion(placed, breathing, material)
+        bodies.append(replace(body, mesh=HumanMesh(placed)) if person.body == "mesh" else body)
     return bodies[0] if len(bodies) == 1 else Bodies(bodies, duration_s)

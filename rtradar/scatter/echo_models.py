@@ -78,6 +78,10 @@ def build_model(
         Where it is of another package, and fails.
     """
     kind = MODELS.find(fidelity)
+    if any(person.mesh is not None for person in body.people):
+        from rtradar.scatter.models.mesh_optics import mesh_model
+
+        kind = mesh_model(fidelity)
     room = scene if scene is not None and not scene.is_empty else None
     with MODELS.guarded(fidelity):
         taken = inspect.signature(kind).parameters

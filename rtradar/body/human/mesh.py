@@ -175,6 +175,20 @@ class HumanMesh:
         """
         return self._divided(divisions)[1]
 
+    def weights(self, divisions: int = 0) -> Array:
+        """Weights of the parts in each vertex, which add up to 1.
+
+        Parameters
+        ----------
+        divisions : int
+            Number of times that each triangle is divided in four, 0 to 4.
+
+        Returns
+        -------
+        (vertex, part) float64
+        """
+        return np.asarray(self._divided(divisions)[0][:, 3::4].toarray())
+
     def _divided(self, divisions: int) -> tuple[Any, NDArray[np.int64]]:
         """Skinning as a sparse matrix (vertex, 4 rows a part), and faces, of the divided mesh."""
         if not 0 <= divisions <= MOST_DIVISIONS:

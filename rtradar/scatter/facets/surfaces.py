@@ -60,7 +60,7 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], subdivisions: int) -> Facet
     sphere, faces = _unit_facets(subdivisions)
     axes = np.asarray(semi_axes, dtype=np.float64)[:, None, :]
     vertices = sphere * axes
-    normals, areas = _normals(vertices, faces)
+    normals, areas = facet_normals(vertices, faces)
     smooth = sphere / axes
     smooth /= np.linalg.norm(smooth, axis=2, keepdims=True)
     # Half the width of a uniform spread with the variance that a linear function has over the
@@ -76,16 +76,17 @@ def mesh_facets(
     """Facets of a mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``, without empty ones."""
     whole = np.asarray(vertices, dtype=np.float64)[None]
     chosen = np.asarray(faces, dtype=np.int32)
-    normals, areas = _normals(whole, chosen)
+    normals, areas = facet_normals(whole, chosen)
     solid = areas[0] > 0
     flat = np.zeros((1, int(solid.sum())))
     chosen = np.ascontiguousarray(chosen[solid])
     return Facets(whole, chosen, normals[:, solid], areas[:, solid], flat, both_sides)
 
 
-def _normals(
+def facet_normals(
     vertices: NDArray[np.float64], faces: NDArray[np.int32]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit normals (part, facet, 3) and areas (part, facet) [m^2] of triangles of parts."""
     a, b, c = (vertices[:, faces[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     twice = np.linalg.norm(normals, axis=2)

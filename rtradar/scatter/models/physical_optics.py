@@ -16,9 +16,10 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
+from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
@@ -26,6 +27,8 @@ _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
 
 _MOST_FREQUENCIES = 9
+
+Array = NDArray[np.float64]
 
 
 class PhysicalOptics(BuiltInModel):
@@ -86,9 +89,7 @@ class PhysicalOptics(BuiltInModel):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"physical-optics: {name} = {value}; it must be positive")
         self._radar, self._body, self._spreading = radar, body, spreading
-        self._surface = FacetBody(
-            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=frequencies
-        )
+        self._surface = self._surface_of(variant, facets, frequencies)
         self.variant: str | None = self._surface.variant
         self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
         # From coarse nodes to fine ones, which stand at antennas or between them.
@@ -98,11 +99,44 @@ class PhysicalOptics(BuiltInModel):
         end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
         self._envelope = Envelope(self._sample, body.owner, tolerance, end)
 
+    def _surface_of(self, variant: str, facets: int | None, nodes: int) -> FacetBody | SkinFacets:
+        return FacetBody(
+            self._radar,
+            self._body,
+            variant=variant,
+            spreading=self._spreading,
+            facets=facets,
+            nodes=nodes,
+        )
+
+    def _carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
+        """Path [m] and strength [m] of each part (chirp, rx, part), which the envelope is over."""
+        length, strength, _ = solve_specular_points(
+            at, polarization=self._radar.polarization, spreading=self._spreading
+        )
+        return length, strength
+
+    def _field(
+        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
+    ) -> NDArray[np.complex128]:
+        """Amplitude (node, pair, n) of parts (n,) at one time, for paths (pair, n)."""
+        surface, antennas = self._surface, nodes.antennas
+        assert isinstance(surface, FacetBody)
+        return surface.amplitude(
+            (pose.centres, pose.frames),
+            antennas[None],
+            nodes.pairs,
+            length[None],
+            surface.seen(pose.centres[0], pose.frames[0], antennas, parts),
+            np.arange(len(antennas))[None],
+            parts,
+        )[:, 0]
+
     def _sample(self, place: float, parts: NDArray[np.int64], whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose = self._body.at([time])
-        coarse = self._at_nodes(pose, self._coarse, parts)
+        coarse = self._at_nodes(time, pose, self._coarse, parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse, self._body.owner) if whole is None else whole[parts]
@@ -111,30 +145,20 @@ class PhysicalOptics(BuiltInModel):
             > self._unevenness * scale
         )
         if uneven.any():
-            fine = self._at_nodes(pose, self._fine, parts[uneven])
+            fine = self._at_nodes(time, pose, self._fine, parts[uneven])
             ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
         return Sample(ratio, strength)
 
-    def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
+    def _at_nodes(
+        self, time: float, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]
+    ) -> Sample:
         antennas, pairs = nodes.antennas, nodes.pairs
         centres, frames = (
             np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
         )
         ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
-        length, strength, _ = solve_specular_points(
-            Geometry(*ends, centres, frames, pose.semi_axes[parts]),
-            polarization=self._radar.polarization,
-            spreading=self._spreading,
-        )
-        amplitude = self._surface.amplitude(
-            (pose.centres, pose.frames),
-            antennas[None],
-            pairs,
-            length[None, :, 0],
-            self._surface.seen(pose.centres[0], pose.frames[0], antennas, parts),
-            np.arange(len(antennas))[None],
-            parts,
-        )[:, 0]
+        length, strength = self._carriers(Geometry(*ends, centres, frames, pose.semi_axes[parts]))
+        amplitude = self._field(time, pose, nodes, length[:, 0], parts)
         specular = strength[:, 0]
         # Without a specular point there is next to nothing to see either: antennas on opposite
         # sides.
@@ -145,9 +169,7 @@ class PhysicalOptics(BuiltInModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength, _ = solve_specular_points(
-            at, polarization=self._radar.polarization, spreading=self._spreading
-        )
+        length, strength = self._carriers(at)
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals, envelope, weights = chirps // self._step, self._envelope, self._fine.weights
         # Power is measured at keyframes, where nothing is asked of what comes after.

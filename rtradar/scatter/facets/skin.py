@@ -1,0 +1,213 @@
+"""Facets of people as meshes that bend, and what antennas see of them.
+
+Facets are triangles of the skin: their corners move with it, so that what they add stays coherent
+from pose to pose, however it bends. They are so small that their sag is 0.1 rad. Mitsuba decides
+what antennas see past all people's skins, at the middles of the facets, on the mesh that is coarser
+by one division; facets that face away are not lit.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body, unit_sphere
+from rtradar.body.human.mesh import MOST_DIVISIONS, loop_subdivision
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.facets.surfaces import body_facets, facet_integral, facet_normals
+from rtradar.scatter.ray_tubes.tubes import in_four
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.bounces import MeshSurfaces
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+_SAME = 1e-5
+"""Fraction of the people's extent: what is met nearer to a facet than that is the facet."""
+
+_KEPT = 4
+"""Poses that are kept: what is asked about twice in turn, in a few threads."""
+
+
+class Skin(NamedTuple):
+    """The skin of one person: a coarse mesh, and a fine one that has four triangles for each.
+
+    ``coarse (face, 3)`` and ``fine (4 face, 3)`` are triangles; ``part (face,)`` the person's parts
+    in ascending order; ``posed(time)`` gives the vertices of both [m], world.
+    """
+
+    coarse: Indices
+    fine: Indices
+    part: Indices
+    posed: Callable[[float], tuple[Array, Array]]
+
+
+class _Pose(NamedTuple):
+    """Fine ``vertices (vertex, 3)`` [m], ``seen (eye, facet)``, and of which parts, ``known``."""
+
+    vertices: Array
+    seen: NDArray[np.float32]
+    known: NDArray[np.bool_]
+
+
+class _Piece(NamedTuple):
+    """A part's fine facets: which of all, which vertices of all, and faces among these."""
+
+    facets: slice
+    vertices: Indices
+    faces: NDArray[np.int32]
+
+
+def skin_of(person: Body, frequency_hz: float) -> Skin:
+    """Return the skin of a person at this frequency [Hz]: their mesh, or all their ellipsoids'."""
+    mesh = person.mesh
+    if mesh is None:
+        return _skin_of_ellipsoids(person, frequency_hz)
+    divisions = min(MOST_DIVISIONS, max(1, mesh.divisions_for(frequency_hz)))
+    part = np.repeat(mesh.part, 4 ** (divisions - 1))
+    order = np.argsort(part, kind="stable")
+
+    def posed(time: float) -> tuple[Array, Array]:
+        return tuple(person.skin([time], level)[0] for level in (divisions - 1, divisions))
+
+    coarse, fine = mesh.faces_of(divisions - 1), mesh.faces_of(divisions)
+    return Skin(coarse[order], _four_of(fine, order), part[order], posed)
+
+
+def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
+    levels = round(np.log(body_facets(person.semi_axes, frequency_hz) / 20) / np.log(4))
+    sphere, faces = unit_sphere(levels - 1)
+    smooth, finer = loop_subdivision(faces, len(sphere))
+    fine = smooth @ sphere
+    fine *= np.linalg.norm(sphere, axis=1).mean() / np.linalg.norm(fine, axis=1, keepdims=True)
+    parts = len(person.semi_axes)
+
+    def posed(time: float) -> tuple[Array, Array]:
+        pose = person.at([min(time, person.duration_s)])
+        stretched = np.swapaxes(pose.frames[0] * pose.semi_axes[:, None], 1, 2)
+        places = (own @ stretched + pose.centres[0][:, None] for own in (sphere, fine))
+        return tuple(own.reshape(-1, 3) for own in places)
+
+    def everywhere(own: Indices, count: int) -> Indices:
+        return np.concatenate([own + part * count for part in range(parts)])
+
+    part = np.repeat(np.arange(parts), len(faces))
+    return Skin(everywhere(faces, len(sphere)), everywhere(finer, len(fine)), part, posed)
+
+
+def _four_of(fine: Indices, order: Indices) -> Indices:
+    return np.asarray(fine.reshape(-1, 4, 3)[order].reshape(-1, 3))
+
+
+class SkinFacets:
+    """The facets of all people's skins; ``frequency (node,)`` [Hz], ``variant`` the backend."""
+
+    def __init__(
+        self, radar: Radar, body: Body, *, variant: str, spreading: bool, nodes: int
+    ) -> None:
+        self._radar, self._spreading = radar, spreading
+        backend = select(variant)
+        self.variant, self._mi = backend.kind, use(backend)
+        self.frequency = sweep_nodes(radar, nodes)
+        stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
+        self._skins = [skin_of(person, stop_hz) for person in body.people]
+        self._coarse, fine = (self._joined(which) for which in ("coarse", "fine"))
+        counts = np.cumsum([0, *(len(person.semi_axes) for person in body.people)])
+        part = np.concatenate(
+            [skin.part + first for skin, first in zip(self._skins, counts[:-1], strict=True)]
+        )
+        self._part = part
+        self._pieces = [_piece(fine, part, own) for own in range(counts[-1])]
+        self._eyes = shadow_nodes(radar)[0]
+        self._tracing, self._poses = threading.Lock(), OrderedDict[float, _Pose]()
+
+    def _joined(self, which: str) -> Indices:
+        """Faces of all skins, numbered among the vertices of all."""
+        found, first = [], 0
+        for skin in self._skins:
+            faces: Indices = getattr(skin, which)
+            found.append(faces + first)
+            first += int(faces.max()) + 1
+        return np.concatenate(found)
+
+    def amplitude(
+        self,
+        time: float,
+        centres: Array,
+        antennas: Array,
+        pairs: Indices,
+        length: Array,
+        parts: Indices,
+    ) -> NDArray[np.complex128]:
+        """Amplitude (node, pair, n) of `Echoes` of the parts (n,) at a time [s].
+
+        ``antennas (antenna, 3)`` [m], of which ``pairs (pair, 2)`` are Tx and Rx; ``length (pair,
+        n)`` are the carriers [m], and ``centres (part, 3)`` the middles of all parts, about which
+        lengths are reckoned.
+        """
+        pose = self._pose(time, parts)
+        apart = np.linalg.norm(antennas[:, None] - self._eyes, axis=2)
+        row = np.argmin(apart, axis=1)[None]
+        k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
+        field = np.empty((len(parts), len(pairs), len(self.frequency)), dtype=np.complex128)
+        for place, part in enumerate(parts):
+            piece = self._pieces[part]
+            vertices = (pose.vertices[piece.vertices] - centres[part])[None]
+            normals, areas = facet_normals(vertices, piece.faces)
+            facets = Facets(vertices, piece.faces, normals, areas, np.zeros_like(areas))
+            local = (antennas - centres[part])[None]
+            seen = np.ascontiguousarray(pose.seen[:, piece.facets])
+            views = Views(np.zeros(1, dtype=np.int64), local, row, seen)
+            waves = Waves(pairs, length[None, :, place], k, self._spreading)
+            field[place] = facet_integral(facets, views, waves)[0]
+        to_tx, to_rx = (antennas[pairs[:, side], None] - centres[parts] for side in (0, 1))
+        factor = copolar(to_tx, to_rx, self._radar.polarization)
+        return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))) * factor)
+
+    def _pose(self, time: float, parts: Indices) -> _Pose:
+        """The skins at a time, with what is seen of these parts at least."""
+        with self._tracing:
+            kept = self._poses.get(time)
+            if kept is None or not kept.known[parts].all():
+                known = np.zeros(len(self._pieces), dtype=bool)
+                known[parts] = True
+                posed = [skin.posed(time) for skin in self._skins]
+                coarse, fine = (np.concatenate(own) for own in zip(*posed, strict=True))
+                kept = _Pose(fine, self._seen(coarse, known), known)
+                self._poses[time] = kept
+                while len(self._poses) > _KEPT:
+                    self._poses.popitem(last=False)
+            return kept
+
+    def _seen(self, vertices: Array, known: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """Which facets (eye, facet) of known parts are seen past all skins."""
+        surfaces = MeshSurfaces(self._mi, vertices, self._coarse, same=_SAME)
+        asked = np.flatnonzero(known[self._part])
+        corners = vertices[self._coarse[asked]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        # Those at the corners, in their order, then the one between.
+        middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
+        seen = np.zeros((len(self._eyes), len(self._coarse), 4), dtype=np.float32)
+        for eye, place in enumerate(self._eyes):
+            facing = np.flatnonzero(np.sum(normals * (place - corners[:, 0]), axis=1) > 0)
+            points = middles[facing].reshape(-1, 3)
+            own = np.repeat(asked[facing], 4)
+            clear = surfaces.sees(np.broadcast_to(place, points.shape), points, own)
+            seen[eye, asked[facing]] = clear.reshape(-1, 4)
+        return seen.reshape(len(self._eyes), -1)
+
+
+def _piece(fine: Indices, part: Indices, own: int) -> _Piece:
+    first, last = np.searchsorted(part, [own, own + 1])
+    facets = slice(4 * int(first), 4 * int(last))
+    vertices, faces = np.unique(fine[facets], return_inverse=True)
+    return _Piece(facets, vertices, np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int32))
