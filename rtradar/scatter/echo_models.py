@@ -78,7 +78,8 @@ def build_model(
         Where it is of another package, and fails.
     """
     kind = MODELS.find(fidelity)
-    if any(person.mesh is not None for person in body.people):
+    # Other bodies of ellipsoids than `Body` need not know of people and meshes.
+    if any(getattr(person, "mesh", None) is not None for person in getattr(body, "people", ())):
         from rtradar.scatter.models.mesh_optics import mesh_model
 
         kind = mesh_model(fidelity)
