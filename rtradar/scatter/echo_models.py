@@ -99,8 +99,9 @@ def build_model(
     def conductor(before: Radar) -> EchoModel:
         with MODELS.guarded(fidelity):
             model: EchoModel = kind(before, body, spreading=spreading, **backend, **model_options)
-        built_in = fidelity in MODELS.built_in
-        return model if built_in else _Checked(fidelity, model, before, body)
+        if fidelity in MODELS.built_in or getattr(model, "fast_over_walls", False):
+            return model
+        return _Checked(fidelity, model, before, body)
 
     if room is None:
         return over_legs(conductor(radar), radar, body, materials)
