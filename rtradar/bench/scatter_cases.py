@@ -329,7 +329,7 @@ def _facets_by_length(k: Any) -> Calls:
     angle, pose = rng.uniform(-1, 1, chirps), np.arange(chirps)
     tx = 40 * np.stack([np.cos(angle), np.sin(angle), np.zeros(chirps)], axis=1)
     rx = tx[:, None] + rng.uniform(-0.05, 0.05, (chirps, receivers, 3))
-    factor = rng.normal(size=(chirps, count)) + 1j * rng.normal(size=(chirps, count))
+    factor = rng.normal(size=(chirps, 3, count)) + 1j * rng.normal(size=(chirps, 3, count))
     views = k.RigidViews(
         tx, rx, pose, pose, np.zeros(chirps), np.ones((chirps, 1, count), dtype=np.float32),
         np.ones((chirps, 1)), np.ones((chirps, receivers, 1)), factor,

@@ -16,12 +16,12 @@ several times, too (`rtradar.scatter.rigid_bounces`).
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
@@ -34,18 +34,26 @@ from rtradar.kernels.scatter.facets_by_length import (
 )
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import small_facets
-from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.polarization import antenna_field, copolar, unit
+from rtradar.scatter.multipath.image_paths import WallPath
+from rtradar.scatter.multipath.slab_series import room_series
+from rtradar.scatter.multipath.wall_edges import WallEdges
+from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.rigid_bounces import SheetBounces
+from rtradar.scatter.rigid_legs import Past, RigidLegs
 from rtradar.scatter.validity import Limit
-from rtradar.scene import Object, reflection
+from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map
-from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+DIRECT = WallPath((), ())
+"""The path that no wall reflects."""
+
+_WALL_ERROR = 0.015
+"""Error of the field behind walls that polynomials over the sweep may have."""
 
 _NODES = 3
 """Frequencies over the sweep: one pass of `synthesize` in float32 takes as many."""
@@ -75,29 +83,19 @@ _TASKS_AT_ONCE = 16
 
 
 class _Keyframe(NamedTuple):
-    """Visibility (place, facet) float32, and what is left of a conductor's field (facet,)."""
+    """Visibility (place, facet) float32; what is left of a conductor's field (3, facet)."""
 
     seen: NDArray[np.float32]
     factor: NDArray[np.complex128]
 
 
-class Past(NamedTuple):
-    """What may hide an object: Mitsuba, tracers of all in the room and of the others, and people.
-
-    ``others`` are furniture and the objects but for this one.
-    """
-
-    mi: Any
-    room: RoomTracer
-    others: RoomTracer
-    body: Body
-    people: BodyTracer
-
-
 class RigidEchoes:
-    """Echoes of one moving object for any chirps; ``past`` is what may hide it, None for nothing.
+    """Echoes of one moving object over one path, for any chirps.
 
-    An `InputError` is raised if its mesh cannot be used, or comes within 0.3 m of an antenna while
+    The direct path goes through the ``walls`` of the room, others over them. ``past`` is what may
+    hide the object, None for nothing. ``limits`` are those of validity that it meets.
+
+    An `InputError` is raised if the mesh cannot be used, or comes within 0.3 m of an antenna while
     the capture lasts.
     """
 
@@ -108,16 +106,24 @@ class RigidEchoes:
         duration_s: float,
         past: Past | None,
         *,
+        walls: Sequence[Wall] = (),
+        path: WallPath = DIRECT,
         spreading: bool = True,
     ) -> None:
-        self.moving, self._radar, self._past, self._spreading = moving, radar, past, spreading
+        self.moving, self.path = moving, path
+        self._radar, self._spreading = radar, spreading
+        self.frequency = sweep_nodes(radar, _NODES)
+        series = room_series(
+            walls, radar, most_nodes=_NODES, enough=_WALL_ERROR, bounces=path.order
+        )
+        response = WallResponse(WallEdges.of(walls, radar), series.walls, self.frequency)
+        self._legs = RigidLegs(radar, path, response, past)
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
         own = shape.corners - self._reference
         radius = float(np.linalg.norm(own, axis=-1).max())
         nearest, rates, speeds, turning = self._kinematics(duration_s)
-        self.frequency = sweep_nodes(radar, _NODES)
         wavenumber = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
         k = wavenumber[-1]
         bow_m = 2 * math.sqrt(_BOW_RAD * nearest / k)
@@ -134,10 +140,11 @@ class RigidEchoes:
         self._knot_s = _KNOT_RAD / max(k * rates, _KNOT_RAD / _KEYFRAME_S)
         self._keyframe_s = min(_KEYFRAME_S, _KEYFRAME_RAD / max(turning, 1e-9))
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
-        self._places, self._tx_weight, self._rx_weight = shadow_nodes(radar)
-        self.limits = tuple(self._limits(speeds))
+        self.limits = tuple(self._limits(speeds)) if path.order == 0 else ()
+        # What slabs add is the same all the time: what is left is in the factors.
+        self._longer_m = self._legs.longer_m(self._pose(np.zeros(1))[1][0])
         self._bounces = None
-        if past is not None and not shape.closed:
+        if past is not None and not shape.closed and path.order == 0:
             self._bounces = SheetBounces(
                 past.mi,
                 radar,
@@ -158,22 +165,24 @@ class RigidEchoes:
         rate of paths against that over the point of reference [m/s]; range rates (instant, vertex)
         [m/s]; and the largest rate of rotation [rad/s].
         """
-        shape, antenna = self.moving.shape, np.array(self._radar.position_m)
+        shape, middles = self.moving.shape, self._legs.middles[:, None, None]
         times = np.linspace(0.0, duration_s, _SAMPLES)
         points = np.concatenate([shape.vertices, self._reference[None]])
         early, late = (
             np.einsum("tij,vj->tvi", rotation, points) + place[:, None]
             for rotation, place in (self.moving.pose(at) for at in (times, times + _STEP_S))
         )
-        ranges, later = (np.linalg.norm(at - antenna, axis=-1) for at in (early, late))
-        speeds = (later - ranges) / _STEP_S
-        self._refuse_too_near(times, ranges)
-        rates = 2 * float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
+        # Of both legs (2, instant, vertex).
+        ranges, later = (np.linalg.norm(at - middles, axis=-1) for at in (early, late))
+        speeds = (later - ranges).sum(axis=0) / _STEP_S
+        if self.path.order == 0:
+            self._refuse_too_near(times, ranges[0])
+        rates = float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
         rotations = [self.moving.pose(at)[0] for at in (times, times + _STEP_S)]
         # The chord of a small rotation, over all three axes, is sqrt(2) of its angle.
         change = np.linalg.norm(rotations[1] - rotations[0], axis=(1, 2)) / math.sqrt(2)
         nearest = max(float(ranges.min()), MINIMUM_ANTENNA_DISTANCE_M)
-        return nearest, rates, speeds[:, :-1], float(change.max()) / _STEP_S
+        return nearest, rates, speeds[:, :-1] / 2, float(change.max()) / _STEP_S
 
     def _refuse_too_near(self, times: Array, ranges: Array) -> None:
         radar = self._radar
@@ -237,7 +246,7 @@ class RigidEchoes:
             steps, bounces = np.append(steps, more), np.append(bounces, order)
             amplitude = np.concatenate([amplitude, field_of], axis=3)
         return Echoes(
-            length=self._over_reference(times, tx)[..., None] + steps,
+            length=self._over_reference(times, tx)[..., None] + self._longer_m + steps,
             amplitude=np.ascontiguousarray(amplitude),
             frequency=self.frequency,
             tx=tx,
@@ -252,31 +261,31 @@ class RigidEchoes:
 
     def _over_reference(self, times: Array, tx: Indices) -> Array:
         """Paths over the point of reference (task, rx) [m]."""
-        radar, at = self._radar, self._pose(times)[1]
-        out = np.linalg.norm(radar.tx[tx] - at, axis=1)
-        back = np.linalg.norm(radar.rx[radar.rx_of_tx[tx]] - at[:, None], axis=2)
+        legs, at = self._legs, self._pose(times)[1]
+        out = np.linalg.norm(legs.tx[tx] - at, axis=1)
+        back = np.linalg.norm(legs.rx[self._radar.rx_of_tx[tx]] - at[:, None], axis=2)
         return np.asarray(out[:, None] + back)
 
     def _field(self, times: Array, tx: Indices) -> NDArray[np.complex128]:
         """Amplitudes (task, rx, node, echo) at the times of tasks and for their Tx."""
-        radar, (rotation, at) = self._radar, self._pose(times)
+        legs, (rotation, at) = self._legs, self._pose(times)
         place = times / self._keyframe_s
         before = np.floor(place).astype(np.int64)
         numbers = np.unique([before, before + 1])
         keyframes = self._find(numbers.tolist())
-        rx = radar.rx_of_tx[tx]
+        rx = self._radar.rx_of_tx[tx]
         views = RigidViews(
-            tx=np.einsum("tji,tj->ti", rotation, radar.tx[tx] - at),
-            rx=np.einsum("tji,trj->tri", rotation, radar.rx[rx] - at[:, None]),
+            tx=np.einsum("tji,tj->ti", rotation, legs.tx[tx] - at),
+            rx=np.einsum("tji,trj->tri", rotation, legs.rx[rx] - at[:, None]),
             before=np.searchsorted(numbers, before),
             after=np.searchsorted(numbers, before + 1),
             fraction=place - before,
             seen=np.stack([own.seen for own in keyframes]),
-            tx_weight=self._tx_weight[tx],
-            rx_weight=self._rx_weight[rx],
+            tx_weight=legs.tx_weight[tx],
+            rx_weight=legs.rx_weight[rx],
             factor=np.stack([own.factor for own in keyframes]),
         )
-        out = np.zeros((len(times), radar.n_rx, _NODES, self._count), dtype=np.complex128)
+        out = np.zeros((len(times), self._radar.n_rx, _NODES, self._count), dtype=np.complex128)
         given = self._facets, views, self._grid, self._spreading, out
         thread_map(
             lambda first: facets_by_length(first, min(first + _TASKS_AT_ONCE, len(out)), *given),
@@ -299,64 +308,25 @@ class RigidEchoes:
         (rotation,), (at,) = self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
         normals = facets.normals @ rotation.T
-        places = self._places
-        facing = np.einsum("fi,pfi->pf", normals, places[:, None] - middles)
-        seen = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
-        if self._past is not None:
-            place, facet = np.nonzero(seen)
-            room = self._past.room
-            seen[place, facet] = self._clear(room, time_s, places[place], middles[facet])
-        return _Keyframe(seen.astype(np.float32), self._factor(middles, normals))
+        facing = np.einsum("fi,pfi->pf", normals, self._legs.places[:, None] - middles)
+        asked = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
+        seen = self._legs.seen(time_s, middles, asked)
+        given = middles, normals, self.moving.material, self._longer_m
+        return _Keyframe(seen.astype(np.float32), self._legs.factor(*given))
 
     def _open_at(self, time_s: float) -> tuple[Array, Array]:
-        """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times their gain."""
-        (rotation,), (at,) = self._pose(np.array([time_s]))
-        middles = self._facets.vertices[:, -len(self._facets.faces) :].T @ rotation.T + at
-        places = np.repeat(self._places, len(middles), axis=0)
-        targets, others = np.tile(middles, (len(self._places), 1)), self._past and self._past.others
-        assert others is not None
-        clear = self._clear(others, time_s, places, targets).reshape(-1, len(middles)).mean(axis=1)
-        gain = math.sqrt(float(self._gain(unit(at - np.array(self._radar.position_m)))))
-        return self._tx_weight @ clear * gain, self._rx_weight @ clear * gain
+        """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times what is left.
 
-    def _clear(
-        self, room: RoomTracer, time_s: float, origins: Array, targets: Array
-    ) -> NDArray[np.bool_]:
-        assert self._past is not None
-        body, people = self._past.body, self._past.people
-        room.pose(time_s)
-        clear = ~room.blocked(origins, targets)
-        poses = body.at([min(max(time_s, 0.0), body.duration_s)])
-        people.pose(poses.centres[0], poses.frames[0])
-        on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
-        clear[clear] = people.sees(origins[clear], targets[clear], on_none)
-        return clear
-
-    def _gain(self, way: Array) -> Array:
-        """Field (...) that the patterns of both antennas leave in directions ``way (..., 3)``."""
-        radar, gain = self._radar, np.ones(way.shape[:-1])
-        for antenna in (radar.tx_antenna, radar.rx_antenna):
-            if antenna is not None:
-                gain = gain * np.sqrt(antenna.relative(way, radar.polarization))
-        return gain
-
-    def _factor(self, middles: Array, normals: Array) -> NDArray[np.complex128]:
-        """Field of each facet over that of a conductor between isotropic antennas, (facet,).
-
-        It is that of the middle of the array. With the fraction p of TE in the field that is sent,
-        what comes back the same way is p times minus the coefficient of TE, and the rest times that
-        of TM.
+        That is the root of what walls and patterns of antennas leave of both legs.
         """
-        radar, way = self._radar, unit(middles - np.array(self._radar.position_m))
-        factor = np.asarray(self._gain(way) * copolar(-way, -way, radar.polarization), complex)
-        if self.moving.material.conducts:
-            return factor
-        cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)
-        across = unit(np.cross(way, normals))
-        te = np.sum(antenna_field(way, radar.polarization) * across, axis=-1) ** 2
-        eta = self.moving.material.eta(np.array([radar.centre_frequency_hz]))
-        in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
-        return np.asarray(factor * (in_tm - te * (in_te + in_tm)))
+        legs, facets = self._legs, self._facets
+        (rotation,), (at,) = self._pose(np.array([time_s]))
+        middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
+        asked = np.ones((len(legs.places), len(middles)), dtype=bool)
+        clear = legs.seen(time_s, middles, asked, others=True).mean(axis=1)
+        left = legs.factor(at[None], np.eye(3)[:1], self.moving.material, self._longer_m)
+        root = np.sqrt(np.abs(left[_NODES // 2, 0]))
+        return legs.tx_weight @ clear * root, legs.rx_weight @ clear * root
 
 
 def _rigid_facets(corners: Array, both_sides: bool) -> RigidFacets:

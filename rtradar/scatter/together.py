@@ -16,7 +16,8 @@ from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.rigid import Past, RigidEchoes
+from rtradar.scatter.rigid import RigidEchoes
+from rtradar.scatter.rigid_legs import Past
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
@@ -84,7 +85,10 @@ def build_world(
             mi, room, people = tracers
             others = tuple(other for other in scene.objects if other is not moving)
             past = Past(mi, room, RoomTracer(mi, replace(scene, objects=others)), body, people)
-        objects.append(RigidEchoes(radar, moving, body.duration_s, past, spreading=spreading))
+        own = RigidEchoes(
+            radar, moving, body.duration_s, past, walls=scene.walls, spreading=spreading
+        )
+        objects.append(own)
     return World(model, len(body.part_names), objects)
 
 

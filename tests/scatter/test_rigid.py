@@ -14,9 +14,10 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
 from rtradar.scatter.common.interpolation import interpolation_weights
+from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.rigid import RigidEchoes
 from rtradar.scatter.together import build_world, together
-from rtradar.scene import material, reflection
+from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
     rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2, position_m=(0.0, 0.0, 1.0)
@@ -177,3 +178,46 @@ def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
     wavelength = SPEED_OF_LIGHT_MPS / 12e9
     closed = 4 * np.pi * 0.4**4 / (3 * wavelength**2)
     np.testing.assert_allclose(10 * np.log10(power / closed), 0, atol=0.3)
+
+
+def wall(made_of: str, x: float, normal_x: float) -> Wall:
+    """A wall of 20 m across x that faces the given side."""
+    edges = ((0.0, 20.0, 0.0), (0.0, 0.0, 20.0))
+    first, second = edges if normal_x > 0 else edges[::-1]
+    return Wall(
+        name="wall",
+        corner_m=(x, -10.0, -10.0),
+        edge_u_m=first,
+        edge_v_m=second,
+        material=material(made_of),
+        thickness_m=0.0125,
+    )
+
+
+def test_a_wall_before_it_leaves_what_its_slab_lets_through_twice() -> None:
+    ahead = dataclasses.replace(box(None), position_m=(2.5, 0.0, 1.0))
+    chirp = np.arange(1)
+    board = wall("plasterboard", 1.0, -1.0)
+    free = field(RigidEchoes(RADAR, ahead, 0.1, None).echoes(chirp))
+    model = RigidEchoes(RADAR, ahead, 0.1, None, walls=(board,))
+    found = field(model.echoes(chirp))
+    eta = board.material.eta(model.frequency)
+    _, through = slab(eta, board.thickness_m, model.frequency, 1.0, "te")
+    # Over the same way through air, out and back.
+    k = 2 * np.pi * model.frequency / SPEED_OF_LIGHT_MPS
+    expected = (through * np.exp(1j * k * board.thickness_m))[:, None, None] ** 2
+    np.testing.assert_allclose(found / free, np.broadcast_to(expected, found.shape), atol=0.02)
+
+
+def test_over_a_conducting_wall_it_is_its_mirror_image() -> None:
+    behind = wall("perfect-conductor", -1.0, 1.0)
+    # Wall, object, wall: the radar sees the object mirrored in the plane x = -1 m.
+    (path,) = (
+        own for own in wall_paths((behind,), np.array(RADAR.position_m), 2) if own.order == 2
+    )
+    own = dataclasses.replace(box(None), yaw_deg=20.0)
+    mirrored = dataclasses.replace(own, yaw_deg=-20.0, position_m=(-4.5, 0.3, 1.1))
+    chirp = np.arange(2)
+    found = field(RigidEchoes(RADAR, own, 0.1, None, walls=(behind,), path=path).echoes(chirp))
+    expected = field(RigidEchoes(RADAR, mirrored, 0.1, None).echoes(chirp))
+    np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())

@@ -62,8 +62,8 @@ class RigidViews(NamedTuple):
     ``tx (task, 3)``, ``rx (task, rx, 3)``. Between the keyframes ``before (task,)`` and ``after
     (task,)`` the task is at ``fraction (task,)``; ``seen (keyframe, place, facet)`` float32 is the
     visibility from places of the array, whose weights in the antennas are ``tx_weight (task,
-    place)`` and ``rx_weight (task, rx, place)``; ``factor (keyframe, facet)`` is what the material
-    and the antennas make of the field of a conductor.
+    place)`` and ``rx_weight (task, rx, place)``; ``factor (keyframe, 3, facet)`` is what the
+    material, walls and antennas make of the field of a conductor at the three wavenumbers.
     """
 
     tx: Array
@@ -146,10 +146,11 @@ def _put_edge(out, low, high, grid, apart, value, field):
 
 
 @inlined(fastmath=FAST)
-def _put_facet(out, mean, u, v, grid, strength, field, value):
+def _put_facet(out, mean, u, v, grid, strength, factor, field, value):
     """Share the field of a facet (3, echo): its mean path, and those of two corners less it.
 
-    ``field`` and ``value (3,)`` are room to work in.
+    Its strength is that of a conductor, to be multiplied by ``factor (3,)``; ``field`` and ``value
+    (3,)`` are room to work in.
     """
     w, spread = -u - v, u * u + u * v + v * v
     low, high = min(u, min(v, w)), max(u, max(v, w))
@@ -162,12 +163,12 @@ def _put_facet(out, mean, u, v, grid, strength, field, value):
                 re, im = by_series(-k * u, -k * v)
             else:
                 re, im = mean_of_phasor(k * u, k * v, k * w)
-            field[node] = strength * complex(-im * k, re * k) * _OVER_ROOT_PI
+            field[node] = factor[node] * complex(-im * k, re * k) * (strength * _OVER_ROOT_PI)
         _put(out, mean, grid, field)
         return
     for node in range(3):
         # j k times 2 j / (k (high - low)).
-        value[node] = strength * (-2.0 * _OVER_ROOT_PI / (high - low))
+        value[node] = factor[node] * (-2.0 * strength * _OVER_ROOT_PI / (high - low))
     upper, lower = (high - middle) * many > 1.0, (middle - low) * many > 1.0
     _put_edge(out, mean + middle, mean + high, grid, upper, value, field)
     for node in range(3):
@@ -195,7 +196,7 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
     field, value = np.empty(3, dtype=np.complex128), np.empty(3, dtype=np.complex128)
     to_tx, to_rx = np.empty(n_vertices), np.empty(n_vertices)
     open_tx, open_rx, facing = np.empty(n_facets), np.empty(n_facets), np.empty(n_facets)
-    factor, lit = np.empty(n_facets, dtype=np.complex128), np.empty(n_facets, dtype=np.int64)
+    factor, lit = np.empty((n_facets, 3), np.complex128), np.empty(n_facets, np.int64)
     for task in range(begin, end):
         fraction = smoothstep(views.fraction[task])
         before, after = views.seen[views.before[task]], views.seen[views.after[task]]
@@ -209,7 +210,9 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
             height = normal[0] * tx[0] + normal[1] * tx[1] + normal[2] * tx[2] - facets.planes[f]
             if open_tx[f] > 0 and (height > 0 or facets.both_sides):
                 facing[f] = height / (far_tx + to_tx[middle + f])
-                factor[f] = first[f] + fraction * (last[f] - first[f])
+                for node in range(3):
+                    begins = first[node, f]
+                    factor[f, node] = begins + fraction * (last[node, f] - begins)
                 lit[count] = f
                 count += 1
         for r in range(views.rx.shape[1]):
@@ -231,8 +234,8 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
                 mean = (first_path + second_path + to_tx[c] + to_rx[c]) / 3
                 bow = _BOWED * (to_tx[middle + f] + to_rx[middle + f] - mean)
                 u, v = first_path - mean, second_path - mean
-                strength = size * factor[f]
-                _put_facet(out[task, r], mean + bow, u, v, grid, strength, field, value)
+                own = factor[f]
+                _put_facet(out[task, r], mean + bow, u, v, grid, size, own, field, value)
 
 
 def facets_by_length_reference(facets, views, grid, spreading):
@@ -241,7 +244,7 @@ def facets_by_length_reference(facets, views, grid, spreading):
     points = np.einsum("mc,fcx->fmx", midpoints(48), corners)
     for tx, receivers, pose in zip(views.tx, views.rx, views.before, strict=True):
         for rx in receivers:
-            path, along, size = 0.0, [], facets.areas * views.factor[pose]
+            path, along, size = 0.0, [], facets.areas
             for antenna in (tx, rx):
                 path = path + np.linalg.norm(points - antenna, axis=-1) - np.linalg.norm(antenna)
                 middle = np.linalg.norm(corners.mean(axis=1) - antenna, axis=-1)
@@ -250,7 +253,8 @@ def facets_by_length_reference(facets, views, grid, spreading):
             size = size * (np.min(along, axis=0) > 0) * np.mean(along, axis=0)
             k = grid.wavenumber[:, None, None]
             phases = np.exp(-1j * k * path).mean(axis=2)
-            out.append(np.conj(1j * grid.wavenumber / np.sqrt(np.pi) * (phases @ size)))
+            field = (phases * views.factor[pose]) @ size
+            out.append(np.conj(1j * grid.wavenumber / np.sqrt(np.pi) * field))
     return np.reshape(out, (*views.rx.shape[:2], -1))
 
 

@@ -1,0 +1,161 @@
+"""Both legs of a path between the array and an object that moves: what hides it, and what is left.
+
+A leg is straight, through walls, or over walls from the image of its antenna. It carries the field
+of its antenna as a vector to the middle of each facet, which reflects as a conductor does about the
+bisector of both legs, times what the material leaves at the facet's own angle. By reciprocity a
+receiver receives what it would send.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.antenna import Antenna
+from rtradar.body import Body
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import shadow_nodes
+from rtradar.scatter.common.polarization import antenna_field, bisector, unit
+from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
+from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scene import Material, reflection
+from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.room_tracer import RoomTracer
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+Bools = NDArray[np.bool_]
+
+_TOGETHER = 1.0
+"""Range cells of path, c / bandwidth, by which waves of a slab may differ in delay and be one echo:
+at half of it polynomials through three nodes err by 16 % of the wave that comes later."""
+
+
+class Past(NamedTuple):
+    """What may hide an object: Mitsuba, tracers of all in the room and of the others, and people.
+
+    ``others`` are furniture and the objects but for this one.
+    """
+
+    mi: Any
+    room: RoomTracer
+    others: RoomTracer
+    body: Body
+    people: BodyTracer
+
+
+class RigidLegs:
+    """The legs of one path, with the walls of the room as they answer at given frequencies.
+
+    ``tx`` and ``rx (n, 3)`` are the images of the antennas [m]; ``places (place, 3)`` those from
+    which visibility is asked, with weights ``tx_weight (tx, place)`` and ``rx_weight (rx, place)``.
+    ``middles (2, 3)`` are the images of the array's middle over both legs.
+    """
+
+    def __init__(
+        self, radar: Radar, path: WallPath, walls: WallResponse, past: Past | None
+    ) -> None:
+        self.path, self._radar, self._walls, self._past = path, radar, walls, past
+        self._sides: tuple[tuple[Leg, Antenna | None], ...] = (
+            (path.out, radar.tx_antenna),
+            (path.back, radar.rx_antenna),
+        )
+        self.tx, self.rx = images(path.out, radar.tx), images(path.back, radar.rx)
+        self._real, self.tx_weight, self.rx_weight = shadow_nodes(radar)
+        self._sends: Bools = np.any(self.tx_weight != 0, axis=0)
+        self.places = np.where(
+            self._sends[:, None], images(path.out, self._real), images(path.back, self._real)
+        )
+        position = np.array(radar.position_m)
+        self.middles = np.stack([images(leg, position) for leg, _ in self._sides])
+
+    def seen(self, time_s: float, points: Array, asked: Bools, *, others: bool = False) -> Bools:
+        """Which points (point, 3) [m] are free for each place at a time [s], of those ``asked``.
+
+        Both are (place, point). With ``others`` the object does not hide itself.
+        """
+        free = asked.copy()
+        for leg, own in ((self.path.out, self._sends), (self.path.back, ~self._sends)):
+            places = np.flatnonzero(own)
+            along, extent = self._walls.edges.leg(leg, self._real[places, None], points)
+            open_ = free[places] & (extent != 0)
+            for origins, targets in pairwise(along):
+                start, end, _ = np.broadcast_arrays(origins, targets, open_[..., None])
+                open_[open_] = self._clear(time_s, start[open_], end[open_], others)
+            free[places] = open_
+        return free
+
+    def _clear(self, time_s: float, origins: Array, targets: Array, others: bool) -> Bools:
+        if self._past is None or len(origins) == 0:
+            return np.ones(len(origins), dtype=bool)
+        body, people = self._past.body, self._past.people
+        room = self._past.others if others else self._past.room
+        room.pose(time_s)
+        clear = ~room.blocked(origins, targets)
+        poses = body.at([min(max(time_s, 0.0), body.duration_s)])
+        people.pose(poses.centres[0], poses.frames[0])
+        on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
+        clear[clear] = people.sees(origins[clear], targets[clear], on_none)
+        return clear
+
+    def longer_m(self, point: Array) -> float:
+        """Length that slabs add to the strongest wave over both legs to a point (3,) [m]."""
+        total = 0.0
+        for leg, antenna in self._sides:
+            waves, _ = self._waves(leg, antenna, point[None])
+            powers = [float((np.abs(field) ** 2).sum()) for _, field in waves]
+            total += float(waves[int(np.argmax(powers))][0][0])
+        return total
+
+    def factor(self, points: Array, normals: Array, made_of: Material, longer_m: float) -> Field:
+        """Field of facets over that of a conductor between isotropic antennas, (node, facet).
+
+        ``points`` are their middles and ``normals (facet, 3)`` unit vectors, world [m]. The phase
+        of a length ``longer_m`` is taken out; waves that come much earlier or later are left out.
+        """
+        (sent, going), (received, coming) = (
+            self._waves(leg, antenna, points) for leg, antenna in self._sides
+        )
+        normal = bisector(-going, -coming)
+        radar = self._radar
+        k = 2 * np.pi * self._walls.frequency[:, None] / SPEED_OF_LIGHT_MPS
+        apart = _TOGETHER * SPEED_OF_LIGHT_MPS / radar.bandwidth_hz
+        total = np.zeros((len(k), len(points)), dtype=np.complex128)
+        for extra_out, field in sent:
+            turned = 2 * np.sum(field * normal, axis=-1, keepdims=True) * normal - field
+            for extra_back, own in received:
+                extra = extra_out + extra_back - longer_m
+                near = np.abs(extra) <= apart
+                # A conductor at normal incidence counts as +1: that the field is reversed is in
+                # the sign.
+                total -= near * np.exp(-1j * k * extra) * np.sum(own * turned, axis=-1)
+        if made_of.conducts:
+            return total
+        way = -normal
+        cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)
+        across = unit(np.cross(way, normals))
+        te = np.sum(antenna_field(way, radar.polarization) * across, axis=-1) ** 2
+        eta = made_of.eta(np.array([radar.centre_frequency_hz]))
+        in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+        # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
+        return np.asarray(total * (in_tm - te * (in_te + in_tm)))
+
+    def _waves(
+        self, leg: Leg, antenna: Antenna | None, points: Array
+    ) -> tuple[list[tuple[Array, Field]], Array]:
+        """Waves from the array's middle to points: extra lengths and fields, and where they go.
+
+        Lengths (point,) [m], fields (node, point, 3), and the direction of arrival (point, 3).
+        """
+        radar, middle = self._radar, np.array(self._radar.position_m)
+        along, extent = self._walls.edges.leg(leg, middle, points)
+        ways = [unit(targets - origins) for origins, targets in pairwise(along)]
+        field = antenna_field(ways[0], radar.polarization) * extent[..., None]
+        if antenna is not None:
+            field = field * np.sqrt(antenna.relative(ways[0], radar.polarization))[..., None]
+        waves = self._walls.along(leg, along, ways, field)
+        return [(wave.extra_m, wave.field) for wave in waves], ways[-1]
