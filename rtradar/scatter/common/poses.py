@@ -56,7 +56,9 @@ class EchoModel(Protocol):
     """
 
     @property
-    def variant(self) -> str | None: ...  # noqa: D102
+    def variant(self) -> str | None:
+        """Backend that traces."""
+        ...
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes at some chirps.
