@@ -15,7 +15,7 @@ sweep shows elsewhere, and weakly: it is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -56,7 +56,8 @@ class WallEdges:
         self.wavelength_m, self.resolution_m = wavelength_m, resolution_m
 
     @classmethod
-    def of(cls, walls: Sequence[Wall], radar: Radar) -> WallEdges:
+    @lru_cache(maxsize=8)
+    def of(cls, walls: tuple[Wall, ...], radar: Radar) -> WallEdges:
         """Make those for the sweep of a radar."""
         light = SPEED_OF_LIGHT_MPS
         return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz)
