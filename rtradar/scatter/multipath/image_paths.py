@@ -51,11 +51,13 @@ class WallPath:
         return " > ".join([*out, "body", *reversed(back)])
 
 
-def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPath, ...]:
+def wall_paths(
+    walls: Sequence[Wall], place: Array, order: int, others: Sequence[Face] = ()
+) -> tuple[WallPath, ...]:
     """List all paths with up to ``order`` reflections at walls, the direct one first.
 
     The middle of the array, ``place (3,)`` [m], or its image, settles which face of a wall
-    reflects.
+    reflects. Each of the ``others``, faces of furniture, reflects once on a path, without walls.
     """
     legs: list[Leg] = [()]
     for depth in range(1, order + 1):
@@ -66,7 +68,9 @@ def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPat
             for wall in walls
             if not leg or leg[-1].wall is not wall
         ]
-    paths = (WallPath(*both) for both in product(legs, legs))
+    paths = [WallPath(*both) for both in product(legs, legs)]
+    for face in others if order else ():
+        paths += [WallPath((), (face,)), WallPath((face,), ())]
     return tuple(
         sorted((path for path in paths if path.order <= order), key=lambda path: path.order)
     )

@@ -21,7 +21,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scene import Material, Wall, slab
-from rtradar.scene.slab import Polarization, slab_passes
+from rtradar.scene.slab import Polarization, reflection, slab_passes
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -42,12 +42,13 @@ class Term:
 
     ``passes`` through the slab are odd for transmission, even for reflection; ``rest`` says whether
     the term holds all later terms too. ``index_squared`` is the squared index of refraction for the
-    delay that is taken out; 0 for none.
+    delay that is taken out; 0 for none. A ``solid`` has no far face.
     """
 
     passes: int
     rest: bool
     index_squared: float = 0.0
+    solid: bool = False
 
     @property
     def whole(self) -> bool:
@@ -71,6 +72,8 @@ class Term:
 
         A transmitted field is relative to that after the same way through air.
         """
+        if self.solid:
+            return reflection(wall.material.eta(frequency), cosine, polarization)
         arguments = wall.material.eta(frequency), wall.thickness_m, frequency, cosine, polarization
         if self.whole:
             factor = slab(*arguments)[self.passes % 2]
@@ -93,6 +96,10 @@ class WallSeries(NamedTuple):
 
     terms: tuple[tuple[Term, ...], tuple[Term, ...]]
     held: tuple[bool, bool]
+
+
+HALF_SPACE = WallSeries(((Term(0, rest=True, solid=True),), ()), (True, True))
+"""The surface of a solid, through which nothing passes."""
 
 
 class RoomSeries(NamedTuple):

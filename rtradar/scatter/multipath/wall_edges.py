@@ -24,6 +24,7 @@ from scipy.special import fresnel
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
+from rtradar.scatter.multipath.furniture_faces import SolidFace
 from rtradar.scatter.multipath.image_paths import Leg, corners, height, image, image_chain
 from rtradar.scene import Wall
 
@@ -45,29 +46,38 @@ class Sides(NamedTuple):
 
 
 class WallEdges:
-    """The walls of a room with their edges, for the sweep of a radar.
+    """The walls of a room, and faces of furniture, with their edges, for the sweep of a radar.
 
     Edges count at the wavelength in the middle of the sweep, ``wavelength_m``; its range resolution
-    ``resolution_m`` is c / B, of the whole path.
+    ``resolution_m`` is c / B, of the whole path. ``surfaces`` are the walls, then the faces.
     """
 
-    def __init__(self, walls: Sequence[Wall], wavelength_m: float, resolution_m: float) -> None:
+    def __init__(
+        self,
+        walls: Sequence[Wall],
+        wavelength_m: float,
+        resolution_m: float,
+        faces: Sequence[SolidFace] = (),
+    ) -> None:
         self.walls = tuple(walls)
+        self.surfaces: tuple[Wall, ...] = (*self.walls, *faces)
         self.wavelength_m, self.resolution_m = wavelength_m, resolution_m
 
     @classmethod
     @lru_cache(maxsize=8)
-    def of(cls, walls: tuple[Wall, ...], radar: Radar) -> WallEdges:
+    def of(
+        cls, walls: tuple[Wall, ...], radar: Radar, faces: tuple[SolidFace, ...] = ()
+    ) -> WallEdges:
         """Make those for the sweep of a radar."""
         light = SPEED_OF_LIGHT_MPS
-        return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz)
+        return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz, faces)
 
     @cached_property
     def _sides(self) -> tuple[tuple[Sides, ...], ...]:
         """The rectangle of each wall, then its openings."""
         return tuple(
             tuple(Sides(ends, _free(wall, ends, self.walls)) for ends in _rectangles(wall))
-            for wall in self.walls
+            for wall in self.surfaces
         )
 
     def leg(
@@ -84,7 +94,7 @@ class WallEdges:
         sources = np.broadcast_arrays(*image_chain(leg, antennas), points)[1:-1]
         ends = np.broadcast_to(points, along[0].shape)
         for face, source in zip(reversed(leg), reversed(sources), strict=True):
-            number = self.walls.index(face.wall)
+            number = self.surfaces.index(face.wall)
             weight[valid] *= self.weight(
                 number, source[valid], ends[valid], back=face.back, margin_m=margin_m
             )
@@ -123,12 +133,13 @@ class WallEdges:
         The straight legs from sources to targets (leg, 3) [m] cross the plane of the front, or of
         the back; in a reflection sources are images.
         """
-        wall = self.walls[number]
+        wall = self.surfaces[number]
         source, target = (_on_face(wall, points, back) for points in (sources, targets))
         total, *openings = (
             self._between(sides, source, target, margin_m) for sides in self._sides[number]
         )
-        return np.asarray(total - sum(openings))
+        filled = wall.fraction if isinstance(wall, SolidFace) else 1.0
+        return np.asarray(filled * (total - sum(openings)))
 
     def _between(self, sides: Sides, source: Array, target: Array, margin_m: float) -> Field:
         """The same for one rectangle; source and target (3, leg) are in the axes of the face."""

@@ -89,7 +89,7 @@ class Wave(NamedTuple):
 
 
 class WallResponse(NamedTuple):
-    """The edges of all walls, the series of their slabs, and the frequencies of the nodes [Hz]."""
+    """The edges of all surfaces, the series of each, and the frequencies of the nodes [Hz]."""
 
     edges: WallEdges
     series: Sequence[WallSeries]
@@ -116,7 +116,7 @@ class WallResponse(NamedTuple):
         waves = self.start(field)
         for section, (origins, targets) in enumerate(pairwise(corners)):
             if section:
-                wall = self.walls.index(leg[section - 1].wall)
+                wall = self.edges.surfaces.index(leg[section - 1].wall)
                 waves = self.reflected(wall, section, waves, directions[section - 1])
             waves = self.transmitted(section, waves, origins, targets)
         return waves
@@ -124,9 +124,9 @@ class WallResponse(NamedTuple):
     def reflected(self, number: int, section: int, waves: Waves, directions: Array) -> Waves:
         """Reflect waves, which travel along ``directions (..., 3)``, before a section of a leg.
 
-        Each becomes one wave for each term of the wall with this number.
+        Each becomes one wave for each term of the surface with this number.
         """
-        wall = self.walls[number]
+        wall = self.edges.surfaces[number]
         cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
         out = []
         for passages, extra, field in waves:

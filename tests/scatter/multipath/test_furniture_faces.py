@@ -1,0 +1,105 @@
+"""Faces of furniture: which there are, and what is seen over them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from rtradar.radar import Radar
+from rtradar.scatter.echo_models import build_model
+from rtradar.scatter.multipath.furniture_faces import faces_of, reflecting_faces
+from rtradar.scene import Furniture, Scene, Wall, material, reflection
+from rtradar.trace.backends.backend import Backend
+
+RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+
+
+def block(folder: Path, size: tuple[float, float, float], made: str = "metal", **at: Any) -> Any:
+    path = folder / "block.ply"
+    trimesh.creation.box(size).export(path)
+    return Furniture("block", path, material(made), metres_per_unit=1.0, **at)
+
+
+def test_a_turned_block_has_six_faces_where_its_sides_are(tmp_path: Path) -> None:
+    size, yaw, place = np.array([0.4, 1.0, 2.0]), 30.0, np.array([1.0, 2.0, 1.0])
+    piece = block(tmp_path, tuple(size), yaw_deg=yaw, position_m=tuple(place))
+    faces = {face.name: face for face in faces_of(piece)}
+    turn = piece.yaw
+    for axis, (plus, minus) in enumerate((("front", "back"), ("left", "right"), ("top", "bottom"))):
+        for sign, side in ((1, plus), (-1, minus)):
+            face = faces.pop(f"block {side}")
+            outward = sign * turn[:, axis]
+            np.testing.assert_allclose(face.normal, outward, atol=1e-12)
+            middle = place + outward * size[axis] / 2
+            np.testing.assert_allclose(face.corners.mean(axis=0), middle, atol=1e-6)
+            assert face.area_m2 == pytest.approx(np.prod(size) / size[axis], rel=1e-6)
+            assert face.fraction == pytest.approx(1.0, abs=1e-6)
+    assert not faces
+
+
+def test_the_wardrobe_has_three_doors_and_a_round_table_no_side() -> None:
+    wardrobe = Furniture("wardrobe", "wardrobe", material("wood"), position_m=(0, 0, 0))
+    doors = [face for face in faces_of(wardrobe) if face.name.startswith("wardrobe front")]
+    large = [face for face in doors if face.area_m2 > 0.5]
+    assert [face.name for face in large] == [
+        "wardrobe front", "wardrobe front 2", "wardrobe front 3",
+    ]  # fmt: skip
+    lamp = Furniture("lamp", "lamp", material("metal"), position_m=(0, 0, 0))
+    assert not [face for face in faces_of(lamp) if face.area_m2 > 0.05]
+
+
+def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path) -> None:
+    # The front of the block looks at radar and body; nothing is seen over its other faces.
+    points = np.array([[0.0, 0.0, 1.0], [0.1, 0.2, 1.3]])
+    for made, place, names in (
+        ("metal", (-2.6, 2.2, 1.0), ["block right"]),
+        # Out of the way.
+        ("metal", (-2.6, 2.2, 4.0), []),
+        ("vacuum", (-2.6, 2.2, 1.0), []),
+    ):
+        piece = block(tmp_path, (1.0, 0.3, 1.5), made, position_m=place)
+        scene = Scene(furniture=(piece,))
+        assert [face.wall.name for face in reflecting_faces(scene, RADAR, points, None)] == names
+    # 6 cm are less than a zone.
+    thin = block(tmp_path, (1.0, 0.3, 0.06), position_m=(-2.6, 2.2, 1.0))
+    assert not reflecting_faces(Scene(furniture=(thin,)), RADAR, points, None)
+
+
+@pytest.mark.parametrize("made", ["perfect-conductor", "wood"])
+def test_a_large_face_reflects_as_a_wall_of_the_same_material(
+    made: str, tmp_path: Path, backend: Backend, one: Any
+) -> None:
+    # A block as large as a wall, in whose front the wall is; wood without end against a conductor.
+    piece = block(tmp_path, (12.0, 0.4, 12.0), made, position_m=(-2.0, 2.2, 0.0))
+    wall = Wall(
+        name="wall",
+        corner_m=(-8.0, 2.0, -6.0),
+        edge_u_m=(12.0, 0.0, 0.0),
+        edge_v_m=(0.0, 0.0, 12.0),
+        material=material("perfect-conductor"),
+        thickness_m=0.1,
+    )
+    body = one((0.1, 0.1, 0.1), (0.0, 0.3, 1.0))
+    found = {}
+    for name, scene in {
+        "block right": Scene(furniture=(piece,)),
+        "wall": Scene(walls=(wall,)),
+    }.items():
+        model = build_model("specular", RADAR, body, scene=scene, variant=backend.kind)
+        assert [path.name for path in model.paths] == ["body", f"body > {name}", f"{name} > body"]
+        echoes = model.echoes(np.arange(1))
+        index = model.path_names.index(f"body > {name}")
+        middle = echoes.amplitude.shape[0] // 2
+        found[name] = echoes.length[0, 0, index], echoes.amplitude[middle, 0, 0, index]
+    (length, amplitude), (expected, mirrored) = found.values()
+    # The file holds the block in float32.
+    assert length == pytest.approx(expected, abs=1e-7)
+    # Body and radar are as high as each other: v is TE. The body turns the field with both alike.
+    image = np.array([-4.0, 3.0, 1.0])
+    way = np.array([0.0, 0.3, 1.0]) - image
+    eta = piece.material.eta(RADAR.centre_frequency_hz)
+    te = complex(reflection(eta, abs(way[1]) / np.linalg.norm(way), "te"))
+    # The specular point on the body, 0.1 m from its middle, changes the angle by this.
+    assert amplitude == pytest.approx(-np.conj(te) * mirrored, rel=0.02)
