@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body import Body
 from rtradar.radar import Radar
 from rtradar.scatter.multipath.image_paths import Face, corners, height
-from rtradar.scatter.multipath.slab_series import HALF_SPACE, POLARIZATIONS, WallSeries
+from rtradar.scatter.multipath.slab_series import POLARIZATIONS
 from rtradar.scene import Furniture, Scene, Wall, reflection
 from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
 
+_TIMES = 50
+"""Number of poses at which faces are looked for."""
 FAINT_DB = 40.0
 """Faces whose ghosts are expected further below the direct echoes are left out [dB]."""
 _FILLED = 0.9
@@ -48,22 +51,19 @@ class SolidFace(Wall):
     def _check_slab(self, where: str) -> None:
         """A half-space has no thickness to be checked."""
 
-    @property
-    def series(self) -> WallSeries:
-        """Return what it does to a wave."""
-        return HALF_SPACE
-
 
 def reflecting_faces(
-    scene: Scene, radar: Radar, points: Array, room: RoomTracer | None
+    scene: Scene, radar: Radar, body: Body, room: RoomTracer | None
 ) -> tuple[Face, ...]:
-    """Find the faces of furniture over which the radar may see any of some points (..., 3) [m].
+    """Find the faces of furniture over which the radar may see parts of a body at some time.
 
     Their specular points, for the middle of the array, lie on the face, the face is as wide as the
     radius of the Fresnel zone, furniture leaves both legs free, and the ghosts are not expected
-    more than `FAINT_DB` below the direct echoes, in the mean over the points.
+    more than `FAINT_DB` below the direct echoes, in the mean over the parts and
+    `_TIMES` poses.
     """
-    place, points = np.asarray(radar.position_m, dtype=np.float64), points.reshape(-1, 3)
+    place = np.asarray(radar.position_m, dtype=np.float64)
+    points = body.at(np.linspace(0.0, body.duration_s, _TIMES)).centres.reshape(-1, 3)
     found = []
     for piece in scene.furniture:
         for own in faces_of(piece):

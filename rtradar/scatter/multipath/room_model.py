@@ -30,13 +30,13 @@ from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
-from rtradar.scatter.multipath.furniture_faces import SolidFace, reflecting_faces
-from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
+from rtradar.scatter.multipath.furniture_faces import reflecting_faces
+from rtradar.scatter.multipath.image_paths import corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
-from rtradar.scatter.multipath.slab_series import room_series
+from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -60,9 +60,6 @@ _ENOUGH, _MOST_NODES = 0.015, 3
 
 _KEPT_BYTES = 64e6
 """Memory of the keyframes that stay, so that pruning and the signal trace once: 10 s in a box."""
-
-_TIMES = 50
-"""Number of poses at which faces of furniture are looked for."""
 
 _KEYFRAMES_AT_ONCE = 32
 _CHIRPS_AT_ONCE = 64
@@ -150,14 +147,10 @@ class RoomModel:
         if level.traces:
             backend = use(select(conductor.variant or "auto"))
             tracers = BodyTracer(backend, body.semi_axes), RoomTracer(backend, scene)
-        faces = _faces(scene, radar, body, tracers[1] if tracers else None) if order else ()
+        faces = reflecting_faces(scene, radar, body, tracers and tracers[1]) if order else ()
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order, faces)
-        solids = tuple(face.wall for face in faces if isinstance(face.wall, SolidFace))
-        walls = WallResponse(
-            WallEdges.of(scene.walls, radar, solids),
-            (*series.walls, *(solid.series for solid in solids)),
-            series.frequency,
-        )
+        every = *series.walls, *(HALF_SPACE,) * len(faces)
+        walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages(radar, self.paths)
         self._columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         self._around = Surroundings(
@@ -387,12 +380,6 @@ class RoomModel:
             )
         )
         return summaries
-
-
-def _faces(scene: Scene, radar: Radar, body: Body, room: RoomTracer | None) -> tuple[Face, ...]:
-    """Faces of furniture over which the radar may see the body at some time."""
-    times = np.linspace(0.0, body.duration_s, _TIMES)
-    return reflecting_faces(scene, radar, body.at(times).centres, room)
 
 
 def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:

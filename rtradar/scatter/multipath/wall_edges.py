@@ -25,7 +25,7 @@ from scipy.special import fresnel
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.multipath.furniture_faces import SolidFace
-from rtradar.scatter.multipath.image_paths import Leg, corners, height, image, image_chain
+from rtradar.scatter.multipath.image_paths import Face, Leg, corners, height, image, image_chain
 from rtradar.scene import Wall
 
 Array = NDArray[np.float64]
@@ -57,17 +57,15 @@ class WallEdges:
         walls: Sequence[Wall],
         wavelength_m: float,
         resolution_m: float,
-        faces: Sequence[SolidFace] = (),
+        faces: Sequence[Face] = (),
     ) -> None:
         self.walls = tuple(walls)
-        self.surfaces: tuple[Wall, ...] = (*self.walls, *faces)
+        self.surfaces = (*self.walls, *(face.wall for face in faces))
         self.wavelength_m, self.resolution_m = wavelength_m, resolution_m
 
     @classmethod
     @lru_cache(maxsize=8)
-    def of(
-        cls, walls: tuple[Wall, ...], radar: Radar, faces: tuple[SolidFace, ...] = ()
-    ) -> WallEdges:
+    def of(cls, walls: tuple[Wall, ...], radar: Radar, faces: tuple[Face, ...] = ()) -> WallEdges:
         """Make those for the sweep of a radar."""
         light = SPEED_OF_LIGHT_MPS
         return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz, faces)

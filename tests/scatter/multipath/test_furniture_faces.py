@@ -50,9 +50,9 @@ def test_the_wardrobe_has_three_doors_and_a_round_table_no_side() -> None:
     assert not [face for face in faces_of(lamp) if face.area_m2 > 0.05]
 
 
-def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path) -> None:
+def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: Any) -> None:
     # The front of the block looks at radar and body; nothing is seen over its other faces.
-    points = np.array([[0.0, 0.0, 1.0], [0.1, 0.2, 1.3]])
+    body = one(centre=(0.0, 0.1, 1.1))
     for made, place, names in (
         ("metal", (-2.6, 2.2, 1.0), ["block right"]),
         # Out of the way.
@@ -61,10 +61,10 @@ def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path) -> No
     ):
         piece = block(tmp_path, (1.0, 0.3, 1.5), made, position_m=place)
         scene = Scene(furniture=(piece,))
-        assert [face.wall.name for face in reflecting_faces(scene, RADAR, points, None)] == names
+        assert [face.wall.name for face in reflecting_faces(scene, RADAR, body, None)] == names
     # 6 cm are less than a zone.
     thin = block(tmp_path, (1.0, 0.3, 0.06), position_m=(-2.6, 2.2, 1.0))
-    assert not reflecting_faces(Scene(furniture=(thin,)), RADAR, points, None)
+    assert not reflecting_faces(Scene(furniture=(thin,)), RADAR, body, None)
 
 
 @pytest.mark.parametrize("made", ["perfect-conductor", "wood"])
