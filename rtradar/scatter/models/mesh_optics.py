@@ -69,6 +69,7 @@ class MeshOptics(PhysicalOptics):
         unevenness: float = 0.02,
         frequencies: int = 3,
     ) -> None:
+        self._look_s = anchor_s
         super().__init__(
             radar,
             body,
@@ -82,7 +83,12 @@ class MeshOptics(PhysicalOptics):
 
     def _surface_of(self, variant: str, facets: int | None, nodes: int) -> SkinFacets:
         return SkinFacets(
-            self._radar, self._body, variant=variant, spreading=self._spreading, nodes=nodes
+            self._radar,
+            self._body,
+            variant=variant,
+            spreading=self._spreading,
+            nodes=nodes,
+            look_s=self._look_s,
         )
 
     def _carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
@@ -133,7 +139,12 @@ class MeshReference(BuiltInModel):
     ) -> None:
         self._radar, self._body = radar, body
         self._surface = SkinFacets(
-            radar, body, variant=variant, spreading=spreading, nodes=_REFERENCE_NODES
+            radar,
+            body,
+            variant=variant,
+            spreading=spreading,
+            nodes=_REFERENCE_NODES,
+            look_s=radar.cycle_duration_s,
         )
         self.variant: str | None = self._surface.variant
 
