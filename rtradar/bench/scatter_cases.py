@@ -363,7 +363,7 @@ def _between_knots(k: Any) -> Calls:
     "scatter.silhouettes.occluded_fractions", "shadow of 4 parts on 20 legs, 400 lines", 3e-3
 )
 def _occluded_fractions(k: Any) -> Calls:
-    rng, table = np.random.default_rng(1), k.wave_table()
+    rng, table = np.random.default_rng(1), k.wave_table(0.1)
     starts = np.array([-4.0, 0, 1.0]) + rng.uniform(-0.3, 0.3, (20, 3))
     ends = np.array([3.0, 0, 1.2]) + rng.uniform(-0.5, 0.5, (20, 3))
     length = np.linalg.norm(ends - starts, axis=1)
@@ -373,8 +373,8 @@ def _occluded_fractions(k: Any) -> Calls:
     given = (starts, ends, np.zeros(20), 1.3 * length), 0.0214, (centres, maps, axes.max(axis=1))
     scales = np.array([0.87, 1.13])
     out = np.empty((20, 2), dtype=np.complex128)
-    call = filled(k.occluded_fractions, *given, 400, scales, table, out=(out,))
-    return call, lambda: (k.occluded_fractions_reference(*given, scales),)
+    call = filled(k.occluded_fractions, *given, 4.0, 400, scales, table, out=(out,))
+    return call, lambda: (k.occluded_fractions_reference(*given, scales, 0.1),)
 
 
 @kernel_case("still_room.add_blended", "four keyframes of a room, blended over 500 chirps", 1e-5)

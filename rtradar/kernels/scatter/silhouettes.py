@@ -24,10 +24,6 @@ from rtradar.kernels.jit import compiled, inlined
 Indices = NDArray[np.int64]
 Field = NDArray[np.complex128]
 
-FADE = 0.1
-"""Damping ``eps``: an edge two Fresnel radii aside has lost two thirds of its fringes."""
-REACH = 3.5
-"""Offset beyond which parts are left out, in Fresnel radii: their fringes are below 0.1 %."""
 _FAR = 4.0
 _STEPS = 64
 """Entries of the table of the integrand for each unit of a squared radius."""
@@ -48,10 +44,10 @@ class Shadow(NamedTuple):
     of_mirror: Field
 
 
-def wave_table():
-    """Table of exp((j - eps) pi x) for x from 0 on, in steps of 1 / `_STEPS`."""
+def wave_table(fade):
+    """Table of exp((j - fade) pi x) for x from 0 on, in steps of 1 / `_STEPS`."""
     x = np.arange(int(_FAR**2 * _STEPS) + 2) / _STEPS
-    return np.exp((1j - FADE) * np.pi * x)
+    return np.exp((1j - fade) * np.pi * x)
 
 
 @inlined(fastmath={"contract"})
@@ -70,7 +66,7 @@ def _crossing(rho, scales, table, sign, out):
 
 
 @inlined(fastmath={"contract"})
-def _near_parts(start, way, size, before, length, wavelength, body, near):
+def _near_parts(start, way, size, before, length, wavelength, reach, body, near):
     """Find the parts near a leg: their silhouettes' quadratic forms (part, 6); return how many."""
     centres, maps, longest = body
     # Two unit vectors across the leg.
@@ -101,7 +97,7 @@ def _near_parts(start, way, size, before, length, wavelength, body, near):
         gap = math.sqrt(max(g0 * g0 + g1 * g1 + g2 * g2 - along * along, 0.0))
         past = before + min(max(along, 0.0), size)
         zone = math.sqrt(wavelength * past * max(length - past, 0.0) / length)
-        if gap > longest[part] + REACH * zone:
+        if gap > longest[part] + reach * zone:
             continue
         m = maps[part]
         for i in range(3):
@@ -177,12 +173,13 @@ def _over_line(cosine, sine, half, near, count, lows, highs):
 
 
 @compiled(fastmath={"contract"})
-def occluded_fractions(legs, wavelength, body, lines, scales, table, out):
+def occluded_fractions(legs, wavelength, body, reach, lines, scales, table, out):
     """Fill in the occluded fraction (leg, node) complex of legs past a posed body.
 
     ``legs`` are starts and ends (leg, 3), the path before the start and that of the whole (leg,)
     [m]; ``body`` is centres (part, 3), the maps (part, 3, 3) to the axes where each part is the
-    unit sphere, and the largest semi-axes (part,) [m]. The integral is taken over ``lines`` lines
+    unit sphere, and the largest semi-axes (part,) [m]. Parts are left out that are farther from a
+    leg than ``reach`` Fresnel radii. The integral is taken over ``lines`` lines
     through each leg; ``scales (node,)`` are frequencies over that of the wavelength, ``table`` is
     that of `wave_table`.
     """
@@ -206,7 +203,7 @@ def occluded_fractions(legs, wavelength, body, lines, scales, table, out):
         own = out[leg]
         own[:] = 0
         count = _near_parts(
-            starts[leg], way, size, before[leg], length[leg], wavelength, body, near
+            starts[leg], way, size, before[leg], length[leg], wavelength, reach, body, near
         )
         if count == 0:
             continue
@@ -217,7 +214,7 @@ def occluded_fractions(legs, wavelength, body, lines, scales, table, out):
                 _crossing(lows[i], scales, table, -0.5 / lines, own)
 
 
-def occluded_fractions_reference(legs, wavelength, body, scales, step=0.01):
+def occluded_fractions_reference(legs, wavelength, body, scales, fade, step=0.01):
     """`occluded_fractions` by a sum over a grid of offsets, which it has to converge to."""
     across, found = np.arange(-_FAR, _FAR, step) + step / 2, []
     for start, end, before, length in zip(*legs, strict=True):
@@ -233,6 +230,6 @@ def occluded_fractions_reference(legs, wavelength, body, scales, step=0.01):
             offset = x - zone * plane @ to_sphere.T
             covered |= (offset**2).sum(axis=-1) - (offset @ y) ** 2 / (y @ y) <= 1
         square = np.add.outer(across**2, across**2)[covered]
-        wave = [np.exp((1j - FADE) * np.pi * square * scale).sum() * scale for scale in scales]
-        found.append((FADE - 1j) * step**2 * np.array(wave))
+        wave = [np.exp((1j - fade) * np.pi * square * scale).sum() * scale for scale in scales]
+        found.append((fade - 1j) * step**2 * np.array(wave))
     return np.array(found)

@@ -8,7 +8,8 @@ a half where it is in the middle. An echo keeps the product of what its legs kee
 reflect every leg of every Tx and Rx is computed, at `SWEEP_NODES` frequencies, for zones narrow
 over the sweep. Points on furniture and on rough walls, which all antennas share, are many and weak:
 the fraction is that at the sweep's centre and at the ends of each line of Tx and the middle of each
-of Rx, linear in between. Nobody is seen past an edge here, so no ray is traced.
+of Rx, linear in between; for the weakest it is that in the array's middle. Nobody is seen past an
+edge here, so no ray is traced.
 """
 
 from __future__ import annotations
@@ -36,15 +37,23 @@ Indices = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _SHORTEST_M = 1e-6
-KEYFRAMES_S = 20e-3
+KEYFRAMES_S = 12.5e-3
 """Keyframe spacing of the body shadow [s]. `validation/other_methods/shadow.py` has the error of
 interpolating between them."""
 _KEPT_KEYFRAMES = 8
 """Keyframes in the cache: those on both sides of a chirp, and a few before."""
 SWEEP_NODES = 5
 """Frequencies at which the shadow of what walls reflect is computed."""
-MIRROR_LINES, POINT_LINES = 48, 8
-"""Lines through a leg over which Kirchhoff's integral is taken: an error of 0.4 % and of 6 %."""
+MIRROR_LINES, POINT_LINES = 48, 12
+"""Lines through a leg over which Kirchhoff's integral is taken: an error of 0.4 % and of 3 %."""
+MIRROR_FADE, POINT_FADE = 0.1, 0.3
+"""Damping ``eps`` of the integral: what a mirror loses to an edge two Fresnel radii aside is less
+by two thirds. A point stands for facets or a cell as wide as such a zone, which sees no fringes."""
+MIRROR_REACH, POINT_REACH = 3.5, 2.0
+"""Fresnel radii beyond which parts are left out: fringes are then below 0.2 %."""
+_WEAK = 0.03
+"""Power of the points seen from the array's middle only, over that of all that the body may come
+near."""
 _FAINT = 2e-3
 """Power of the points whose shadow is left out, over that of all that the body may come near."""
 _TRACK_S, _MOST_INSTANTS = 0.1, 200
@@ -90,7 +99,7 @@ class ClutterShadow:
         """Which mirrors are occluded, and what of each is lost (node, tx, rx, mirror)."""
         legs, radar = self._legs, self._radar
         scales = self.frequency / radar.centre_frequency_hz
-        lost = self._lost(legs.geometry, body, MIRROR_LINES, scales)
+        lost = self._lost(legs.geometry, body, MIRROR_REACH, MIRROR_LINES, scales, MIRROR_FADE)
         kept = np.ones((len(self.mirrors), radar.n_channels, SWEEP_NODES), dtype=np.complex128)
         some = np.flatnonzero(lost.any(axis=1))
         np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
@@ -102,14 +111,13 @@ class ClutterShadow:
         """Which echoes of shared points are occluded, and the fraction (tx, rx, echo)."""
         centres, _, longest = body
         near = np.flatnonzero(self._passes(*_ball(centres, longest)))
-        nodes = len(self._antennas)
-        starts = np.repeat(self._antennas, len(near), axis=0)
-        ends = np.tile(self._points[near], (nodes, 1))
-        length = np.linalg.norm(ends - starts, axis=1)
-        geometry = starts, ends, np.zeros(len(length)), length
-        lost = self._lost(geometry, body, POINT_LINES, np.ones(1))[:, 0].reshape(nodes, -1)
-        some = lost.any(axis=0)
-        near, lost = near[some], lost[:, some]
+        from_middle = self._seen_from(self._middle[None], near, body)
+        some = from_middle[0] != 0
+        from_middle, near = from_middle[:, some], near[some]
+        strong = np.flatnonzero(self._strong[near])
+        from_nodes = self._seen_from(self._antennas, near[strong], body)
+        lost = np.repeat(from_middle, len(self._antennas), axis=0)
+        lost[:, strong] = from_nodes
         # Not by BLAS, whose threads cost more than these few numbers.
         of_tx, of_rx = (
             1 - np.einsum("an,ne->ae", weights, lost)
@@ -117,8 +125,23 @@ class ClutterShadow:
         )
         return self._of_point[near], 1 - of_tx[:, None] * of_rx[self._radar.rx_of_tx]
 
+    def _seen_from(self, antennas: Array, points: Indices, body: tuple[Array, ...]) -> Field:
+        """Fraction lost on the legs from places to some points (place, point)."""
+        starts = np.repeat(antennas, len(points), axis=0)
+        ends = np.tile(self._points[points], (len(antennas), 1))
+        length = np.linalg.norm(ends - starts, axis=1)
+        geometry = starts, ends, np.zeros(len(length)), length
+        lost = self._lost(geometry, body, POINT_REACH, POINT_LINES, np.ones(1), POINT_FADE)
+        return lost.reshape(len(antennas), len(points))
+
     def _lost(
-        self, legs: tuple[Array, ...], body: tuple[Array, ...], lines: int, scales: Array
+        self,
+        legs: tuple[Array, ...],
+        body: tuple[Array, ...],
+        reach: float,
+        lines: int,
+        scales: Array,
+        fade: float,
     ) -> Field:
         """Fraction of the field that the body takes from each leg (leg, node)."""
         out = np.zeros((len(legs[0]), len(scales)), dtype=np.complex128)
@@ -126,7 +149,7 @@ class ClutterShadow:
         def fill(begin: int) -> None:
             some = slice(begin, begin + _LEGS_A_THREAD)
             own = tuple(np.ascontiguousarray(array[some]) for array in legs)
-            given = self._radar.wavelength_m, body, lines, scales, _table()
+            given = self._radar.wavelength_m, body, reach, lines, scales, _table(fade)
             occluded_fractions(own, *given, out[some])
 
         thread_map(fill, range(0, len(out), _LEGS_A_THREAD))
@@ -141,8 +164,11 @@ class ClutterShadow:
         for centres in poses.centres:
             near |= self._passes(*_ball(centres, poses.semi_axes.max(axis=1)))
         order = np.flatnonzero(near)[np.argsort(power[near])]
-        faint = np.cumsum(power[order]) < _FAINT * power[order].sum()
-        chosen = np.sort(order[~faint])
+        share = np.cumsum(power[order]) / power[order].sum()
+        chosen = np.sort(order[share >= _FAINT])
+        strong = np.zeros(len(self._points), dtype=bool)
+        strong[order[share >= _WEAK]] = True
+        self._strong = strong[chosen]
         self._points, self._of_point = self._points[chosen], self._of_point[chosen]
         self._measure()
 
@@ -165,9 +191,9 @@ def _ball(centres: Array, longest: Array) -> tuple[Array, float]:
     return middle, float((np.linalg.norm(centres - middle, axis=1) + longest).max())
 
 
-@lru_cache(maxsize=1)
-def _table() -> Field:
-    return np.asarray(wave_table())
+@lru_cache
+def _table(fade: float) -> Field:
+    return np.asarray(wave_table(fade))
 
 
 def _shared_points(clutter: Clutter, starts: Indices) -> tuple[Array, Indices, Array]:

@@ -7,9 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.silhouettes import FADE
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.body_shadow import ClutterShadow
+from rtradar.scatter.clutter.body_shadow import MIRROR_FADE, ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 
@@ -73,8 +72,8 @@ def kirchhoff(offset: float, zone: float, ball: float) -> complex:
         cosine = (radius**2 + offset**2 - ball**2) / (2 * radius * offset)
     arc = 2 * np.arccos(np.clip(cosine, -1, 1))
     # Faded as a beam wide against the zone would.
-    wave = np.exp((1j - FADE) * np.pi * (radius / zone) ** 2)
-    return complex((FADE - 1j) * (arc * wave * radius).sum() * radius[0] * 2 / zone**2)
+    wave = np.exp((1j - MIRROR_FADE) * np.pi * (radius / zone) ** 2)
+    return complex((MIRROR_FADE - 1j) * (arc * wave * radius).sum() * radius[0] * 2 / zone**2)
 
 
 @pytest.mark.parametrize("keyframe", [0, 8, 14, 60])
