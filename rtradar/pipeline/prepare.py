@@ -83,6 +83,9 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         with processing.stages.time("room"):
             powers = budget.power, noise.power
             inside = indoors(around, radar, body, scene, settings, n_chirps, *powers)
+            if isinstance(model, World):
+                objects = model.prune(radar, n_chirps, 0.0 if settings.keep_all else noise.power)
+                inside = inside._replace(summary=inside.summary | {"objects": objects})
     return Capture(
         people=everyone,
         scene=scene,

@@ -251,7 +251,7 @@ class RigidEchoes:
             frequency=self.frequency,
             tx=tx,
             part=np.zeros(len(steps), dtype=np.int64),
-            bounces=bounces,
+            bounces=bounces + self.path.order,
         )
 
     def _pose(self, times: Array) -> tuple[Array, Array]:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model
+from rtradar.scatter.multipath.image_paths import wall_paths
+from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.rigid import RigidEchoes
 from rtradar.scatter.rigid_legs import Past
@@ -24,22 +28,32 @@ from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
+_INSTANTS = 8
+"""Chirps of a capture at which the power of an object over a wall is looked at."""
+
+LEAST_GHOST_DB = -25.0
+"""Power of a ghost over that of the object's direct echoes, below which it is left out: each takes
+as long as these."""
+
 
 class World:
     """The echoes of people, by the model ``person``, and those of moving objects.
 
-    The part of an object comes after the ``parts`` of the people, in the order of the objects.
-    ``limits`` are those of the objects.
+    The ``objects (object, path)`` answer over several paths, the direct one first. The part of an
+    object comes after the ``parts`` of the people, in the order of the objects. ``limits`` are
+    those of the objects.
     """
 
-    def __init__(self, person: EchoModel, parts: int, objects: Sequence[RigidEchoes]) -> None:
-        self.person, self.objects, self._parts = person, tuple(objects), parts
+    def __init__(
+        self, person: EchoModel, parts: int, objects: Sequence[Sequence[RigidEchoes]]
+    ) -> None:
+        self.person, self.objects, self._parts = person, list(map(list, objects)), parts
         self.variant = person.variant
 
     @property
     def limits(self) -> tuple[Limit, ...]:
         """Limits of validity that the objects come near or go past."""
-        return tuple(limit for own in self.objects for limit in own.limits)
+        return tuple(limit for own in self.objects for path in own for limit in path.limits)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
@@ -50,9 +64,42 @@ class World:
         chirps = np.asarray(chirps, dtype=np.int64)
         found = [self.person.echoes(chirps)]
         for number, own in enumerate(self.objects, start=self._parts):
-            echoes = own.echoes(chirps)
-            found.append(replace(echoes, part=echoes.part + number))
+            for path in own:
+                echoes = path.echoes(chirps)
+                found.append(replace(echoes, part=echoes.part + number))
         return together(found)
+
+    def prune(self, radar: Radar, n_chirps: int, noise_power_m2: float) -> list[dict[str, Any]]:
+        """Leave out ghosts of objects that are not worth their cost.
+
+        Left out are those that stay more than `MARGIN_DB` below the noise of an IF sample [m^2],
+        after the gain of a frame, or `LEAST_GHOST_DB` below the direct echoes of their object; of
+        noise 0 only what is never seen. Returned are the ``name`` of each object and its
+        ``paths``, with the ``path``, its ``power_m2`` and whether it is ``kept``.
+        """
+        gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
+        least = noise_power_m2 / gain * 10 ** (-MARGIN_DB / 10)
+        chirps = np.unique(np.linspace(0, n_chirps - 1, _INSTANTS).astype(np.int64))
+        found = []
+        for number, own in enumerate(self.objects):
+            powers = [_power(path, chirps) for path in own]
+            enough = max(least, powers[0] * 10 ** (LEAST_GHOST_DB / 10)) if least else 0.0
+            worth = [not place or 0 < power >= enough for place, power in enumerate(powers)]
+            rows = [
+                {"path": path.path.name.replace("body", "object"), "power_m2": power, "kept": kept}
+                for path, power, kept in zip(own, powers, worth, strict=True)
+            ]
+            found.append({"name": own[0].moving.name, "paths": rows})
+            self.objects[number] = [path for path, kept in zip(own, worth, strict=True) if kept]
+        return found
+
+
+def _power(path: RigidEchoes, chirps: NDArray[np.int64]) -> float:
+    """Power of the echoes [m^2], of which those next to each other add up as fields."""
+    echoes = path.echoes(chirps)
+    k = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
+    turns = np.exp(1j * k[:, None, None, None] * echoes.length)
+    return float((np.abs((echoes.amplitude * turns).sum(axis=3)) ** 2).mean())
 
 
 def build_world(
@@ -61,6 +108,7 @@ def build_world(
     body: Body,
     *,
     scene: Scene,
+    order: int = 1,
     variant: str = "auto",
     spreading: bool = True,
     **options: Any,
@@ -70,12 +118,12 @@ def build_world(
     Without objects it is what `build_model` makes, whose parameters and errors these are. A level
     that traces nothing lets nothing occlude an object either.
     """
-    given: dict[str, Any] = {"scene": scene, "variant": variant, "spreading": spreading, **options}
-    model = build_model(fidelity, radar, body, **given)
+    settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
+    model = build_model(fidelity, radar, body, spreading=spreading, **settled)
     if not scene.objects:
         return model
-    objects = []
-    tracers = None
+    objects, tracers = [], None
+    paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     if model.variant is not None:
         mi = use(select(variant))
         tracers = mi, RoomTracer(mi, scene), BodyTracer(mi, body.semi_axes)
@@ -85,10 +133,16 @@ def build_world(
             mi, room, people = tracers
             others = tuple(other for other in scene.objects if other is not moving)
             past = Past(mi, room, RoomTracer(mi, replace(scene, objects=others)), body, people)
-        own = RigidEchoes(
-            radar, moving, body.duration_s, past, walls=scene.walls, spreading=spreading
+        rigid = partial(
+            RigidEchoes,
+            radar,
+            moving,
+            body.duration_s,
+            past,
+            walls=scene.walls,
+            spreading=spreading,
         )
-        objects.append(own)
+        objects.append([rigid(path=path) for path in paths])
     return World(model, len(body.part_names), objects)
 
 

@@ -16,7 +16,7 @@ from rtradar.motion import place
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.rigid import RigidEchoes
-from rtradar.scatter.together import build_world, together
+from rtradar.scatter.together import World, build_world, together
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -221,3 +221,22 @@ def test_over_a_conducting_wall_it_is_its_mirror_image() -> None:
     found = field(RigidEchoes(RADAR, own, 0.1, None, walls=(behind,), path=path).echoes(chirp))
     expected = field(RigidEchoes(RADAR, mirrored, 0.1, None).echoes(chirp))
     np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())
+
+
+def test_ghosts_below_the_noise_or_far_below_their_object_are_left_out() -> None:
+    body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.05))
+    radar = dataclasses.replace(RADAR, position_m=(-2.0, 1.0, 1.0))
+    plate = dataclasses.replace(box(None), position_m=(0.5, 1.0, 1.0))
+    walls = (wall("perfect-conductor", 2.0, -1.0),)
+    scene = rt.Scene(walls=walls, objects=(plate,))
+    world = build_world("specular", radar, body, scene=scene)
+    assert isinstance(world, World)
+    (found,) = world.prune(radar, 300, 0.0)
+    # The wall behind it: over it the object is seen from its other side.
+    names = [row["path"] for row in found["paths"]]
+    assert names == ["object", "object > wall", "wall > object"]
+    powers = [row["power_m2"] for row in found["paths"]]
+    assert powers[1] == pytest.approx(powers[2], rel=0.05)
+    assert len(world.objects[0]) == sum(power > 0 for power in powers)
+    world.prune(radar, 300, 1e9)
+    assert [path.path.name for path in world.objects[0]] == ["body"]

@@ -48,7 +48,7 @@ def echoes_of(radar: rt.Radar, moving: rt.Object, chirps: NDArray[np.int64]) -> 
     scene = rt.Scene(objects=(moving,))
     body = replace(ASIDE, duration_s=float(chirps[-1] + 1) * radar.chirp_interval_s)
     world = build_world("specular", radar, body, scene=scene)
-    return world.objects[0].echoes(chirps)
+    return world.objects[0][0].echoes(chirps)
 
 
 def slow_time(echoes: rt.Echoes, middle_hz: float) -> NDArray[np.complex128]:
