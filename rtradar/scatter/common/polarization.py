@@ -119,7 +119,7 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
 
     Equation :eq:`polarization` of the theory page.
     """
-    tx, rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in (to_tx, to_rx))
+    tx, rx = unit(to_tx), unit(to_rx)
     normal = bisector(tx, rx)
     sent, received = antenna_field(tx, polarization), antenna_field(rx, polarization)
     fraction = np.sum(sent * received, axis=-1) - 2 * np.sum(sent * normal, axis=-1) * np.sum(

@@ -43,6 +43,10 @@ class Still:
     def owner(self) -> NDArray[np.int64]:
         return np.zeros(len(self.semi_axes), dtype=np.int64)
 
+    @property
+    def materials(self) -> tuple[str, ...]:
+        return ("perfect-conductor",) * len(self.semi_axes)
+
     def at(self, times: Array) -> Poses:
         moved = self.centres + np.asarray(times)[:, None, None] * np.array(self.velocity)
         return Poses(
