@@ -115,7 +115,8 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     """Write a spatial cloud as a NumPy archive.
 
     The archive holds ``points (n, 3)``, ``velocity``, ``power`` and ``time (n,)``, ``axes`` and
-    ``units (3,)``. A coordinate that is not measured is NaN in every point.
+    ``units (3,)``, and ``source (n,) int64`` if the cloud has it. A coordinate that is not measured
+    is NaN in every point.
 
     Parameters
     ----------
@@ -131,16 +132,26 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     """
     columns = [cloud.points, *(getattr(cloud, name)[:, None] for name in _EXTRA_UNITS)]
     names, units = (*SPATIAL_AXES, *_EXTRA_UNITS), (*SPATIAL_UNITS, *_EXTRA_UNITS.values())
-    write_npz(Path(path), CloudTable(names, units, np.concatenate(columns, axis=1)))
+    more = {} if cloud.source is None else {"source": cloud.source}
+    write_npz(Path(path), CloudTable(names, units, np.concatenate(columns, axis=1)), **more)
 
 
-def write_npz(path: Path, cloud: CloudTable) -> dict[str, Any]:
-    """Write ``points (n, 3)``, ``axes``, ``units`` and further columns by their names, float64."""
+def write_npz(path: Path, cloud: CloudTable, **more: NDArray[Any]) -> dict[str, Any]:
+    """Write ``points (n, 3)``, ``axes``, ``units`` and further columns by their names, float64.
+
+    Arrays of other types are given by name.
+    """
     extra = {name: cloud.values[:, 3 + k] for k, name in enumerate(cloud.names[3:])}
     with atomic_file(path) as file:
         axes, units = np.array(cloud.names[:3]), np.array(cloud.units[:3])
         np.savez_compressed(
-            file, allow_pickle=False, points=cloud.values[:, :3], axes=axes, units=units, **extra
+            file,
+            allow_pickle=False,
+            points=cloud.values[:, :3],
+            axes=axes,
+            units=units,
+            **extra,
+            **more,
         )
     return {"type": "float64"}
 

@@ -40,6 +40,9 @@ class SpatialCloud:
         Power of one channel in squared units of the IF signal; an echo of amplitude 1 has power 1.
     time : (n,) float64
         Centre of the frame [s].
+    source : (n,) int64, optional
+        Index of the person who returned most of the cell, -1 for the room or nobody; None where
+        that is not known.
 
     Raises
     ------
@@ -52,6 +55,7 @@ class SpatialCloud:
     velocity: NDArray[np.float64]
     power: NDArray[np.float64]
     time: NDArray[np.float64]
+    source: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         for field in ("points", "velocity", "power", "time"):
@@ -69,6 +73,14 @@ class SpatialCloud:
                     "every value must be finite, but for y or z not measured"
                 )
 
+        if self.source is not None:
+            source = np.asarray(self.source, dtype=np.int64)
+            object.__setattr__(self, "source", source)
+            if source.shape != (len(self.points),):
+                raise InputError(
+                    f"spatial cloud: source has shape {source.shape}; give one for each point"
+                )
+
     @property
     def measured(self) -> NDArray[np.bool_]:
         """Whether the radar measured x, y and z, (3,) bool; all True if there is no point."""
@@ -77,8 +89,9 @@ class SpatialCloud:
     def strongest(self) -> SpatialCloud:
         """Return the points at most `SHOWN_DB` below the strongest one, for pictures."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
+        source = None if self.source is None else self.source[kept]
         return SpatialCloud(
-            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept]
+            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept], source
         )
 
 
@@ -91,7 +104,12 @@ def measured_alone(points: NDArray[np.float64]) -> bool:
     return bool(missing.sum() == 1 and not missing[0] and finite[:, ~missing].all())
 
 
-def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> SpatialCloud:
+def spatial_points(
+    spectra: AngleSpectra,
+    radar: Radar,
+    time_s: float,
+    source: NDArray[np.int64] | None = None,
+) -> SpatialCloud:
     """Make the points of one frame from the angle peaks of each detected cell.
 
     Azimuth and elevation are measured by two separate linear arrays, so that it is unknown which
@@ -108,6 +126,8 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
         Radar whose axes are parallel to the world axes.
     time_s : float
         Centre of the frame [s].
+    source : (cell,) int64, optional
+        Who returned most of each cell.
 
     Returns
     -------
@@ -128,6 +148,7 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
         spectra.velocity[cell],
         (y.power[cell, rank] + z.power[cell, rank]) / 2,
         np.full(len(cell), time_s),
+        None if source is None else source[cell],
     )
 
 

@@ -111,27 +111,34 @@ class Clouds(NamedTuple):
 class Frame(NamedTuple):
     """One processed frame, centred at ``middle_s``.
 
-    ``power`` is its map (range, velocity) [m^2], ``mask`` marks the detections, and ``angles`` are
-    the spectra of the detected cells, None if the radar measures no angle.
+    ``power`` is its map (range, velocity) [m^2], ``mask`` marks the detections, ``angles`` are the
+    spectra of the detected cells, None if the radar measures no angle, and ``source`` (cell,) is
+    who returned most of each, None if that is not known.
     """
 
     middle_s: float
     power: NDArray[np.float32]
     mask: NDArray[np.bool_]
     angles: AngleSpectra | None
+    source: NDArray[np.int64] | None = None
+
+
+SourceOfCells = Callable[[int, NDArray[np.floating], NDArray[np.bool_]], NDArray[np.int64]]
+"""Who returned most of each detected cell, by the first cycle, the map and the mask of a frame."""
 
 
 class CloudMaker:
     """Accumulates the clouds of one capture from its range spectra.
 
-    So that memory stays low, `push` takes at most ``max_chirps`` chirps.
+    ``source_of`` tells who returned most of a cell, where that is known. So that memory stays low,
+    `push` takes at most ``max_chirps`` chirps.
     """
 
-    def __init__(self, processing: Processing) -> None:
-        self._processing, radar = processing, processing.radar
+    def __init__(self, processing: Processing, source_of: SourceOfCells | None = None) -> None:
+        self._processing, radar, self._source_of = processing, processing.radar, source_of
         self._sliding = SlidingWindows(radar)
         self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
-        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=6)
+        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=7)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
         self.max_chirps = step * max(1, int(_MAX_BYTES / step_bytes))
@@ -160,14 +167,18 @@ class CloudMaker:
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
-            angles = None
+            angles = source = None
+            if self._source_of is not None:
+                with stages.time("sources"):
+                    source = self._source_of(start, power, mask)
             if measured_angles(radar):
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
-                    found = spatial_points(angles, radar, middle)
-                    columns = found.points, found.velocity, found.power, found.time
+                    found = spatial_points(angles, radar, middle, source)
+                    who = np.full(len(found.time), -1) if found.source is None else found.source
+                    columns = found.points, found.velocity, found.power, found.time, who
                     self._spatial.add(np.column_stack(columns))
-            yield Frame(middle, power, mask, angles)
+            yield Frame(middle, power, mask, angles, source)
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
@@ -175,7 +186,8 @@ class CloudMaker:
             rdt = self._rdt.finish()
             rows = self._spatial.rows()
             rows = rows[np.argsort(rows[:, 5], kind="stable")]
-        spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5])
+        source = None if self._source_of is None else rows[:, 6].astype(np.int64)
+        spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], source)
         return Clouds(rdt, spatial, self._spatial.n_seen)
 
 

@@ -19,6 +19,7 @@ from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write
 from rtradar.pipeline.prepare import Moving, people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
+from rtradar.pipeline.sources import Sources
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.view import run_view_of
 from rtradar.radar import Radar
@@ -189,6 +190,7 @@ def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
 
 def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds:
     """Stream a capture into a file of maps, and IF samples into an array; return its clouds."""
-    with RunWriter(maps, capture.processing, capture.title, capture.frame_starts) as writer:
+    starts, source_of = capture.frame_starts, Sources(capture).of_cells
+    with RunWriter(maps, capture.processing, capture.title, starts, source_of) as writer:
         capture.stream(writer, kept)
-        return writer.finish()
+        return writer.finish(capture.body)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -11,7 +11,9 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.body import Body
 from rtradar.errors import InputError
+from rtradar.pipeline.output.truth import TRUTH, truth_axes, truth_of
 from rtradar.system.files import LastingFile
 
 if TYPE_CHECKING:
@@ -50,6 +52,13 @@ _COLUMNS_MEAN = "power averaged over channels and a few cycles"
 _MAPS = {
     "range_doppler": _Map(_FRAME, "power summed over all channels"),
     "detections": _Map(_FRAME, "1 where a target is detected", np.uint8, "1", sparse=True),
+    "source": _Map(
+        _FRAME,
+        "index of the person who returned most of a detected cell; -1: the room, or nobody",
+        np.int16,
+        "1",
+        sparse=True,
+    ),
     "range_time": _Map(("slow_time", "range"), _COLUMNS_MEAN),
     "spectrogram": _Map(_SLOW, "power of one channel summed over range"),
     "range_azimuth": _Map(("time", "range", "azimuth"), _CELLS, sparse=True),
@@ -72,7 +81,8 @@ class MapStore:
     ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
-    becomes an attribute of their datasets, ``attributes`` those of the file.
+    becomes an attribute of their datasets, ``attributes`` those of the file. The maps ``left_out``
+    are not made.
     """
 
     def __init__(
@@ -81,6 +91,7 @@ class MapStore:
         fixed: Mapping[str, NDArray[np.float64]],
         attributes: Mapping[str, Any],
         clutter_removal: Mapping[str, str] | None = None,
+        left_out: Collection[str] = (),
     ) -> None:
         # The newest format indexes growing data in constant memory.
         self._owned = isinstance(file, Path)
@@ -92,7 +103,7 @@ class MapStore:
         for name, values in fixed.items():
             self._scale(name, data=values)
         for name, kind in _MAPS.items():
-            if any(axis not in fixed for axis in kind.axes[1:]):
+            if name in left_out or any(axis not in fixed for axis in kind.axes[1:]):
                 continue
             shape = tuple(len(fixed[axis]) for axis in kind.axes[1:])
             steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
@@ -131,6 +142,17 @@ class MapStore:
             kind = _SINGLE[name]
             data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind.dtype))
             self._describe(data, kind, clutter_removal="none", time_s=time_s)
+
+    def put_truth(self, body: Body) -> None:
+        """Write what is true of each person of a body at the times of the frames."""
+        for name, names in truth_axes(body).items():
+            axis = self._file.create_dataset(name, data=list(names), dtype=h5py.string_dtype())
+            axis.make_scale(name)
+            axis.attrs.update({"units": "1", "long_name": f"name of the {name}"})
+        for name, values in truth_of(body, self._file["time"][:]).items():
+            axes, unit, meaning = TRUTH[name]
+            data = self._file.create_dataset(name, data=values)
+            self._describe(data, _Map(axes, meaning, np.float64, unit))
 
     def close(self) -> None:
         """Write what is buffered and close the file; may be called again."""

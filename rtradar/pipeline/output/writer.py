@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body import Body
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.pipeline.capture import Capture
@@ -19,6 +20,7 @@ from rtradar.pipeline.processing import (
     CloudMaker,
     Clouds,
     Processing,
+    SourceOfCells,
     block_chirps,
     frame_angles,
 )
@@ -60,7 +62,8 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
 class RunWriter:
     """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
-    A path, whose file is replaced, or an open file may be given. If clutter is removed, the map of
+    A path, whose file is replaced, or an open file may be given. ``source_of`` tells who returned
+    most of a cell, where that is known. If clutter is removed, the map of
     the middle one of ``frame_starts``, first cycles of the frames, is also kept as it was before;
     of none if they are left out. So that memory stays low, `push` takes at most ``max_chirps``
     chirps.
@@ -72,10 +75,11 @@ class RunWriter:
         processing: Processing,
         title: str,
         frame_starts: Sequence[int] | NDArray[np.int64] = (),
+        source_of: SourceOfCells | None = None,
     ) -> None:
         self._processing = processing
         radar, removal = processing.radar, processing.removal
-        self._clouds = CloudMaker(processing)
+        self._clouds = CloudMaker(processing, source_of)
         self._spectrogram = SlidingSpectrogram(
             radar, removal=removal, window_functions=processing.window_functions
         )
@@ -95,7 +99,8 @@ class RunWriter:
         self._received = None
         if len(frame_starts) and removed["time"] != "none":
             self._received = ReceivedFrame(radar, int(frame_starts[len(frame_starts) // 2]))
-        self._store = MapStore(file, axes, {"title": title}, clutter_removal=removed)
+        left_out = () if source_of is not None else ("source",)
+        self._store = MapStore(file, axes, {"title": title}, removed, left_out)
 
     def __enter__(self) -> RunWriter:
         return self
@@ -121,6 +126,9 @@ class RunWriter:
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
         for frame in self._clouds.frames(spectra):
             maps = {"range_doppler": frame.power, "detections": frame.mask}
+            if frame.source is not None:
+                maps["source"] = np.full(frame.mask.shape, -1, dtype=np.int16)
+                maps["source"][frame.mask] = frame.source
             with stages.time("angle"):
                 if frame.angles:
                     maps |= self._angle_maps(frame.angles)
@@ -144,10 +152,15 @@ class RunWriter:
                 kept["range_azimuth_received"] = range_azimuth(angles, radar)
             self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
 
-    def finish(self) -> Clouds:
-        """Write what is buffered, close the file and return the clouds."""
+    def finish(self, body: Body | None = None) -> Clouds:
+        """Write what is buffered, close the file and return the clouds.
+
+        Of the people of a ``body``, place, speed and joints are written too.
+        """
         power, times = self._range_time.finish()
         self._store.extend("slow_time", times, range_time=power)
+        if body is not None:
+            self._store.put_truth(body)
         self._store.close()
         clouds = self._clouds.finish()
         if not len(clouds.rdt.points):

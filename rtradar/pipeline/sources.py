@@ -1,0 +1,228 @@
+"""Who returned most of each detected cell of a range-Doppler map.
+
+The echoes of everyone are looked at some eight times in a frame, for one Tx and all Rx together. In
+between the range is a cubic and the power a line. Each echo puts its power on the map as the window
+functions spread a tone of that range: over the bins of range that it passes, and over the Doppler
+bins of the time that it is in each. Of all that a cell is given to the person with most of it.
+Echoes over walls, ghosts, belong to the person too. Powers are added up, so it does not matter how
+echoes interfere.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from rtradar.pipeline.capture import Capture
+from rtradar.process import range_spectrum
+from rtradar.process.window_functions import WindowName, weights
+
+_INSTANTS = 8
+"""Times in a frame at which echoes are looked at."""
+
+_RATE_CYCLES = 2
+"""Cycles before and after such a time, over which range rates are taken."""
+
+_WEAK = 0.1
+"""Echoes with less power than this fraction of the noise of a cell are left out."""
+
+_FINE, _LEAST, _FARTHEST = 32, 1e-5, 32
+"""Steps of a bin in which the spectrum of a range window is known; the power over that of its peak
+down to which it is followed, and the most bins for that."""
+
+_UNEXPECTED = 10.0
+"""A cell with so many times the power of what is expected in it of anybody is nobody's: noise, the
+room's or a shadow's. Echoes that interfere make less of a difference."""
+
+_AT_ONCE = 2048
+
+Array = NDArray[np.float64]
+
+
+class _Echoes(NamedTuple):
+    """Echoes (echo,) at one time: range [m], range rate [m/s], mean power [m^2], and owner."""
+
+    range_m: Array
+    rate_mps: Array
+    power_m2: Array
+    owner: NDArray[np.int64]
+
+    def of(self, kept: NDArray[np.int64]) -> _Echoes:
+        """Return some of the echoes."""
+        return _Echoes(
+            self.range_m[kept], self.rate_mps[kept], self.power_m2[kept], self.owner[kept]
+        )
+
+
+class Sources:
+    """The person who returned most of a detected cell, for the frames of one capture in order."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture, radar = capture, capture.radar
+        self._cycles = radar.cycles_per_frame
+        self._every = max(1, self._cycles // _INSTANTS)
+        windows = capture.processing.window_functions
+        self._doppler = weights(windows.doppler, self._cycles)
+        self._spread, self._reach = _spread(windows.range, radar.samples_per_chirp)
+        after = self._spread[len(self._spread) // 2 :] ** 2
+        # Largest power from each bin after the tone on.
+        self._falls = np.maximum.accumulate(after[::-1])[::-1][: _FINE * self._reach : _FINE]
+        noise = capture.noise.power / radar.samples_per_chirp / self._cycles
+        self._weak_m2 = _WEAK * noise
+        self._kept: dict[int, _Echoes] = {}
+
+    def of_cells(
+        self, start_cycle: int, power: NDArray[np.floating], mask: NDArray[np.bool_]
+    ) -> NDArray[np.int64]:
+        """Return the person's index for each marked cell, -1 for the room or nobody.
+
+        The frame begins at ``start_cycle``; ``power (range, velocity)`` is its map [m^2], and the
+        cells are in the order of `numpy.nonzero`.
+        """
+        rows, columns = np.nonzero(mask)
+        expected = self.expected(start_cycle, np.unique(rows))[:, rows, columns]
+        others = expected[-1] + self._still[rows, columns]
+        best = expected[:-1].max(axis=0)
+        known = (best > others) & (power[rows, columns] < _UNEXPECTED * best)
+        return np.where(known, expected[:-1].argmax(axis=0), -1)
+
+    def expected(self, start_cycle: int, rows: NDArray[np.int64]) -> Array:
+        """Map (person + 1, range, velocity) that is expected of each person, the last of objects.
+
+        Powers are those of a map, sums over all channels [m^2]; only these ``rows`` of range bins
+        are filled.
+        """
+        radar, n_cycles = self._capture.radar, self._cycles
+        range_m, power, owner = self._course(start_cycle)
+        place = range_m / radar.range_bin_m
+        field = np.sqrt(power) * self._doppler
+        # As far as an echo is not weak.
+        reach = (self._falls * power.max(axis=1)[:, None] > self._weak_m2).sum(axis=1)
+        low, high = place.min(axis=1) - reach, place.max(axis=1) + reach
+        echo, row = np.nonzero((rows >= low[:, None]) & (rows <= high[:, None]))
+        turns = 2 / radar.wavelength_m * range_m
+        tone = (field * np.exp(2j * np.pi * (turns - np.rint(turns)))).astype(np.complex64)
+        steps = np.rint(_FINE * place).astype(np.int32)
+        n_owners = len(self._capture.body.names) + 1
+        found = np.zeros((n_owners * radar.samples_per_chirp, n_cycles))
+        target = owner[echo] * radar.samples_per_chirp + rows[row]
+        order = np.argsort(target, kind="stable")
+        echo, row, target = echo[order], row[order], target[order]
+        for first in range(0, len(echo), _AT_ONCE):
+            own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
+            away = (_FINE * (bins + self._reach)).astype(np.int32)[:, None] - steps[own]
+            signal = self._spread.take(away, mode="clip") * tone[own]
+            parts = scipy.fft.fft(signal, axis=1, overwrite_x=True).view(np.float32)
+            spectrum = parts[:, ::2] ** 2 + parts[:, 1::2] ** 2
+            targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
+            found[targets] += np.add.reduceat(spectrum, begin, axis=0)
+        maps = found.reshape(n_owners, radar.samples_per_chirp, n_cycles)
+        return np.asarray(radar.n_channels * np.fft.fftshift(maps, axes=2))
+
+    def _course(self, start_cycle: int) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Range [m] and power [m^2] of the echoes (echo, cycle) over a frame, and their owners."""
+        first, last = start_cycle // self._every, (start_cycle + self._cycles - 1) // self._every
+        seen = self._seen(np.arange(first, last + 2))
+        count = min(len(one.owner) for one in seen)  # more may come while they are asked for
+        power = np.array([one.power_m2[:count] for one in seen])
+        kept = np.flatnonzero(power.max(axis=0) > max(self._weak_m2, 0.0))
+        cycles = np.arange(start_cycle, start_cycle + self._cycles)
+        number, rest = cycles // self._every - first, cycles % self._every / self._every
+        range_m = np.empty((len(kept), self._cycles))
+        power_m2 = np.empty_like(range_m)
+        apart_s = self._every * self._capture.radar.cycle_duration_s
+        for interval, (before, after) in enumerate(pairwise(seen)):
+            inside = number == interval
+            t = rest[inside]
+            here, there = before.of(kept), after.of(kept)
+            range_m[:, inside] = _cubic(here, there, apart_s, t)
+            power_m2[:, inside] = np.outer(here.power_m2, 1 - t) + np.outer(there.power_m2, t)
+        return range_m, power_m2, seen[0].owner[kept]
+
+    def _seen(self, numbers: NDArray[np.int64]) -> list[_Echoes]:
+        """Echoes at these multiples of the step between times, found once for all frames."""
+        for old in [number for number in self._kept if number < numbers[0]]:
+            del self._kept[old]
+        missing = [number for number in numbers.tolist() if number not in self._kept]
+        if missing:
+            self._kept |= zip(missing, self._look(np.array(missing)), strict=True)
+        return [self._kept[number] for number in numbers.tolist()]
+
+    def _look(self, numbers: NDArray[np.int64]) -> list[_Echoes]:
+        capture, radar = self._capture, self._capture.radar
+        cycles = numbers[:, None] * self._every + [-_RATE_CYCLES, _RATE_CYCLES]
+        cycles = np.clip(cycles, 0, capture.n_chirps // radar.n_tx - 1)
+        middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
+        chirps, where = np.unique(cycles * radar.n_tx + middle, return_inverse=True)
+        echoes = capture.model.echoes(chirps.astype(np.int64))
+        # (number, before and after, rx, echo)
+        where = where.reshape(cycles.shape)
+        power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[where]
+        length = echoes.length[where]
+        # A receiver that has an echo at one time only knows no rate.
+        both = np.sqrt(power[:, 0] * power[:, 1])
+        total = np.maximum(both.sum(axis=1), np.finfo(np.float64).tiny)
+        before, after = ((both * length[:, side]).sum(axis=1) / total for side in (0, 1))
+        apart_s = np.diff(cycles, axis=1) * radar.cycle_duration_s
+        rate = np.divide(after - before, 2 * apart_s, out=np.zeros_like(before), where=apart_s > 0)
+        # At the ends of the capture the times are not in the middle of both cycles.
+        late_s = (numbers * self._every - cycles.mean(axis=1)) * radar.cycle_duration_s
+        range_m = (before + after) / 4 + rate * late_s[:, None]
+        mean = np.where(range_m < radar.max_range_m, both.mean(axis=1), 0.0)
+        # Objects come after all people.
+        owners = np.append(capture.body.owner, len(capture.body.names))
+        owner = owners[np.minimum(echoes.part, len(owners) - 1)]
+        return [_Echoes(*arrays, owner) for arrays in zip(range_m, rate, mean, strict=True)]
+
+    @cached_property
+    def _still(self) -> Array:
+        """Power of the room in each cell, none where its clutter is removed [m^2]."""
+        capture, radar = self._capture, self._capture.radar
+        power = np.zeros((radar.samples_per_chirp, self._cycles))
+        if capture.inside is not None and capture.settings.clutter_removal == "none":
+            samples = np.zeros((radar.n_tx, radar.n_rx, len(power)), np.complex64)
+            capture.inside.room.add(samples, np.arange(radar.n_tx))
+            windows = capture.processing.window_functions
+            spectra = range_spectrum(samples, radar, window_functions=windows)
+            by_range = (np.abs(spectra.astype(np.complex128)) ** 2).sum(axis=(0, 1))
+            power += by_range[:, None] * np.fft.fftshift(np.abs(np.fft.fft(self._doppler)) ** 2)
+        return power
+
+
+def _cubic(before: _Echoes, after: _Echoes, apart_s: float, t: Array) -> Array:
+    """Range (echo, n) by ranges and rates at both ends, at fractions ``t (n,)`` of the time.
+
+    Where an echo is not seen at one end, it goes on as at the other.
+    """
+    ends = []
+    for own, other, later_s in ((before, after, -apart_s), (after, before, apart_s)):
+        gone = own.power_m2 == 0
+        there = other.range_m + later_s * other.rate_mps
+        rate = np.where(gone, other.rate_mps, own.rate_mps)
+        ends.append((np.where(gone, there, own.range_m), apart_s * rate))
+    (start, start_rate), (end, end_rate) = ends
+    return np.asarray(
+        np.outer(start, (1 + 2 * t) * (1 - t) ** 2)
+        + np.outer(start_rate, t * (1 - t) ** 2)
+        + np.outer(end, t**2 * (3 - 2 * t))
+        + np.outer(end_rate, t**2 * (t - 1))
+    )
+
+
+def _spread(window: WindowName, n: int) -> tuple[NDArray[np.float32], int]:
+    """Field of a tone of 1 in the bins so far before and after it, and how far that is [bin].
+
+    Steps are fractions of a bin, (2 _FINE reach + 1,), the first and last one 0. The phase is that
+    about the middle of the sweep, whose frequency range rates are measured at.
+    """
+    steps = np.arange(_FINE * n)
+    spectrum = np.fft.fft(weights(window, n), _FINE * n) * np.exp(1j * np.pi * steps / _FINE)
+    half = spectrum.real[: min(_FINE * n // 2, _FINE * _FARTHEST + 1)]
+    reach = int(np.flatnonzero(half**2 > _LEAST)[-1]) // _FINE + 1
+    half = np.append(half[: _FINE * reach], 0.0)
+    return np.concatenate([half[:0:-1], half]).astype(np.float32), reach

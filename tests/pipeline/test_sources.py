@@ -1,0 +1,99 @@
+"""Who returned a cell, against maps that are simulated for each person alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.sources import Sources
+from rtradar.scene import Wall, material
+from rtradar.settings import RunSettings
+
+RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=4, rx_z=4)
+WALKER = rt.Person(rt.synthetic_motion("walk", duration_s=0.5), (0.3, 1.2))
+KICKER = rt.Person(rt.synthetic_motion("kick", seed=1, duration_s=0.5), (0.0, 0.5))
+
+
+@pytest.fixture(scope="module")
+def together() -> rt.Result:
+    return rt.run([WALKER, KICKER], RADAR, duration_s=0.15)
+
+
+def test_a_cell_is_of_the_person_who_returns_most_of_it_alone(together: rt.Result) -> None:
+    alone = [
+        rt.run(person, RADAR, duration_s=0.15, noise_power_m2=0.0).maps["range_doppler"].values
+        for person in (WALKER, KICKER)
+    ]
+    detected = together.maps["detections"].values.astype(bool)
+    ratio_db = 10 * np.log10(alone[1][detected] / alone[0][detected].astype(float))
+    source = together.maps["source"].values[detected]
+    clear = np.abs(ratio_db) > 3
+    assert clear.sum() > 300
+    assert {0, 1} <= set(np.unique(source).tolist())
+    assert (source[clear] == (ratio_db[clear] > 0)).mean() > 0.99
+    assert (together.maps["source"].values[~detected] == -1).all()
+
+
+def test_points_have_the_source_of_their_cell(together: rt.Result) -> None:
+    cloud = together.spatial
+    assert cloud.source is not None
+    maps = together.maps
+    for time, place, velocity, source in zip(
+        cloud.time[::50], cloud.points[::50], cloud.velocity[::50], cloud.source[::50], strict=True
+    ):
+        cell = maps["source"].sel(
+            time=time,
+            range=np.linalg.norm(place - RADAR.position_m),
+            velocity=velocity,
+            method="nearest",
+        )
+        assert int(cell) == source
+
+
+def test_expected_power_is_that_of_the_map() -> None:
+    """Of one person without noise: interference leaves decibels in a cell, and none in the sum."""
+    result = rt.run(WALKER, RADAR, duration_s=0.15, snr_db=60)
+    settings = RunSettings(duration_s=0.15, snr_db=60)
+    capture = prepare(WALKER, RADAR, rt.Scene(), settings)
+    start = int(capture.frame_starts[0])
+    expected = Sources(capture).expected(start, np.arange(RADAR.samples_per_chirp))[0]
+    found = result.maps["range_doppler"].values[0]
+    strong = found > 1e-4 * found.max()
+    ratio_db = 10 * np.log10(expected[strong] / found[strong])
+    assert abs(np.median(ratio_db)) < 0.5
+    assert (np.abs(ratio_db) < 6).mean() > 0.95
+    assert abs(10 * np.log10(expected.sum() / found.sum())) < 0.5
+
+
+def test_noise_is_nobody() -> None:
+    result = rt.run(KICKER, RADAR, duration_s=0.15, pfa=1e-2)
+    detected = result.maps["detections"].values.astype(bool)
+    source = result.maps["source"].values
+    far = detected & (np.abs(result.maps["velocity"].values) > 8)
+    assert far.sum() > 20
+    assert (source[far] == -1).all()
+
+
+def test_a_wall_is_the_rooms() -> None:
+    """Without removal of clutter the wall at rest is the room's, and the walker is a person."""
+    wall = Wall(
+        name="back",
+        corner_m=(2.0, 2.0, 0.0),
+        edge_u_m=(0.0, 0.0, 2.5),
+        edge_v_m=(0.0, -4.0, 0.0),
+        material=material("concrete"),
+        thickness_m=0.2,
+    )
+    scene = rt.Scene(walls=(wall,))
+    result = rt.run(WALKER, RADAR, scene, duration_s=0.15, fidelity="analytic")
+    cloud = result.spatial
+    assert cloud.source is not None
+    range_m = np.linalg.norm(cloud.points - result.radar.position_m, axis=1)
+    wall_cells = (np.abs(cloud.velocity) < 0.02) & (np.abs(range_m - 6.0) < 0.05)
+    assert wall_cells.any()
+    assert (cloud.source[wall_cells] == -1).all()
+    assert (cloud.source[np.abs(cloud.velocity) > 1.0] == 0).mean() > 0.8
