@@ -10,7 +10,8 @@ First the chest alone: the echoes of upper and middle torso of a person who hold
 whole person who stands and sways. A chest sways by 5 mm root mean square, at times as slow as a
 breath, so a breath of 0.1 mm is hidden in the phase of the chest. But the body sways as one
 pendulum: the way of the head, which does not breathe, is fitted beside the sine with a factor of
-its own. How far off a reading without the head is, is reported.
+its own. How far off a reading without the head is, is reported. Real bodies also bend at the hip,
+which the pendulum does not, so their sway is removed less well than here.
 
     python validation/closed_forms/breath.py [--quick] [--json FILE]
 """
@@ -34,6 +35,7 @@ from rtradar.validate.rows import Row, judged, main, reported
 Array = NDArray[np.float64]
 SPEED_MPS = 299_792_458.0
 DURATION_S = 60.0
+SNR_DB = 20.0  # of one IF sample of the whole person
 CHEST, HEAD = "upper torso", "head"
 BREATHING_PARTS = ("middle torso", CHEST)
 CYCLES_HZ = {12e9: 16.0, 77e9: 64.0}  # a chest moves by less than lambda / 4 from cycle to cycle
@@ -157,7 +159,7 @@ def whole_rows(frequency_hz: float, breathing: rt.Breathing, seed: int) -> list[
     motion = rt.synthetic_motion("stand", seed=seed, duration_s=DURATION_S)
     body = rt.Body.from_motion(place(motion))
     chest, head = (front(radar, body, part) for part in (CHEST, HEAD))
-    capture = rt.simulate(motion, radar, snr_db=np.inf, breathing=breathing)
+    capture = rt.simulate(motion, radar, snr_db=SNR_DB, breathing=breathing)
     blocks = (block.values for block in capture.blocks())
     way, swayed = ways(blocks, radar, [chest.at, head.at])
     cycle_hz = CYCLES_HZ[frequency_hz]
