@@ -285,15 +285,20 @@ def make_sample(plan: SamplePlan) -> Made:
 
 
 def scene_digest(scene: Scene) -> str:
-    """Hash of a scene, including the content of its mesh files."""
+    """Hash of a scene, including the content of its mesh files and what its people do."""
 
     def content(value: object) -> str:
+        if isinstance(value, np.ndarray):
+            return hashlib.sha256(value.tobytes()).hexdigest()
         if not isinstance(value, Path):
             return str(value)
         status = value.stat()
         return _mesh_digest(value, status.st_mtime_ns, status.st_size)
 
-    text = json.dumps(asdict(scene), sort_keys=True, default=content)
+    # Scenes that have none keep the ids of before there were any.
+    later = {key for key in ("objects", "people") if not getattr(scene, key)}
+    table = {key: value for key, value in asdict(scene).items() if key not in later}
+    text = json.dumps(table, sort_keys=True, default=content)
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
 
 

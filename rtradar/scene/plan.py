@@ -77,16 +77,23 @@ def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
     draw_radar(axes, (x, y))
-    axes.plot(*person, "o", color=theme.person, markersize=7)
+    people = {"person": person} | {
+        f"{number}: {one.motion.name}": one.position_m
+        for number, one in enumerate(scene.people, start=1)
+    }
+    if scene.people:  # who are there, whoever may come
+        del people["person"]
+    for place in people.values():
+        axes.plot(*place, "o", color=theme.person, markersize=7)
     title = printable(f"{scene.name}: {scene.description}")
     dress(axes, title=title, note=plan_note(scene))
     others = [
         Label("radar", around((x, y), 12.0), theme.radar),
-        Label("person", around(person, 12.0), theme.person),
+        *(Label(name, around(place, 12.0), theme.person) for name, place in people.items()),
     ]
     # Names keep off the arrow, the person's mark and the lines of walls.
     avoided = [_square((x + fraction * _ARROW_M, y)) for fraction in np.linspace(0, 1, 12)]
-    name_parts(axes, scene, others, [*avoided, _square(person)])
+    name_parts(axes, scene, others, [*avoided, *map(_square, people.values())])
     return axes
 
 
@@ -103,7 +110,8 @@ def _place_and_limits(
     """Return the radar's place in a plan (2,) and the limits of the plan (2, 2) [m]."""
     own = Radar().position_m if radar is None else radar.position_m
     x, y = (own if scene.radar_position_m is None else scene.radar_position_m)[:2]
-    return (x, y), plan_limits(scene, [(x, y), (x + _ARROW_M, y), scene.person_position_m])
+    places = [one.position_m for one in scene.people] or [scene.person_position_m]
+    return (x, y), plan_limits(scene, [(x, y), (x + _ARROW_M, y), *places])
 
 
 def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:

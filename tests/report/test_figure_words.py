@@ -116,7 +116,7 @@ EVERY: dict[str, Callable[[], None]] = {
         FILE, MAPS["azimuth"], ROOM, RADAR, [GHOST], {1: NAME}, NAME
     ),
     "room_plan": lambda: draw_room_plan(
-        FILE, ROOM, RADAR, np.zeros((3, 2)), {1: POINTS}, {1: NAME}, NAME
+        FILE, ROOM, RADAR, {NAME: np.zeros((3, 2))}, {1: POINTS}, {1: NAME}, NAME
     ),
     "power_over_time": lambda: draw_power_over_time(FILE, np.arange(8.0), ALONE, UNIT, NAME, NAME),
     "part_power": lambda: draw_part_power(FILE, [NAME] * 8, ALONE, ALONE, UNIT, NAME),

@@ -33,7 +33,13 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
         yaw_deg=30.0,
     )
     draw_room_plan(
-        tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, {}, "title"
+        tmp_path / "plan.png",
+        Scene(furniture=(chair,)),
+        Radar(),
+        {"person": np.zeros((3, 2))},
+        {},
+        {},
+        "title",
     )
     every = chair.triangles().corners[..., :2]
     (corners,) = drawn

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
@@ -112,11 +113,15 @@ def _draw_room(
         windows = capture.processing.window_functions
         axes = (received("range_azimuth"), maps["azimuth"][:]), scene, radar
         rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, key, heading, windows)
-    track = body.motion.at(np.linspace(0, body.duration_s, _TRACK_POINTS))[0][:, 0, :2]
+    times = np.linspace(0, body.duration_s, _TRACK_POINTS)
+    tracks = truth_of(body, times)["person_position"][..., :2]
+    named = dict(zip(body.names, np.swapaxes(tracks, 0, 1), strict=True))
+    if len(named) == 1:
+        named = {"person": tracks[:, 0]}
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
     paths = {number: inside.model.course(ghost.path, middle) for number, ghost in numbered.items()}
     drawn["Plan of the room, with paths"] = folder / "plan.png"
-    rooms.draw_room_plan(folder / "plan.png", scene, radar, track, paths, key, heading)
+    rooms.draw_room_plan(folder / "plan.png", scene, radar, named, paths, key, heading)
     return drawn
 
 

@@ -56,20 +56,20 @@ def draw_room_plan(
     path: Path,
     scene: Scene,
     radar: Radar,
-    track: NDArray[np.float64],
+    tracks: Mapping[str, NDArray[np.float64]],
     paths: Mapping[int, NDArray[np.float64]],
     key: Mapping[int, str],
     title: str,
 ) -> None:
-    """Draw the room from above: walls, furniture, radar, the person's track and paths of echoes.
+    """Draw the room from above: walls, furniture, radar, people's tracks and paths of echoes.
 
-    ``track`` (time, 2) are positions of the person's root [m], ``paths`` the corners (point, 3) of
-    the path of each ghost [m] by its number, ``key`` the walls of each.
+    ``tracks`` (time, 2) are positions of each person's root [m] by name, ``paths`` the corners
+    (point, 3) of the path of each ghost [m] by its number, ``key`` the walls of each.
     """
     place = radar.position_m[:2]
-    limits = plan_limits(
-        scene, [place, *track, *(xy for way in paths.values() for xy in way[:, :2])]
-    )
+    walked = np.concatenate(list(tracks.values()))
+    ways = [xy for way in paths.values() for xy in way[:, :2]]
+    limits = plan_limits(scene, [place, *walked, *ways])
     axes = new_figure(height_of_plan(limits) + 0.5).add_subplot()
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
@@ -85,15 +85,14 @@ def draw_room_plan(
         places = [((1 - at) * first + at * last).tolist() for at in (0.5, 0.35, 0.65, 0.2, 0.8)]
         words = ", ".join(map(str, numbers))
         labels.append(Label(words, [((x, y), (0.0, 0.0)) for x, y in places], colour))
-    axes.plot(*track.T, color=theme.person, linewidth=2.5)
     draw_radar(axes, place)
-    middle = track[len(track) // 2].tolist()
-    labels += [
-        Label("radar", around((place[0], place[1]), 12.0), theme.radar),
-        Label("person", around((middle[0], middle[1]), 12.0), theme.person),
-    ]
+    labels.append(Label("radar", around((place[0], place[1]), 12.0), theme.radar))
+    for name, track in tracks.items():
+        axes.plot(*track.T, color=theme.person, linewidth=2.5)
+        x, y = track[len(track) // 2].tolist()
+        labels.append(Label(name, around((x, y), 12.0), theme.person))
     square = np.array([[-0.03], [0.03]])
-    avoided = [point + square for point in track[:: len(track) // 20 + 1]]
+    avoided = [point + square for point in walked[:: len(walked) // (20 * len(tracks)) + 1]]
     notes = [_key("Paths of echoes over", key), plan_note(scene)]
     dress(axes, title=f"Plan of the room\n{title}", note="\n".join(filter(None, notes)))
     name_parts(axes, scene, labels, avoided)

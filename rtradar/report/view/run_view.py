@@ -68,7 +68,8 @@ def group_of_parts(parts: Sequence[str]) -> list[int]:
     names = list(GROUPS)
     found = []
     for part in parts:
-        side, _, limb = part.partition(" ")
+        # Of several people, "NAME: part".
+        side, _, limb = part.rpartition(": ")[2].partition(" ")
         group = "torso" if "torso" in part else "head, neck"
         if side in ("left", "right"):
             group = f"{side} {'arm' if limb in _ARM else 'leg'}"
