@@ -26,6 +26,7 @@ from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets_by_length import (
+    KNOTS,
     LengthGrid,
     RigidFacets,
     RigidViews,
@@ -68,8 +69,8 @@ _BOW_RAD = 0.3
 _OF_OBJECT = 0.125
 """Largest facet over the longest extent of the object: what occludes it does so facet by facet."""
 
-_KNOT_RAD = 0.8
-"""Phase against the point of reference from one knot to the next: a polynomial through six is off
+_KNOT_RAD = 1.1
+"""Phase against the point of reference from one knot to the next: a polynomial through eight is off
 by 0.2 %."""
 
 _KEYFRAME_S, _KEYFRAME_RAD = 20e-3, math.radians(10.0)
@@ -225,7 +226,7 @@ class RigidEchoes:
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         numbers = np.floor(times / self._knot_s).astype(np.int64)
-        knots = np.unique(numbers[:, None] + np.arange(-2, 4))
+        knots = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
         if len(knots) * radar.n_tx < len(chirps):
             every = np.repeat(knots * self._knot_s, radar.n_tx)
             field = self._field(every, np.tile(np.arange(radar.n_tx), len(knots)))
@@ -233,7 +234,7 @@ class RigidEchoes:
             field = field[..., used].reshape(len(knots), radar.n_tx, *field.shape[1:3], -1)
             amplitude = np.empty((_NODES, len(chirps), radar.n_rx, field.shape[-1]), np.complex64)
             fraction = times / self._knot_s - numbers
-            first = np.searchsorted(knots, numbers - 2)
+            first = np.searchsorted(knots, numbers - KNOTS // 2 + 1)
             between_knots(field, first, fraction, tx, amplitude)
         else:
             field = self._field(times, tx)

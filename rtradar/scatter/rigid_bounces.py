@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.facets_by_length import between_knots
+from rtradar.kernels.scatter.facets_by_length import KNOTS, between_knots
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import SHEET_BOUNCES
 from rtradar.scatter.common.keyframes import KeyframeCache
@@ -30,8 +30,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _KEPT_KNOTS, _PASSING = 128, 32
-_AROUND = 6
-"""Knots of one polynomial."""
 
 
 class SheetBounces:
@@ -75,7 +73,7 @@ class SheetBounces:
         Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``.
         """
         numbers = np.floor(times / self._knot_s).astype(np.int64)
-        wanted = np.unique(numbers[:, None] + np.arange(_AROUND) - 2)
+        wanted = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
         for number in wanted.tolist():
             if number not in self._knots:
                 self._knots.keep(number, self._knot(number * self._knot_s))
@@ -84,7 +82,10 @@ class SheetBounces:
         out = np.empty(
             (len(self._wavenumber), len(times), field.shape[2], int(used.sum())), np.complex64
         )
-        first, fraction = np.searchsorted(wanted, numbers - 2), times / self._knot_s - numbers
+        first, fraction = (
+            np.searchsorted(wanted, numbers - KNOTS // 2 + 1),
+            times / self._knot_s - numbers,
+        )
         between_knots(np.ascontiguousarray(field[..., used]), first, fraction, tx, out)
         beyond = np.arange(-self._half, self._half + 2) * self._step
         bounces = np.repeat(self._orders, self._count).astype(np.int64)
