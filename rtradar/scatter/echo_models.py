@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -77,24 +77,10 @@ def build_model(
     ExtensionError
         Where it is of another package, and fails.
     """
-    kind = MODELS.find(fidelity)
-    # Other bodies of ellipsoids than `Body` need not know of people and meshes.
-    if any(getattr(person, "mesh", None) is not None for person in getattr(body, "people", ())):
-        from rtradar.scatter.models.mesh_optics import mesh_model
-
-        kind = mesh_model(fidelity)
+    kind = _kind_for(fidelity, body, model_options)
     room = scene if scene is not None and not scene.is_empty else None
-    with MODELS.guarded(fidelity):
-        taken = inspect.signature(kind).parameters
-        known = [name for name in taken if name not in _COMMON]
-        for option in model_options:
-            if option not in known:
-                raise InputError(
-                    f"fidelity '{fidelity}' has no option '{option}'; it has: "
-                    f"{', '.join(known) or 'none'}"
-                )
-        # What traces nothing takes no backend.
-        backend = {"variant": variant} if takes_backend(fidelity) else {}
+    # What traces nothing takes no backend.
+    backend = {"variant": variant} if takes_backend(fidelity) else {}
 
     def conductor(before: Radar) -> EchoModel:
         with MODELS.guarded(fidelity):
@@ -109,6 +95,25 @@ def build_model(
 
     level = Level(conductor, takes_backend(fidelity), spreading)
     return RoomModel(level, room, radar, body, materials, order=order)
+
+
+def _kind_for(fidelity: str, body: Body, model_options: Iterable[str]) -> Callable[..., EchoModel]:
+    """Return what makes the model of that name for such a body; refuse options it does not have."""
+    kind: Callable[..., EchoModel] = MODELS.find(fidelity)
+    # Other bodies of ellipsoids than `Body` need not know of people and meshes.
+    if any(getattr(person, "mesh", None) is not None for person in getattr(body, "people", ())):
+        from rtradar.scatter.models.mesh_optics import mesh_model
+
+        kind = mesh_model(fidelity)
+    with MODELS.guarded(fidelity):
+        known = [name for name in inspect.signature(kind).parameters if name not in _COMMON]
+        for option in model_options:
+            if option not in known:
+                raise InputError(
+                    f"fidelity '{fidelity}' has no option '{option}'; it has: "
+                    f"{', '.join(known) or 'none'}"
+                )
+    return kind
 
 
 def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:
