@@ -101,6 +101,12 @@ DATA_SET_KEYS = {
         "person_position_m": ("list of places [x, y] [m]", "as the scene says"),
         "radar_position_m": ("list of places [x, y, z] [m]", "as the scene or the radar says"),
     },
+    "[others]": {
+        "count": ("number of people beside the one of the label, at most 8", "must be given"),
+        "labels": ("list of what they do, drawn for each", "`['walk', 'stand']`"),
+        "x_m": ("range [least, most] of their mean places [m]", "`[-1.0, 1.0]`"),
+        "y_m": ("the same", "`[-1.5, 1.5]`"),
+    },
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {
         "label": (

@@ -35,6 +35,7 @@ DATA_SET = {
     "[windows]": "[windows]\n",
     "[each]": "[each]\n",
     "[drawn]": "[drawn]\n",
+    "[others]": "[others]\ncount = 1\n",
     "[[synthetic]]": "[windows]\nduration_s = 1\n[[synthetic]]\n",
     "[[recordings]]": "[[recordings]]\n",
 }

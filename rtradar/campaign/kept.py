@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
-from rtradar.motion import Motion
-from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing
 from rtradar.process import (
     SlidingSpectrogram,
@@ -37,10 +36,13 @@ class Capture(NamedTuple):
 
 
 def capture_of(
-    motion: Motion, radar: Radar, scene: Scene, keep: Sequence[str], **options: Unpack[RunOptions]
+    people: Moving, radar: Radar, scene: Scene, keep: Sequence[str], **options: Unpack[RunOptions]
 ) -> Capture:
-    """Compute the clouds of a run with these settings, and the kinds of arrays to ``keep``."""
-    capture = prepare(motion, radar, scene, RunSettings(**options))
+    """Compute the clouds of a run with these settings, and the kinds of arrays to ``keep``.
+
+    Joints are those of the first person.
+    """
+    capture = prepare(people, radar, scene, RunSettings(**options))
     keeper = MapKeeper(capture.processing, keep)
     capture.stream(keeper, progress=False)
     maps = keeper.maps()

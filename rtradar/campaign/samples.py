@@ -18,14 +18,25 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar import __version__
+from rtradar.body import Person
 from rtradar.campaign.kept import capture_of
-from rtradar.campaign.spec import DRAWN, RUN_KEYS, Actor, Combination, Recorded, Spec, check_samples
+from rtradar.campaign.spec import (
+    APART_M,
+    DRAWN,
+    RUN_KEYS,
+    Actor,
+    Combination,
+    Others,
+    Recorded,
+    Spec,
+    check_samples,
+)
 from rtradar.clouds.sample_files import FORMAT, Sample
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
-from rtradar.scene import Scene
+from rtradar.scene import Object, Scene
 from rtradar.settings import RunSettings
 from rtradar.system.files import open_regular
 from rtradar.system.seeds import stream
@@ -34,6 +45,7 @@ SPATIAL_POINTS = 3000
 """Largest number of points of the spatial cloud, a uniform sample if there are more."""
 
 _ID_DIGITS = 20  # 80 bits: two of a million samples share an id once in 2e12 collections
+_OTHERS_STREAM, _TRIES = 3, 1000
 _SPATIAL_STREAM = 2  # differs from the random streams of noise and RDT cloud with the same seed
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _SLOW_BAR: Any = {"unit": "interval", "disable": None, "leave": False, "delay": 2.0}
@@ -127,7 +139,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     if spec.keep:
         common["keep"] = list(spec.keep)
     planned = [
-        _plan(interval, combination, common)
+        _plan(interval, combination, common, spec.others)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
         for combination in spec.combinations
     ]
@@ -193,7 +205,9 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
         yield _Interval(recorded.label, parameters, _draw(spec, seed), motion)
 
 
-def _plan(interval: _Interval, each: Combination, common: Mapping[str, Any]) -> SamplePlan:
+def _plan(
+    interval: _Interval, each: Combination, common: Mapping[str, Any], others: Others | None
+) -> SamplePlan:
     drawn, radar = interval.drawn, each.radar
     x, y = each.scene.person_position_m
     place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
@@ -211,7 +225,36 @@ def _plan(interval: _Interval, each: Combination, common: Mapping[str, Any]) -> 
         "person_position_m": list(place),
         "radar_position_m": list(scene.radar_position_m or radar.position_m),
     }
+    if others is not None:
+        parameters["others"] = _drawn_others(others, interval.parameters["seed"], place)
     return SamplePlan(interval.label, parameters, radar, scene, interval.motion)
+
+
+def _drawn_others(others: Others, seed: int, place: tuple[float, float]) -> list[dict[str, Any]]:
+    """Draw what others do, where, and how they are turned, as plain JSON values."""
+    random = np.random.default_rng(stream(seed, _OTHERS_STREAM))
+    low, high = np.transpose([others.x_m, others.y_m])
+    places, found = [np.asarray(place)], []
+    for _ in range(others.people):
+        for _ in range(_TRIES):
+            drawn = np.round(low + (high - low) * random.random(2), 4)
+            if min(float(np.linalg.norm(drawn - other)) for other in places) >= APART_M:
+                break
+        else:
+            raise InputError(
+                f"[others] count = {others.people}: x_m and y_m hold no place {APART_M:g} m from "
+                "everyone; widen them"
+            )
+        places.append(drawn)
+        found.append(
+            {
+                "label": others.labels[int(random.integers(len(others.labels)))],
+                "seed": int(random.integers(2**31)),
+                "position_m": drawn.tolist(),
+                "heading_deg": round(float(random.uniform(-180.0, 180.0)), 4),
+            }
+        )
+    return found
 
 
 @lru_cache(maxsize=16)
@@ -262,10 +305,11 @@ def make_sample(plan: SamplePlan) -> Made:
             plan.label, seed=values["subject_seed"], duration_s=values["take_s"], **actor
         )
     settings: Any = vars(plan.run_settings())
+    people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         clouds, maps, warmup_s = capture_of(
-            motion, plan.radar, plan.scene, values.get("keep", ()), **settings
+            people, plan.radar, plan.scene, values.get("keep", ()), **settings
         )
     limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}
     found = {
@@ -282,6 +326,20 @@ def make_sample(plan: SamplePlan) -> Made:
         places = places[np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))]
     sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
     return Made(sample, places, time.perf_counter() - began - warmup_s, maps)
+
+
+def _others(others: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> list[Person]:
+    """Make the people beside the one of the label, for a run with these settings."""
+    end_s = settings["start_s"] + settings["duration_s"]
+    return [
+        Person(
+            synthetic_motion(one["label"], seed=one["seed"], duration_s=end_s),
+            one["position_m"],
+            # The run turns everyone by its heading.
+            (one["heading_deg"] - settings["heading_deg"] + 180.0) % 360.0 - 180.0,
+        )
+        for one in others
+    ]
 
 
 def scene_digest(scene: Scene) -> str:

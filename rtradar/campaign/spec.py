@@ -144,6 +144,29 @@ class Combination(NamedTuple):
     snr_db: float | None
 
 
+class Others(NamedTuple):
+    """People beside the one of the label: how many, what they do, and where, from least to most.
+
+    Synthetic actors whose mean places are at least `APART_M` from each other and from that one.
+    """
+
+    people: int
+    labels: tuple[str, ...]
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+
+
+OTHERS: Mapping[str, list[Any]] = {
+    "labels": ["walk", "stand"],
+    "x_m": [-1.0, 1.0],
+    "y_m": [-1.5, 1.5],
+}
+"""Keys of ``[others]`` beside ``count``, with their defaults."""
+
+MOST_OTHERS, APART_M = 8, 1.0
+"""Most people beside the one of the label, and the least distance of their places [m]."""
+
+
 class Spec(NamedTuple):
     """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
 
@@ -157,6 +180,7 @@ class Spec(NamedTuple):
     actors: tuple[Actor, ...]
     recordings: tuple[Recorded, ...]
     keep: tuple[str, ...] = ()
+    others: Others | None = None
 
 
 def check_samples(intervals: int, combinations: int) -> None:

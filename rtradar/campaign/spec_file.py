@@ -19,19 +19,23 @@ from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (
     DRAWN,
     INTERVAL_KEYS,
+    MOST_OTHERS,
     NAMED,
+    OTHERS,
     RUN_KEYS,
     SWITCHES,
     WINDOWS,
     Actor,
     Combination,
     Intervals,
+    Others,
     Recorded,
     Spec,
     check_equal_sizes,
     check_samples,
 )
 from rtradar.clouds.sample_files import UNKNOWN
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
 from rtradar.process import WindowFunctions
@@ -43,6 +47,7 @@ from rtradar.system.checks import (
     Complaints,
     Table,
     brief,
+    check_keys,
     check_number,
     check_order,
     check_text,
@@ -69,7 +74,18 @@ EACH: Mapping[str, list[Any]] = {
 }
 """Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
-_TOP = ("seed", *RUN_KEYS, "keep", "folder", "windows", "each", "drawn", "synthetic", "recordings")
+_TOP = (
+    "seed",
+    *RUN_KEYS,
+    "keep",
+    "folder",
+    "windows",
+    "each",
+    "drawn",
+    "others",
+    "synthetic",
+    "recordings",
+)
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file",), ("label", "subject", "licence", "skeleton", *INTERVAL_KEYS)
 _MOST = 1_000_000
@@ -123,6 +139,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     }
     keep = wrong.of(_keep, table) or ()
     run = wrong.of(_run_settings, table)
+    others = wrong.of(_others, table)
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
@@ -135,7 +152,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
         check_equal_sizes(keep, lengths, combinations)
-    return Spec(run, intervals, combinations, drawn, actors, recordings, keep)
+    return Spec(run, intervals, combinations, drawn, actors, recordings, keep, others)
 
 
 def _keep(table: Table) -> tuple[str, ...]:
@@ -147,6 +164,29 @@ def _keep(table: Table) -> tuple[str, ...]:
     if not known:
         raise InputError(f"keep = {brief(kinds)}; it must be a list of: {', '.join(KEPT)}")
     return tuple(kind for kind in KEPT if kind in kinds)
+
+
+def _others(table: Table) -> Others | None:
+    """Return who is there beside the person of the label, if there is a table ``[others]``."""
+    if "others" not in table:
+        return None
+    given = table_at("others", table)
+    check_keys("[others] ", given, ("count",), tuple(OTHERS))
+    count = given["count"]
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_OTHERS:
+        raise InputError(
+            f"[others] count = {brief(count)}; it must be a whole number from 1 to {MOST_OTHERS}"
+        )
+    labels = given.get("labels", OTHERS["labels"])
+    if not (isinstance(labels, list) and labels and all(one in ACTIVITIES for one in labels)):
+        raise InputError(
+            f"[others] labels = {brief(labels)}; it must be a list of: {', '.join(ACTIVITIES)}"
+        )
+    low, high = PERSON_LIMITS["position_m"]
+    x_m, y_m = (
+        _range(key, given.get(key, OTHERS[key]), low, high, "[others]") for key in ("x_m", "y_m")
+    )
+    return Others(count, tuple(labels), x_m, y_m)
 
 
 def _run_settings(table: Table) -> RunSettings:
@@ -377,12 +417,14 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Re
     return found
 
 
-def _range(key: str, value: object, least: float, most: float) -> tuple[float, float]:
+def _range(
+    key: str, value: object, least: float, most: float, where: str = "[drawn]"
+) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:
-        raise InputError(f"[drawn] {key} = {brief(value)}; it must be a range: [least, most]")
-    low, high = (check_number("[drawn]", key, end, least, most) for end in value)
+        raise InputError(f"{where} {key} = {brief(value)}; it must be a range: [least, most]")
+    low, high = (check_number(where, key, end, least, most) for end in value)
     if low > high:
-        raise InputError(f"[drawn] {key} = {brief(value)}; the least must come first")
+        raise InputError(f"{where} {key} = {brief(value)}; the least must come first")
     return low, high
 
 

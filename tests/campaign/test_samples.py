@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.campaign.samples import SamplePlan, counts, plan_samples
+import rtradar as rt
+from rtradar.campaign.samples import SamplePlan, counts, plan_samples, scene_digest
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
 from rtradar.settings import RunSettings
@@ -278,3 +279,53 @@ def test_a_recording_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     (tmp_path / "walk.bvh").write_text("nothing")
     with pytest.raises(InputError, match=r"walk\.bvh"):
         planned(tmp_path, text)
+
+
+# -- several people ------------------------------------------------------------------------------
+
+OTHERS = '[others]\ncount = 2\nlabels = ["stand"]\nx_m = [-1, 1]\ny_m = [-2, 2]\n'
+
+
+def test_others_are_drawn_apart_from_everyone_and_the_same_again(tmp_path: Path) -> None:
+    plans = planned(tmp_path, HEAD + OTHERS + actors(4, "kick"))
+    assert plans == planned(tmp_path, HEAD + OTHERS + actors(4, "kick"))
+    assert len({json.dumps(plan.parameters["others"]) for plan in plans}) == 4
+    for plan in plans:
+        others = plan.parameters["others"]
+        assert [one["label"] for one in others] == ["stand"] * 2
+        places = np.array([plan.scene.person_position_m, *(one["position_m"] for one in others)])
+        gaps = np.linalg.norm(places[:, None] - places, axis=-1)[np.triu_indices(3, 1)]
+        assert gaps.min() >= 1.0
+        assert (np.abs(places[1:]) <= [1, 2]).all()
+    alone = planned(tmp_path, HEAD + actors(4, "kick"))
+    assert "others" not in alone[0].parameters
+    assert not {plan.identity for plan in alone} & {plan.identity for plan in plans}
+
+
+def test_people_of_a_scene_belong_to_its_digest() -> None:
+    walk, other = (rt.synthetic_motion("walk", seed=seed, duration_s=0.5) for seed in (0, 1))
+    people = rt.Person(walk), rt.Person(walk, (1, 0)), rt.Person(other)
+    found = [scene_digest(rt.Scene(people=(person,))) for person in people]
+    assert len({*found, scene_digest(rt.Scene())}) == 4
+    assert scene_digest(rt.Scene(people=(rt.Person(walk),))) == found[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("count = 2", "count = 9"), "count = 9"),
+        (("count = 2", "count = true"), "count = True"),
+        (("count = 2\n", ""), "count"),
+        (('["stand"]', '["sit"]'), "labels = "),
+        (("[-1, 1]", "[1, -1]"), r"\[others\] x_m"),
+        (("[-2, 2]", "[0, 0.1]"), "hold no place 1 m from"),
+    ],
+)
+def test_others_without_meaning_are_refused(
+    tmp_path: Path, change: tuple[str, str], message: str
+) -> None:
+    text = OTHERS.replace(*change)
+    if "0.1" in change[1]:
+        text = text.replace("[-1, 1]", "[0, 0.1]")
+    with pytest.raises(InputError, match=message):
+        planned(tmp_path, HEAD + text + actors(1, "kick"))
