@@ -264,7 +264,7 @@ def materials() -> str:
 def meshes() -> str:
     """Sizes of the meshes that come along."""
     rows = []
-    for path in sorted(MESHES.glob("*.ply")):
+    for path in sorted(MESHES.glob("*.ply"), key=lambda path: path.stem):
         piece = Furniture(
             name=path.stem,
             mesh=path.stem,
