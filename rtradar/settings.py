@@ -74,6 +74,7 @@ class SimulationOptions(_Seed, total=False):
     breathing: Breathing | None
     order: int
     keep_all: bool
+    path_tolerance_db: float | None
     noise_power_m2: float | None
 
 
@@ -138,6 +139,11 @@ class RunSettings:
         Largest number of reflections at walls, floors and ceilings on the way of an echo, 0 to 3.
     keep_all : bool
         Whether paths, walls and furniture are kept even where they stay below the noise.
+    path_tolerance_db : float, optional
+        Largest power of the error of all ghosts, the echoes over walls, over that of the person
+        [dB]. Ghosts are computed at anchors a few milliseconds apart as far as this allows. None
+        or ``-inf`` computes every ghost at every chirp, as fidelity levels do that follow more
+        than one echo for each part and path.
     save_if : bool
         Whether the IF samples are kept, in ``if.zarr``.
     detector : str
@@ -152,7 +158,7 @@ class RunSettings:
     ------
     InputError
         If ``fidelity`` or ``detector`` is no such name, or ``snr_db``, ``noise_power_m2``, ``pfa``,
-        ``seed`` or ``order`` no such value.
+        ``seed``, ``order`` or ``path_tolerance_db`` no such value.
     """
 
     fidelity: str = "specular"
@@ -170,6 +176,7 @@ class RunSettings:
     breathing: Breathing | None = None
     order: int = 1
     keep_all: bool = False
+    path_tolerance_db: float | None = -35.0
     save_if: bool = False
     detector: str = "os-cfar"
     range_window: str | tuple[str, float] = "hann"
@@ -186,6 +193,13 @@ class RunSettings:
         DETECTORS.check(self.detector)
         check_seed("", self.seed)
         check_order(self.order)
+        if self.path_tolerance_db == -math.inf:
+            object.__setattr__(self, "path_tolerance_db", None)
+        elif self.path_tolerance_db is not None and not -MAX_SNR_DB <= self.path_tolerance_db <= 0:
+            raise InputError(
+                f"path_tolerance_db = {self.path_tolerance_db}; it must lie within "
+                f"{-MAX_SNR_DB:g} to 0 dB, or be -inf for exact ghosts (--path-tolerance-db)"
+            )
         if self.snr_db == "physical" and not self.spreading:
             raise InputError(
                 "snr_db = physical needs the loss with distance; "

@@ -68,6 +68,30 @@ def _nufft(k: Any) -> Calls:
     return call, lambda: tone_sum_reference(tones, 256, 0.0)
 
 
+_OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
+"""Anchors beside each of four, at whose places its weight is 0."""
+
+
+@kernel_case(
+    "anchored_tones.add_anchored_tones",
+    "IF of 12 chirps, 8 receivers, 315 echoes, 256 samples, between anchors",
+    2e-3,
+)
+def _anchored(k: Any) -> Calls:
+    rng, shape, chirps = np.random.default_rng(0), (6, 2, 8, 315), np.arange(12)
+    start, rate = rng.uniform(1, 6, shape[3]), rng.uniform(-0.05, 0.05, shape[3])
+    length = start + rate * np.arange(6)[:, None, None, None] + rng.uniform(0, 0.01, (2, 8, 1))
+    level, *change = rng.normal(size=(3, 2, *shape)).astype(np.float32)
+    anchors = k.Anchors(length, level, np.array(change)[..., :60].copy())
+    fraction = rng.uniform(0, 1, (12, 1))
+    weight = np.prod(fraction[:, None] + 1 - _OTHERS, axis=2) / [-6, 2, -2, 6]
+    between = k.Between(chirps % 3, weight, chirps % 2, np.full(12, 10e9))
+    out = np.empty((12, 8, 256), dtype=np.complex64)
+    given = anchors, between, k.Sweep(7e13, 4e6)
+    call = filled(k.add_anchored_tones, *given, out=(out,), adds=True)
+    return call, lambda: k.anchored_tones_reference(*given, 256)
+
+
 @kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
 def _noise(k: Any) -> Calls:
     streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])

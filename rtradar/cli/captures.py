@@ -16,6 +16,7 @@ from rtradar.cli.values import (
     add_files,
     breathing,
     decibels,
+    decibels_below,
     number,
     path,
     place_at,
@@ -45,6 +46,7 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
     "detector": ("--detector", {"metavar": "NAME"}),
     "order": ("--order", {"type": whole, "metavar": "N"}),
     "keep_all": ("--keep-all", {}),
+    "path_tolerance_db": ("--path-tolerance-db", {"type": decibels_below, "metavar": "X|-inf"}),
     "save_if": ("--save-if", {}),
     "start_s": ("--start", {"type": seconds, "metavar": "S"}),
     "duration_s": ("--duration", {"type": seconds, "metavar": "S"}),
@@ -59,7 +61,8 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
 """Option of each setting; `RunSettings` has the texts, choices and defaults."""
 
 _ONLY_RUN = (
-    "fidelity", "clutter_removal", "body_material", "detector", "order", "keep_all", "save_if",
+    "fidelity", "clutter_removal", "body_material", "detector", "order", "keep_all",
+    "path_tolerance_db", "save_if",
 )  # fmt: skip
 
 

@@ -224,6 +224,15 @@ def decibels(text: str) -> float | str:
     return value
 
 
+@_named("number of decibels, or -inf")
+def decibels_below(text: str) -> float:
+    """Read a number of decibels that may be -inf."""
+    value = float(text)
+    if math.isnan(value) or value == math.inf:
+        raise ValueError
+    return value
+
+
 @_named("whole number, not negative")
 def whole(text: str) -> int:
     """Read a whole number of at least 0."""

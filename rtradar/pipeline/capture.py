@@ -22,6 +22,7 @@ from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.signal import Noise, receive, synthesize
+from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.files import uninterruptible
 
@@ -44,7 +45,9 @@ class Capture:
 
     ``people`` are those of the scene and those who were given, ``body`` is all of them at their
     places, and ``processing`` has the radar at its position in the scene.
-    ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or None.
+    ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or
+    None. ``tones`` is the model of the echoes that are summed at every chirp: all but ghosts that
+    ``inside`` approximates.
     ``link_budget`` is that of the person's parts, ``warned`` its warnings. ``n_chirps`` are
     whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
     the IF samples, and ``warmup_s`` the time until everything was compiled or loaded [s].
@@ -56,6 +59,7 @@ class Capture:
     processing: Processing
     body: Body
     model: EchoModel
+    tones: EchoModel
     inside: Indoors | None
     link_budget: LinkBudget
     warned: tuple[str, ...]
@@ -112,7 +116,7 @@ class Capture:
         come in the same array. With DDM there is one row for each cycle.
         """
         radar, stages, most = self.radar, self.stages, block_chirps(self.radar)
-        room = self.inside.room if self.inside else None
+        room, ghosts = (self.inside.room, self.inside.ghosts) if self.inside else (None, None)
         # The largest array but for the frames. Allocated anew for each block, it would now and then
         # find no hole in the heap.
         samples_of = np.empty((at_once, radar.n_rx, radar.samples_per_chirp), np.complex64)
@@ -122,6 +126,8 @@ class Capture:
             with stages.time("signal"):
                 times = radar.chirp_times(n, first)
                 samples = synthesize(echoes, radar, times, dtype=np.complex64, out=samples_of[:n])
+                if ghosts is not None:
+                    ghosts.add(samples, np.arange(first, first + n))
             if room is not None:
                 with stages.time("clutter"):
                     room.add(samples, np.arange(first, first + n))
@@ -134,7 +140,9 @@ class Capture:
         # block is computed.
         def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
             with stages.time("scatter"):
-                echoes = self.model.echoes(chirps)
+                echoes = self.tones.echoes(chirps)
+                if ghosts is not None:
+                    ghosts.compute(chirps, AHEAD)
             for begin in range(0, len(chirps), at_once):
                 first = int(chirps[begin])
                 yield first, if_samples(chirps_of(echoes, begin, begin + at_once), first)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -15,17 +16,20 @@ from rtradar.scatter.multipath.room_model import FIELD_ERROR, RoomModel
 from rtradar.scatter.validity import Limit, warn_of
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
+from rtradar.signal.ghosts import GhostIf, ghosts_within
 from rtradar.signal.static_clutter import RoomIf
 
 
 class Indoors(NamedTuple):
     """The person in the room: the echo model, and the IF of the room itself.
 
-    ``summary`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
+    ``ghosts`` are the IF samples of ghosts where they are approximated. ``summary`` is what was
+    kept and dropped, for JSON; ``limits`` are those of the walls.
     """
 
     model: RoomModel
     room: RoomIf
+    ghosts: GhostIf | None
     summary: dict[str, Any]
     limits: tuple[Limit, ...]
 
@@ -61,10 +65,17 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
+    ghosts = None
+    if settings.path_tolerance_db is not None and person_power_m2 > 0 and model.has_ghost_tones:
+        allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
+        ghosts, said = ghosts_within(model, radar, n_chirps, allowed)
+        error = said.pop("error_m2") / person_power_m2
+        said["error_db"] = 10 * math.log10(error) if error > 0 else None
+        summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
     # Walls that are not followed over the sweep, where they matter.
     fraction = max(model.not_followed.values(), default=0.0)
     if fraction == 0:
-        return Indoors(model, room, summary, ())
+        return Indoors(model, room, ghosts, summary, ())
     message = (
         f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, "
         "because they are too dispersive or transmit too little: "
@@ -72,4 +83,4 @@ def indoors(
     )
     limit = Limit("wall_frequency_response", fraction, message)
     warn_of(limit)
-    return Indoors(model, room, summary, (limit,))
+    return Indoors(model, room, ghosts, summary, (limit,))

@@ -77,7 +77,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
-    inside = None
+    inside, tones = None, model
     around = model.person if isinstance(model, World) else model
     if isinstance(around, RoomModel):
         with processing.stages.time("room"):
@@ -86,6 +86,9 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
             if isinstance(model, World):
                 objects = model.prune(radar, n_chirps, 0.0 if settings.keep_all else noise.power)
                 inside = inside._replace(summary=inside.summary | {"objects": objects})
+            if inside.ghosts is not None:
+                direct = around.without_ghosts()
+                tones = model.with_person(direct) if isinstance(model, World) else direct
     return Capture(
         people=everyone,
         scene=scene,
@@ -93,6 +96,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         processing=processing,
         body=body,
         model=model,
+        tones=tones,
         inside=inside,
         link_budget=budget,
         warned=tuple(str(warning.message) for warning in caught),

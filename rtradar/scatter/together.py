@@ -55,6 +55,10 @@ class World:
         """Limits of validity that the objects come near or go past."""
         return tuple(limit for own in self.objects for path in own for limit in path.limits)
 
+    def with_person(self, person: EchoModel) -> World:
+        """Return the same objects with another model of the people."""
+        return World(person, self._parts, self.objects)
+
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
         return account_of(self.person)

@@ -113,7 +113,7 @@ def synthesize(
             f"synthesize: times has shape {times.shape}; with these echoes it must be "
             f"{echoes.length.shape[:1]}"
         )
-    _warn_of_motion_in_chirp(echoes, radar, times)
+    warn_of_motion_in_chirp(echoes, radar, times)
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
     shape = (*echoes.length.shape[:2], radar.samples_per_chirp)
@@ -146,7 +146,7 @@ def _tones(
     echoes: Echoes, amplitude: NDArray[np.complexfloating], radar: Radar, origin: float
 ) -> Tones:
     length = np.ascontiguousarray(echoes.length)
-    powers = _powers_of_sample_number(echoes.frequency, radar, origin)
+    powers = powers_of_sample_number(echoes.frequency, radar, origin)
     sweep = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
     return Tones(length, amplitude, powers, *sweep)
 
@@ -157,7 +157,7 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
     return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
 
-def _powers_of_sample_number(
+def powers_of_sample_number(
     frequency: NDArray[np.float64], radar: Radar, origin: float
 ) -> NDArray[np.float64]:
     """Weights (power, node) of values at nodes in the polynomial in n / samples less an origin."""
@@ -167,7 +167,8 @@ def _powers_of_sample_number(
     return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
 
 
-def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.float64]) -> None:
+def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.float64]) -> None:
+    """Warn where echoes, at the centres of some chirps [s], move too far inside one of them."""
     # Chirps of one Tx only: between two Tx the length changes by the array, not by motion.
     same = np.flatnonzero(echoes.tx == echoes.tx[0]) if len(times) else np.zeros(0, dtype=np.int64)
     if len(same) < 2:

@@ -64,3 +64,9 @@ class KeyframeCache(Generic[_Key, _Value]):
         for values in (self._staying, self._later):
             for key, value in values.items():
                 values[key] = new(value)
+
+    def copy(self) -> KeyframeCache[_Key, _Value]:
+        """Return a cache of its own with the same values."""
+        other = KeyframeCache[_Key, _Value](self.stay, self._passing)
+        other._staying, other._later = self._staying.copy(), self._later.copy()
+        return other

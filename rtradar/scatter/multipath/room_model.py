@@ -9,6 +9,7 @@ and what appears or vanishes fades smoothly.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol, cast, runtime_checkable
@@ -193,12 +194,17 @@ class RoomModel:
         chirps = np.asarray(chirps, dtype=np.int64)
         return self.optical_echoes(chirps) if self._fast else self._by_paths(chirps)
 
-    def optical_echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Compute the echoes as `echoes` of a fast model, by geometric optics for any other."""
+    def optical_echoes(self, chirps: NDArray[np.int64], *, unseen: bool = False) -> Echoes:
+        """Compute the echoes as `echoes` of a fast model, by geometric optics for any other.
+
+        If ``unseen``, an echo has the length over its specular point also where it is not seen.
+        """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
         at = chirp_poses(self._radar, self._body, chirps)
         blend, before, after = self._around_chirps(chirps, at.tx_index)
         near = self._near(blend, before, after)
+        if unseen:
+            near = near._replace(wanted=np.ones_like(near.wanted))
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
         n_direct, n_echoes = at.centres.shape[1], len(columns.part)
         model, formula = self._conductor, None
@@ -236,6 +242,27 @@ class RoomModel:
             part=columns.part[echo],
             bounces=bounces[echo],
         )
+
+    @property
+    def has_ghost_tones(self) -> bool:
+        """Whether `ghosts` can be asked for, and there are any."""
+        return self._fast and not self._columns.direct.all()
+
+    def ghosts(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Compute the echoes over walls of a fast model; they have lengths where they are not seen.
+
+        After `prune` they are the same ones at every chirp.
+        """
+        echoes = self.optical_echoes(np.asarray(chirps, dtype=np.int64), unseen=True)
+        return take(echoes, np.flatnonzero(echoes.bounces > 1))
+
+    def without_ghosts(self) -> RoomModel:
+        """Return the model of the direct echoes alone, with what is already known of them."""
+        direct = copy.copy(self)
+        direct._columns, direct._keyframes = copy.copy(self._columns), self._keyframes.copy()
+        keep = self._columns.direct
+        direct._restrict(keep[np.array(self._columns.echo)], keep)
+        return direct
 
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
@@ -371,15 +398,19 @@ class RoomModel:
         )
         # Direct echoes have the first columns.
         worth |= direct[echo] & (np.arange(len(echo)) < len(direct))
-        columns.keep(worth, keep)
+        self._restrict(worth, keep)
+        return summaries
+
+    def _restrict(self, column: NDArray[np.bool_], echo: NDArray[np.bool_]) -> None:
+        """Leave out all other columns and all other echoes for good."""
+        self._columns.keep(column, echo)
         self._keyframes.replace(
             lambda own: PathKeyframes(
-                _widened(own.factor, len(worth))[..., worth].copy(),
-                own.seen[..., keep].copy(),
-                own.start[..., keep, :].copy(),
+                _widened(own.factor, len(column))[..., column].copy(),
+                own.seen[..., echo].copy(),
+                own.start[..., echo, :].copy(),
             )
         )
-        return summaries
 
 
 def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:

@@ -1,0 +1,259 @@
+"""IF samples of ghosts, the echoes over walls, computed at anchors and followed between them.
+
+There are many times as many ghosts as direct echoes, and they are weaker. Their lengths and
+amplitudes are computed every few milliseconds, and between these anchors they are cubics in time.
+Over the sweep an amplitude is a constant and, where it matters, a parabola. What this leaves out is
+measured against the exact sum, and the anchors lie so close that it stays below a tolerance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.echoes import Echoes
+from rtradar.kernels.anchored_tones import ANCHORS, Anchors, Between, Sweep, add_anchored_tones
+from rtradar.radar import Radar
+from rtradar.signal.synthesis import (
+    powers_of_sample_number,
+    synthesize,
+    warn_of_motion_in_chirp,
+)
+
+APART_S = (12e-3, 8e-3, 5e-3, 3e-3, 2e-3)
+"""Distances between anchors [s], the longest first, of which the first that is good enough counts.
+A walker's limbs turn round in 100 ms."""
+
+_MARGIN_DB = 3.0
+"""What is measured at some instants may be so much larger over the capture [dB]."""
+
+_SHARE = 0.1
+"""Part of the tolerated power that the ghosts left out may take, and as much the changes."""
+
+_STREAMS = 8
+"""Ranges from which ghosts are added in turn."""
+
+MOST_NODES = 3
+"""Frequencies at which amplitudes may be given: those of a parabola."""
+
+_TESTS, _POWER_CHIRPS = 6, 48
+
+AHEAD = 8
+"""Anchors that are computed with those that are needed, because a call has its price."""
+
+
+class GhostEchoes(Protocol):
+    """What is asked of the model of a room: the echoes over its walls.
+
+    Echoes have lengths also where they are not seen, and are the same ones at every chirp.
+    """
+
+    def ghosts(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Compute them at some chirps."""
+        ...
+
+
+class GhostIf:
+    """The IF samples of ghosts by anchors ``apart`` cycles from each other.
+
+    The capture has a number of cycles; ``kept`` are the ghosts that count, of which the last
+    ``changing`` change over the sweep. ``cycles (anchor,)`` are the cycles of the anchors.
+    """
+
+    def __init__(
+        self,
+        model: GhostEchoes,
+        radar: Radar,
+        n_cycles: int,
+        apart: int,
+        kept: NDArray[np.int64],
+        changing: int,
+    ) -> None:
+        self._model, self._radar = model, radar
+        self._kept, self._changing = kept, kept[len(kept) - changing :]
+        gaps = max(ANCHORS - 1, math.ceil((n_cycles - 1) / apart))
+        self.cycles = np.unique(np.rint(np.linspace(0, n_cycles - 1, gaps + 1)).astype(np.int64))
+        # The anchors that are held, from the first on.
+        shape = 0, radar.n_tx, radar.n_rx, len(kept)
+        none = np.zeros((2, *shape), dtype=np.float32)
+        change = np.zeros((2, 2, *shape[:3], changing), dtype=np.float32)
+        self._first, self._held = 0, Anchors(np.zeros(shape), none, change)
+
+    def add(self, samples: NDArray[np.complex64], chirps: NDArray[np.int64]) -> None:
+        """Add the samples of some chirps to ``samples (chirp, rx, sample)`` complex64, in place.
+
+        The chirps (chirp,) are numbered from the start of the capture, ascending.
+        """
+        if len(self._kept) == 0:
+            return
+        radar = self._radar
+        self.compute(chirps)
+        cycle, tx = chirps // radar.n_tx, radar.tx_of_chirp(chirps)
+        first = self._first_anchor(cycle)
+        weight = _cubic_weights(self.cycles[first[:, None] + np.arange(ANCHORS)], cycle)
+        carrier = radar.start_frequency_hz + radar.tx_offset_hz[tx]
+        between = Between(first - self._first, weight, tx, carrier.astype(np.float64))
+        sweep = Sweep(float(radar.slope_hz_per_s), float(radar.sample_rate_hz))
+        add_anchored_tones(self._held, between, sweep, samples)
+
+    def compute(self, chirps: NDArray[np.int64], ahead: int = 0) -> None:
+        """Compute the anchors around some chirps, and some ``ahead`` if any are missing."""
+        ends = self._first_anchor(chirps[[0, -1]] // self._radar.n_tx)
+        begin, end = int(ends[0]), int(ends[1]) + ANCHORS
+        held = self._first + len(self._held.length)
+        if self._first <= begin and end <= held:
+            return
+        kept = slice(begin - self._first if self._first <= begin < held else held, None)
+        start = held if kept.start < held else begin
+        new = self._found(self.cycles[start : end + ahead])
+        self._held = Anchors(
+            np.concatenate([self._held.length[kept], new.length]),
+            np.concatenate([self._held.level[:, kept], new.level], axis=1),
+            np.concatenate([self._held.change[:, :, kept], new.change], axis=2),
+        )
+        self._first = begin
+
+    def _first_anchor(self, cycle: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Number of the first of the anchors around each cycle."""
+        first = np.searchsorted(self.cycles, cycle, side="right") - ANCHORS // 2
+        return np.clip(first, 0, len(self.cycles) - ANCHORS)
+
+    def _found(self, cycles: NDArray[np.int64]) -> Anchors:
+        """Echoes at some cycles."""
+        each = np.arange(self._radar.n_tx)
+        chirps = (cycles[:, None] * len(each) + each).ravel()
+        echoes = self._model.ghosts(chirps)
+        warn_of_motion_in_chirp(echoes, self._radar, self._radar.centres_of(chirps))
+        order = np.argsort(echoes.tx[: len(each)])
+        shape = len(cycles), len(each), echoes.length.shape[1]
+
+        def by_tx(values: NDArray[Any]) -> NDArray[Any]:
+            number = values.shape[-1]
+            return np.ascontiguousarray(values.reshape(*shape, number)[:, order])
+
+        def parts(values: NDArray[np.complexfloating]) -> NDArray[np.float32]:
+            return np.stack([by_tx(values.real), by_tx(values.imag)])
+
+        # Flat echoes have their mean over the sweep, the others their amplitude in its middle.
+        flat = self._kept[: len(self._kept) - len(self._changing)]
+        mean = _over_sweep(echoes.amplitude[..., flat], echoes, self._radar)
+        middle, *change = _over_sweep(echoes.amplitude[..., self._changing], echoes, self._radar)
+        level = np.concatenate([mean[0] + mean[2] / 12, middle], axis=2)
+        changes = np.array([parts(own) for own in change])
+        return Anchors(by_tx(echoes.length[..., self._kept]), parts(level), changes)
+
+
+def ghosts_within(
+    model: GhostEchoes, radar: Radar, n_chirps: int, power_m2: float
+) -> tuple[GhostIf | None, dict[str, Any]]:
+    """Approximate ghosts so that the mean power of the error of an IF sample stays below a limit.
+
+    Parameters
+    ----------
+    model : GhostEchoes
+        Model of the room.
+    radar : Radar
+        Radar in the scene.
+    n_chirps : int
+        Chirps of the capture.
+    power_m2 : float
+        Largest mean power of the error [m^2].
+
+    Returns
+    -------
+    GhostIf or None
+        None where no distance between anchors is good enough.
+    dict
+        What was approximated, for JSON: the number of ghosts, of those left out and of those that
+        change over the sweep, the distance between anchors [s], and the error's power [m^2].
+    """
+    spread = np.unique(np.linspace(0, n_chirps - 1, _POWER_CHIRPS).astype(np.int64))
+    some = model.ghosts(spread)
+    said = {"ghosts": len(some.part), "left_out": 0, "changing": 0}
+    exact = said | {"anchors_apart_s": None, "error_m2": 0.0}
+    if len(some.frequency) > MOST_NODES:
+        return None, exact
+    level, tilt, curve = (
+        (np.abs(own) ** 2).mean(axis=(0, 1)) for own in _over_sweep(some.amplitude, some, radar)
+    )
+    strong = _worth(level, power_m2 * _SHARE)
+    # Times the variances of u and of its square over the sweep.
+    changes = _worth(tilt / 12 + curve / 180, power_m2 * _SHARE)
+    length = some.length.mean(axis=(0, 1))
+    groups = [np.flatnonzero(strong & ~changes), np.flatnonzero(strong & changes)]
+    kept = np.concatenate([_apart(own, length) for own in groups])
+    said |= {"left_out": int((~strong).sum()), "changing": len(groups[1])}
+    n_cycles = n_chirps // radar.n_tx
+    for apart_s in APART_S:
+        apart = min(round(apart_s / radar.cycle_duration_s), (n_cycles - 1) // (ANCHORS - 1))
+        if apart < 2:
+            break
+        found = GhostIf(model, radar, n_cycles, apart, kept, len(groups[1]))
+        error = _error(found, model, radar)
+        if error * 10 ** (_MARGIN_DB / 10) <= power_m2:
+            apart_s = apart * radar.cycle_duration_s
+            return found, said | {"anchors_apart_s": apart_s, "error_m2": error}
+    return None, exact
+
+
+def _error(found: GhostIf, model: GhostEchoes, radar: Radar) -> float:
+    """Mean power of the error [m^2] in some cycles beside the sum of all ghosts, chirp by chirp."""
+    # In the middle between anchors, where a cubic is off by most.
+    middles = (found.cycles[:-1] + found.cycles[1:]) // 2
+    cycles = middles[np.unique(np.linspace(0, len(middles) - 1, _TESTS).astype(np.int64))]
+    each = np.arange(radar.n_tx)
+    chirps = (cycles[:, None] * radar.n_tx + each).ravel()
+    times = radar.centres_of(chirps)
+    error = -synthesize(model.ghosts(chirps), radar, times, dtype=np.complex64)
+    for first in range(0, len(chirps), radar.n_tx):
+        own = slice(first, first + radar.n_tx)
+        found.add(error[own], chirps[own])
+    return float((np.abs(error) ** 2).mean())
+
+
+def _over_sweep(
+    amplitude: NDArray[np.complexfloating], echoes: Echoes, radar: Radar
+) -> NDArray[np.complex64]:
+    """Coefficients (power, chirp, rx, echo) of amplitudes (node, chirp, rx, echo), powers 0 to 2.
+
+    They are those of the polynomial through the nodes of the echoes, in u, which goes from -1/2 to
+    1/2 over the sweep.
+    """
+    powers = powers_of_sample_number(echoes.frequency, radar, 0.5)
+    out = np.zeros((MOST_NODES, *amplitude.shape[1:]), dtype=np.complex64)
+    for own, weights in zip(out, powers.astype(np.float32), strict=False):
+        for weight, values in zip(weights, amplitude, strict=True):
+            own += weight * values
+    return out
+
+
+def _worth(power: NDArray[np.floating], least: float) -> NDArray[np.bool_]:
+    """Whether each is among the strongest, the others of which add up to less than ``least``."""
+    order = np.argsort(power)
+    worth = np.empty(len(power), dtype=bool)
+    worth[order] = np.cumsum(power[order], dtype=np.float64) > least
+    return worth
+
+
+def _apart(echoes: NDArray[np.int64], length: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Order echoes so that neighbours have lengths far apart, and so far-away cells of the grid.
+
+    A sum in a cell can then be read again without waiting until it has been written.
+    """
+    by_length = echoes[np.argsort(length[echoes])]
+    step = max(1, -(-len(echoes) // _STREAMS))
+    return np.concatenate([by_length[begin::step] for begin in range(step)])
+
+
+def _cubic_weights(cycles: NDArray[np.int64], cycle: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Weights (chirp, 4) of values at ``cycles (chirp, 4)`` in the cubic through them."""
+    weights = np.ones(cycles.shape)
+    for one in range(ANCHORS):
+        for other in range(ANCHORS):
+            if other != one:
+                step = (cycle - cycles[:, other]) / (cycles[:, one] - cycles[:, other])
+                weights[:, one] *= step
+    return weights

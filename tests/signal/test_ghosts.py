@@ -1,0 +1,48 @@
+"""Ghosts between anchors: their error beside the sum of all of them, chirp by chirp."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.errors import InputError
+
+RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=0, rx_y=2, rx_z=0)
+WALLS = replace(rt.Scene.load("living-room"), furniture=())
+
+
+def simulated(radar: rt.Radar = RADAR, scene: rt.Scene = WALLS, **options: Any) -> rt.IfSamples:
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
+    given: dict[str, Any] = {"snr_db": math.inf, "duration_s": 0.2} | options
+    return rt.simulate(motion, radar, scene, **given)
+
+
+def power(samples: NDArray[np.complexfloating]) -> float:
+    return float((np.abs(samples) ** 2).mean())
+
+
+@pytest.mark.parametrize("multiplexing", ["tdm", "fdm", "ddm"])
+def test_error_is_below_the_tolerance(multiplexing: Any) -> None:
+    radar = replace(RADAR, multiplexing=multiplexing)
+    exact, free = simulated(radar, path_tolerance_db=None), simulated(radar, rt.Scene())
+    for tolerance_db in (-35.0, -50.0):
+        found = simulated(radar, path_tolerance_db=tolerance_db)
+        error = power(found.samples - exact.samples) / power(free.samples)
+        assert 0 < error < 10 ** (tolerance_db / 10)
+
+
+def test_exact_ghosts_are_asked_for_by_none_or_minus_infinity() -> None:
+    none, infinite = (simulated(path_tolerance_db=db) for db in (None, -math.inf))
+    assert np.array_equal(none.samples, infinite.samples)
+
+
+@pytest.mark.parametrize("tolerance_db", [1.0, math.inf, math.nan, -500.0])
+def test_other_tolerances_are_refused(tolerance_db: float) -> None:
+    with pytest.raises(InputError, match="--path-tolerance-db"):
+        rt.RunSettings(path_tolerance_db=tolerance_db)
