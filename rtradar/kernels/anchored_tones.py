@@ -96,7 +96,8 @@ def add_anchored_tones(
     order = np.lexsort((between.first, between.tx))
     for begin in range(0, chirps, _CHIRPS_AT_ONCE):
         some = order[begin : begin + _CHIRPS_AT_ONCE]
-        own = Between(*(array[some] for array in between))
+        first, weight, tx, carrier = between
+        own = Between(first[some], weight[some], tx[some], carrier[some])
         grid = np.empty((len(some), receivers, cells), dtype=np.complex64)
         _spread_anchored(anchors, own, sweep, half, window.values, grid)
         summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
@@ -204,15 +205,15 @@ def _spread_anchored(anchors, between, sweep, half, values, grid):
                     for tap in range(np.uint64(_TAPS)):
                         imaginary[cell + tap] += s1 * values[1, at, tap] + s2 * values[2, at, tap]
             # Cells beyond an end belong to the other end; cell 0 of the grid lies at _BEFORE.
-            for cell in range(_BEFORE):
-                real[cells + cell] += real[cell]
-                imaginary[cells + cell] += imaginary[cell]
-            for cell in range(_BEFORE, _TAPS):
-                real[cell] += real[cells + cell]
-                imaginary[cell] += imaginary[cells + cell]
-            for cell in range(cells):
-                grid[chirp, receiver, cell] = complex(
-                    real[_BEFORE + cell], imaginary[_BEFORE + cell]
+            for place in range(_BEFORE):
+                real[cells + place] += real[place]
+                imaginary[cells + place] += imaginary[place]
+            for place in range(_BEFORE, _TAPS):
+                real[place] += real[cells + place]
+                imaginary[place] += imaginary[cells + place]
+            for place in range(cells):
+                grid[chirp, receiver, place] = complex(
+                    real[_BEFORE + place], imaginary[_BEFORE + place]
                 )
 
 

@@ -56,7 +56,7 @@ def indoors(
     clutter = Clutter(radar, scene, variant=variant, seed=settings.seed, order=order).prune(noise)
     room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body))
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
-    summary = {
+    summary: dict[str, Any] = {
         "paths": [asdict(path) for path in paths],
         "clutter": {
             "power_m2": room.power_m2,
