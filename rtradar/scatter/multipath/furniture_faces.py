@@ -9,7 +9,7 @@ are smaller than a Fresnel zone, or no rectangles, send no ghosts.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.radar import Radar
-from rtradar.scatter.multipath.image_paths import Face, corners, height
+from rtradar.scatter.multipath.image_paths import Face, corners, height, inside
 from rtradar.scatter.multipath.slab_series import POLARIZATIONS
 from rtradar.scene import Furniture, Scene, Wall, reflection
+from rtradar.scene.objects import Opening
 from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ _TIMES = 50
 FAINT_DB = 40.0
 """Faces whose ghosts are expected further below the direct echoes are left out [dB]."""
 _FILLED = 0.9
-"""Least part of its rectangle that a face fills; it is reflected by that part."""
+"""Least part of its rectangle that a facet fills; it is reflected by that part."""
 _NARROWEST_M = 0.03
 """Faces that are narrower are not listed at all [m]."""
 _SIDES = (("front", "back"), ("left", "right"), ("top", "bottom"))
@@ -39,14 +40,21 @@ _SIDES = (("front", "back"), ("left", "right"), ("top", "bottom"))
 
 @dataclass(frozen=True, kw_only=True)
 class SolidFace(Wall):
-    """A face of a piece of furniture: a rectangle with a half-space of material behind it.
+    """A face of a piece of furniture, with a half-space of material behind it.
 
-    The face fills ``fraction`` of the rectangle. A thin ``sheet`` reflects on both sides.
+    The face consists of ``patches`` in its rectangle, as openings are given, and fills ``fraction``
+    of these. A thin ``sheet`` reflects on both sides.
     """
 
     thickness_m: float = 0.0
+    patches: tuple[Opening, ...]
     fraction: float = 1.0
     sheet: bool = False
+
+    @property
+    def filled_m2(self) -> float:
+        """Area of the face itself [m^2]."""
+        return self.fraction * sum(wide * high for _, _, wide, high in self.patches)
 
     def _check_slab(self, where: str) -> None:
         """A half-space has no thickness to be checked."""
@@ -57,9 +65,9 @@ def reflecting_faces(
 ) -> tuple[Face, ...]:
     """Find the faces of furniture over which the radar may see parts of a body at some time.
 
-    Their specular points, for the middle of the array, lie on the face, the face is as wide as the
-    radius of the Fresnel zone, furniture leaves both legs free, and the ghosts are not expected
-    more than `FAINT_DB` below the direct echoes, in the mean over the parts and
+    Their specular points, for the middle of the array, are at most the radius of the Fresnel zone
+    beside the face, the face is as wide as that, furniture leaves both legs free, and the ghosts
+    are not expected more than `FAINT_DB` below the direct echoes, in the mean over the parts and
     `_TIMES` poses.
     """
     place = np.asarray(radar.position_m, dtype=np.float64)
@@ -70,67 +78,95 @@ def reflecting_faces(
             above = float(height(own, place))
             face = Face(own, back=above < 0)
             if above > 0 or own.sheet:
-                expected = _expected(face, place, points, radar, room)
+                expected = _expected(face, own.filled_m2 / own.area_m2, place, points, radar, room)
                 if expected.sum() > 10 ** (-FAINT_DB / 10) * len(points):
                     found.append(face)
     return tuple(found)
 
 
 def _expected(
-    face: Face, place: Array, points: Array, radar: Radar, room: RoomTracer | None
+    face: Face, filled: float, place: Array, points: Array, radar: Radar, room: RoomTracer | None
 ) -> Array:
     """Power of a ghost at points that are seen over a face, over that of the direct echo there."""
     wall = face.wall
     narrow = float(min(np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m)))
-    (_, met, _), valid = corners((face,), place, points)
+    (_, met, _), valid = corners((face,), place, points, beside_m=np.inf)
     met, points = met[valid], points[valid]
     first, last = np.linalg.norm(met - place, axis=1), np.linalg.norm(met - points, axis=1)
+    cosine = np.abs((met - place) @ wall.normal) / first
     zone = np.sqrt(radar.wavelength_m * first * last / (first + last))
-    near = zone <= narrow
+    near = (zone <= narrow) & inside(wall, met, zone / cosine)
     if room is not None:
         near[near] = ~(room.blocked(place, met[near]) | room.blocked(met[near], points[near]))
-    cosine = np.abs((met - place) @ wall.normal) / first
     eta = wall.material.eta(radar.centre_frequency_hz)
     reflected = [np.abs(reflection(eta, cosine, kind)) ** 2 for kind in POLARIZATIONS]
-    straight = np.linalg.norm(points - place, axis=1)
-    return np.asarray(np.max(reflected, axis=0) * (straight / (first + last)) ** 2 * near)
+    lost = np.linalg.norm(points - place, axis=1) / (first + last) * near
+    return np.asarray(np.max(reflected, axis=0) * (lost * filled) ** 2)
 
 
 def faces_of(piece: Furniture) -> Iterator[SolidFace]:
     """Yield the flat faces of a piece, the largest first: `wardrobe front`, `wardrobe front 2`."""
-    from trimesh import Trimesh, bounds  # slow to import
+    from trimesh import Trimesh  # slow to import
 
-    least_box: Any = bounds.oriented_bounds_2D  # has no types
     triangles = piece.triangles()
     mesh = Trimesh(triangles.vertices, triangles.faces, process=False)
+    planes: dict[tuple[float, ...], list[int]] = {}
+    for number in np.argsort(-mesh.facets_area, kind="stable").tolist():
+        normal, origin = mesh.facets_normal[number], mesh.facets_origin[number]
+        key = *(normal + 0.0).round(3).tolist(), float(round(origin @ normal, 3))
+        planes.setdefault(key, []).append(number)
+    found = []
+    for numbers in planes.values():
+        corners = [triangles.corners[mesh.facets[number]].reshape(-1, 3) for number in numbers]
+        made = _face(corners, mesh.facets_area[numbers], mesh.facets_normal[numbers[0]])
+        if made is not None:
+            found.append(made)
+    found.sort(key=lambda own: -own["fraction"] * own.pop("area"))
     count = Counter[str]()
-    for number in np.argsort(-mesh.facets_area, kind="stable"):
-        normal, area = mesh.facets_normal[number], float(mesh.facets_area[number])
-        own = piece.yaw.T @ normal
-        axis = int(np.abs(own).argmax())
-        along = np.eye(3)[(axis + 1) % 3] @ piece.yaw.T
-        along -= (along @ normal) * normal
-        along /= np.linalg.norm(along)
-        axes = np.stack([along, np.cross(normal, along)])
-        corner = triangles.corners[mesh.facets[number]].reshape(-1, 3)
-        to_box, extent = least_box(corner @ axes.T)
-        if area < _FILLED * np.prod(extent) or extent.min() < _NARROWEST_M:
-            continue
-        # The transform turns points so that the box is about the origin.
-        turn = to_box[:2, :2]
-        edges = turn @ axes
-        if np.linalg.det(turn) < 0:
-            edges, extent = edges[::-1], extent[::-1]
-        middle = turn.T @ -to_box[:2, 2] @ axes + (corner[0] @ normal) * normal
-        start = middle - (edges * extent[:, None]).sum(axis=0) / 2
-        side = _SIDES[axis][int(own[axis] < 0)]
+    for own in found:
+        looks = piece.yaw.T @ np.cross(own["edge_u_m"], own["edge_v_m"])
+        axis = int(np.abs(looks).argmax())
+        side = _SIDES[axis][int(looks[axis] < 0)]
         count[side] += 1
         yield SolidFace(
             name=f"{piece.name} {side}" + (f" {count[side]}" if count[side] > 1 else ""),
-            corner_m=tuple(start.tolist()),
-            edge_u_m=tuple((edges[0] * extent[0]).tolist()),
-            edge_v_m=tuple((edges[1] * extent[1]).tolist()),
             material=piece.material,
-            fraction=min(area / float(np.prod(extent)), 1.0),
             sheet=not triangles.closed,
+            **own,
         )
+
+
+def _face(corners: Sequence[Array], areas: Array, normal: Array) -> dict[str, Any] | None:
+    """Make the rectangle and the patches of what lies in one plane, the largest facet first.
+
+    ``corners`` are those (corner, 3) of the triangles of each facet; what is no rectangle along the
+    largest one is left out.
+    """
+    from trimesh.bounds import oriented_bounds_2D
+
+    least_box: Any = oriented_bounds_2D  # has no types
+    along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    axes = np.stack([along, np.cross(normal, along)]) / np.linalg.norm(along)
+    turn = least_box(corners[0] @ axes.T)[0][:2, :2]
+    # A proper rotation: the second axis is a quarter turn on from the first.
+    axes = np.stack([turn[0], [-turn[0, 1], turn[0, 0]]]) @ axes
+    boxes = []
+    for own, area in zip(corners, areas, strict=True):
+        low, high = (end(own @ axes.T, axis=0) for end in (np.min, np.max))
+        if area >= _FILLED * np.prod(high - low) and (high - low).min() >= _NARROWEST_M:
+            boxes.append((low, high, area))
+    if not boxes:
+        return None
+    lows, highs, filled = (np.array(column) for column in zip(*boxes, strict=True))
+    least, size = lows.min(axis=0), highs.max(axis=0) - lows.min(axis=0)
+    start = least @ axes + (corners[0][0] @ normal) * normal
+    rectangles = np.concatenate([lows - least, highs - lows], axis=1)
+    area = float(np.prod(highs - lows, axis=1).sum())
+    return {
+        "corner_m": tuple(start.tolist()),
+        "edge_u_m": tuple((axes[0] * size[0]).tolist()),
+        "edge_v_m": tuple((axes[1] * size[1]).tolist()),
+        "patches": tuple(tuple(rectangle) for rectangle in rectangles.tolist()),
+        "fraction": min(float(filled.sum()) / area, 1.0),
+        "area": area,
+    }

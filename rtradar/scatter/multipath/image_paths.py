@@ -94,7 +94,7 @@ def image(wall: Wall, points: Array, *, back: bool = False) -> Array:
     return np.asarray(points - 2 * height(wall, points, back=back)[..., None] * normal)
 
 
-def inside(wall: Wall, points: Array, margin_m: float = 0.0) -> Bools:
+def inside(wall: Wall, points: Array, margin_m: float | Array = 0.0) -> Bools:
     """Whether points (..., 3) [m], projected onto the front, lie in its rectangle and a margin."""
     away = np.asarray(points) - np.array(wall.corner_m)
     within = np.ones(away.shape[:-1], dtype=bool)

@@ -72,7 +72,7 @@ class WallEdges:
 
     @cached_property
     def _sides(self) -> tuple[tuple[Sides, ...], ...]:
-        """The rectangle of each wall, then its openings."""
+        """The rectangle of each wall, then its openings; the patches of each face."""
         return tuple(
             tuple(Sides(ends, _free(wall, ends, self.walls)) for ends in _rectangles(wall))
             for wall in self.surfaces
@@ -133,11 +133,10 @@ class WallEdges:
         """
         wall = self.surfaces[number]
         source, target = (_on_face(wall, points, back) for points in (sources, targets))
-        total, *openings = (
-            self._between(sides, source, target, margin_m) for sides in self._sides[number]
-        )
-        filled = wall.fraction if isinstance(wall, SolidFace) else 1.0
-        return np.asarray(filled * (total - sum(openings)))
+        parts = [self._between(sides, source, target, margin_m) for sides in self._sides[number]]
+        if isinstance(wall, SolidFace):
+            return np.asarray(wall.fraction * sum(parts))
+        return np.asarray(parts[0] - sum(parts[1:]))
 
     def _between(self, sides: Sides, source: Array, target: Array, margin_m: float) -> Field:
         """The same for one rectangle; source and target (3, leg) are in the axes of the face."""
@@ -197,9 +196,10 @@ def _axes(wall: Wall) -> Array:
 
 def _rectangles(wall: Wall) -> list[Array]:
     """Ends of a wall along its edges, and those of its openings, (2, 2) each [m]."""
-    lengths = [np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m)]
-    whole = np.array([[0.0, length] for length in lengths])
-    return [whole, *(np.array([[u, u + a], [v, v + b]]) for u, v, a, b in wall.openings)]
+    wide, high = (float(np.linalg.norm(edge)) for edge in (wall.edge_u_m, wall.edge_v_m))
+    of_wall = (0.0, 0.0, wide, high), *wall.openings
+    own = wall.patches if isinstance(wall, SolidFace) else of_wall
+    return [np.array([[u, u + a], [v, v + b]]) for u, v, a, b in own]
 
 
 def _free(wall: Wall, ends: Array, walls: Sequence[Wall]) -> Bools:

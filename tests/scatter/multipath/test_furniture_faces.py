@@ -39,15 +39,16 @@ def test_a_turned_block_has_six_faces_where_its_sides_are(tmp_path: Path) -> Non
     assert not faces
 
 
-def test_the_wardrobe_has_three_doors_and_a_round_table_no_side() -> None:
-    wardrobe = Furniture("wardrobe", "wardrobe", material("wood"), position_m=(0, 0, 0))
-    doors = [face for face in faces_of(wardrobe) if face.name.startswith("wardrobe front")]
-    large = [face for face in doors if face.area_m2 > 0.5]
-    assert [face.name for face in large] == [
-        "wardrobe front", "wardrobe front 2", "wardrobe front 3",
-    ]  # fmt: skip
+def test_the_doors_of_the_wardrobe_are_one_face_and_a_lamp_has_none() -> None:
+    wardrobe = Furniture("wardrobe", "wardrobe", material("wood"), position_m=(0, 0, 0), yaw_deg=30)
+    front = next(face for face in faces_of(wardrobe) if face.name == "wardrobe front")
+    # Three doors of 0.49 by 1.96 m with gaps between them, and where handles are.
+    assert np.array(front.patches)[:, 2:].max(axis=1) == pytest.approx([1.96] * 3, abs=0.01)
+    assert np.array(front.patches)[:, 2:].min(axis=1) == pytest.approx([0.49] * 3, abs=0.01)
+    assert front.area_m2 == pytest.approx(1.49 * 1.96, rel=0.01)
+    assert 0.97 < front.filled_m2 / front.area_m2 < 0.99
     lamp = Furniture("lamp", "lamp", material("metal"), position_m=(0, 0, 0))
-    assert not [face for face in faces_of(lamp) if face.area_m2 > 0.05]
+    assert not [face for face in faces_of(lamp) if face.filled_m2 > 0.05]
 
 
 def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: Any) -> None:
