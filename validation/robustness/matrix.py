@@ -3,8 +3,8 @@
 A cell of the matrix is one whole run in memory, of 0.05 s by a small radar, whose maps must be
 finite and hold power. Cells are chosen so that any two values of two factors meet in one of them (a
 pairwise array, made greedily with a fixed seed); without ``--quick`` all cells follow, of the
-levels that are quick. A refusal is counted as such only where physics forbids the cell, and
-`FORBIDDEN` says what does; any other refusal, and any error, is a failure, and is named.
+levels that are quick. Nothing in the matrix is forbidden by physics: a cell that is refused or
+fails is named on stderr.
 
     python validation/robustness/matrix.py [--quick] [--json FILE]
 """
@@ -43,8 +43,6 @@ FACTORS: dict[str, tuple[str, ...]] = {
     "material": ("perfect-conductor", "skin"),
     "who": ("one", "two", "fan"),
 }  # fmt: skip
-FORBIDDEN: dict[str, str] = {}
-"""Physics that forbids a cell, by a part of the line that refuses it."""
 
 Cell = dict[str, str]
 
@@ -144,13 +142,10 @@ def trouble_of(cell: Cell) -> tuple[str, str]:
 
 def rows_of(name: str, cells: Sequence[Cell]) -> list[Row]:
     """Run all cells, name what went wrong on stderr, and count it."""
-    counts, forbidden = Counter[str](), Counter[str]()
+    counts = Counter[str]()
     for number, cell in enumerate(cells, 1):
         kind, why = trouble_of(cell)
-        physics = next((text for part, text in FORBIDDEN.items() if part in why), "")
-        if kind == "refused" and physics:
-            forbidden[physics] += 1
-        elif kind:
+        if kind:
             counts[kind] += 1
             print(f"{kind}, {number} {' '.join(cell.values())}: {why}", file=sys.stderr, flush=True)
     rows = [
@@ -165,11 +160,7 @@ def rows_of(name: str, cells: Sequence[Cell]) -> list[Row]:
         )
         for kind in ("refused", "failed")
     ]
-    rows.append(reported(name, "cells run", "cells", float(len(cells))))
-    return rows + [
-        reported(f"{name}, {physics}", "cells that physics forbids", "cells", float(count))
-        for physics, count in forbidden.items()
-    ]
+    return [*rows, reported(name, "cells run", "cells", float(len(cells)))]
 
 
 def measure(quick: bool) -> list[Row]:
