@@ -156,9 +156,9 @@ def rows_of(name: str, cells: Sequence[Cell]) -> list[Row]:
             counts[kind],
             0.0,
             cases=len(cells),
-            says=f"cells of the matrix of levels, scenes, antennas and company that are {kind}",
+            says=f"cells of the matrix of levels, scenes, antennas and company that {do}",
         )
-        for kind in ("refused", "failed")
+        for kind, do in (("refused", "are refused"), ("failed", "fail"))
     ]
     return [*rows, reported(name, "cells run", "cells", float(len(cells)))]
 
