@@ -23,6 +23,7 @@ from rtradar.radar import Radar
 from rtradar.scene import (
     MATERIALS,
     Furniture,
+    Object,
     Scene,
     Surface,
     Wall,
@@ -60,6 +61,7 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
     "a side of a room": (Surface, "", SURFACE_LIMITS),
     "[[walls]]": (Wall, "", SURFACE_LIMITS),
     "[[furniture]]": (Furniture, "", FURNITURE_LIMITS),
+    "[[objects]]": (Object, "", FURNITURE_LIMITS),
     "[[people]]": (Person, "", PERSON_LIMITS),
     "[materials.NAME]": (own_material, "", OWN_LIMITS),
 }

@@ -27,6 +27,7 @@ SCENE = {
     "a side of a room": ROOM,
     "[[walls]]": "[[walls]]\n",
     "[[furniture]]": "[[furniture]]\n",
+    "[[objects]]": "[[objects]]\n",
     "[[people]]": "[[people]]\n",
     "[materials.NAME]": "[materials.mine]\n",
 }
