@@ -41,8 +41,8 @@ class SpatialCloud:
     time : (n,) float64
         Centre of the frame [s].
     source : (n,) int64, optional
-        Index of the person who returned most of the cell, -1 for the room or nobody; None where
-        that is not known.
+        Index of the person, or after them the object, that returned most of the cell, -1 for the
+        room or nobody; None where that is not known.
 
     Raises
     ------

@@ -1,11 +1,11 @@
 """Who returned most of each detected cell of a range-Doppler map.
 
-The echoes of everyone are looked at some eight times in a frame, for one Tx and all Rx together. In
-between the range is a cubic and the power a line. Each echo puts its power on the map as the window
-functions spread a tone of that range: over the bins of range that it passes, and over the Doppler
-bins of the time that it is in each. Of all that a cell is given to the person with most of it.
-Echoes over walls, ghosts, belong to the person too. Powers are added up, so it does not matter how
-echoes interfere.
+The echoes of everyone and of every object are looked at some eight times in a frame, for one Tx and
+all Rx together. In between the range is a cubic and the power a line. Each echo puts its power on
+the map as the window functions spread a tone of that range: over the bins of range that it passes,
+and over the Doppler bins of the time that it is in each. Of all that a cell is given to the person
+with most of it. Echoes over walls, ghosts, belong to the person too. Powers are added up, so it
+does not matter how echoes interfere.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class _Echoes(NamedTuple):
 
 
 class Sources:
-    """The person who returned most of a detected cell, for the frames of one capture in order."""
+    """Who returned most of a detected cell, for the frames of one capture in order."""
 
     def __init__(self, capture: Capture) -> None:
         self._capture, radar = capture, capture.radar
@@ -79,20 +79,19 @@ class Sources:
     def of_cells(
         self, start_cycle: int, power: NDArray[np.floating], mask: NDArray[np.bool_]
     ) -> NDArray[np.int64]:
-        """Return the person's index for each marked cell, -1 for the room or nobody.
+        """Return the index of the person or object for each marked cell, -1 for the room or nobody.
 
-        The frame begins at ``start_cycle``; ``power (range, velocity)`` is its map [m^2], and the
-        cells are in the order of `numpy.nonzero`.
+        Objects come after all people. The frame begins at ``start_cycle``; ``power (range,
+        velocity)`` is its map [m^2], and the cells are in the order of `numpy.nonzero`.
         """
         rows, columns = np.nonzero(mask)
         expected = self.expected(start_cycle, np.unique(rows))[:, rows, columns]
-        others = expected[-1] + self._still[rows, columns]
-        best = expected[:-1].max(axis=0)
-        known = (best > others) & (power[rows, columns] < _UNEXPECTED * best)
-        return np.where(known, expected[:-1].argmax(axis=0), -1)
+        best = expected.max(axis=0)
+        known = (best > self._still[rows, columns]) & (power[rows, columns] < _UNEXPECTED * best)
+        return np.where(known, expected.argmax(axis=0), -1)
 
     def expected(self, start_cycle: int, rows: NDArray[np.int64]) -> Array:
-        """Map (person + 1, range, velocity) that is expected of each person, the last of objects.
+        """Map (person and object, range, velocity) that is expected of each of them.
 
         Powers are those of a map, sums over all channels [m^2]; only these ``rows`` of range bins
         are filled.
@@ -108,7 +107,7 @@ class Sources:
         turns = 2 / radar.wavelength_m * range_m
         tone = (field * np.exp(2j * np.pi * (turns - np.rint(turns)))).astype(np.complex64)
         steps = np.rint(_FINE * place).astype(np.int32)
-        n_owners = len(self._capture.body.names) + 1
+        n_owners = len(self._capture.body.names) + len(self._capture.scene.objects)
         found = np.zeros((n_owners * radar.samples_per_chirp, n_cycles))
         target = owner[echo] * radar.samples_per_chirp + rows[row]
         order = np.argsort(target, kind="stable")
@@ -175,8 +174,8 @@ class Sources:
         range_m = (before + after) / 4 + rate * late_s[:, None]
         mean = np.where(range_m < radar.max_range_m, both.mean(axis=1), 0.0)
         # Objects come after all people.
-        owners = np.append(capture.body.owner, len(capture.body.names))
-        owner = owners[np.minimum(echoes.part, len(owners) - 1)]
+        objects = len(capture.body.names) + np.arange(len(capture.scene.objects))
+        owner = np.append(capture.body.owner, objects)[echoes.part]
         return [_Echoes(*arrays, owner) for arrays in zip(range_m, rate, mean, strict=True)]
 
     @cached_property

@@ -220,11 +220,12 @@ class RigidEchoes:
     def echoes(self, chirps: Indices) -> Echoes:
         """Echoes of the object at these chirps, all of part 0.
 
-        Only lengths at which something is seen are there, so their number changes from call to
-        call.
+        Of chirps that lie close together only lengths at which something is seen are there, so
+        their number changes from call to call; of others all are.
         """
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
+        apart = len(chirps) and chirps[-1] - chirps[0] >= 2 * len(chirps)
         numbers = np.floor(times / self._knot_s).astype(np.int64)
         knots = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
         if len(knots) * radar.n_tx < len(chirps):
@@ -238,12 +239,12 @@ class RigidEchoes:
             between_knots(field, first, fraction, tx, amplitude)
         else:
             field = self._field(times, tx)
-            used = field.any(axis=(0, 1, 2))
+            used = field.any(axis=(0, 1, 2)) | bool(apart)
             amplitude = np.moveaxis(field[..., used], 2, 0).astype(np.complex64)
         steps = (self._grid.first + np.flatnonzero(used)) * self._grid.step
         bounces = np.ones(len(steps), dtype=np.int64)
         if self._bounces is not None:
-            more, field_of, order = self._bounces.echoes(times, tx)
+            more, field_of, order = self._bounces.echoes(times, tx, whole=bool(apart))
             steps, bounces = np.append(steps, more), np.append(bounces, order)
             amplitude = np.concatenate([amplitude, field_of], axis=3)
         return Echoes(

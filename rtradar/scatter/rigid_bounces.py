@@ -67,10 +67,13 @@ class SheetBounces:
             _KEPT_KNOTS, _PASSING
         )
 
-    def echoes(self, times: Array, tx: Indices) -> tuple[Array, NDArray[np.complex64], Indices]:
+    def echoes(
+        self, times: Array, tx: Indices, *, whole: bool
+    ) -> tuple[Array, NDArray[np.complex64], Indices]:
         """Lengths (echo,) [m] beyond the path over the point of reference, amplitudes, bounces.
 
-        Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``.
+        Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``. All
+        echoes are there if ``whole``, else those that are not 0.
         """
         numbers = np.floor(times / self._knot_s).astype(np.int64)
         wanted = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
@@ -78,7 +81,7 @@ class SheetBounces:
             if number not in self._knots:
                 self._knots.keep(number, self._knot(number * self._knot_s))
         field = np.stack([self._knots[number] for number in wanted.tolist()])
-        used = field.any(axis=(0, 1, 2, 3))
+        used = field.any(axis=(0, 1, 2, 3)) | whole
         out = np.empty(
             (len(self._wavenumber), len(times), field.shape[2], int(used.sum())), np.complex64
         )

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import rtradar as rt
 from rtradar.pipeline.prepare import prepare
@@ -97,3 +98,17 @@ def test_a_wall_is_the_rooms() -> None:
     assert wall_cells.any()
     assert (cloud.source[wall_cells] == -1).all()
     assert (cloud.source[np.abs(cloud.velocity) > 1.0] == 0).mean() > 0.8
+
+
+def test_an_object_comes_after_the_people() -> None:
+    box = trimesh.creation.box((0.2, 0.2, 0.2))
+    motion = rt.FollowingPath(velocity_mps=(1.5, 0.0, 0.0))
+    cart = rt.Object("cart", box, "metal", position_m=(-2.5, 1.0, 1.0), motion=motion)
+    cloud = rt.run([WALKER, cart], RADAR, duration_s=0.15).spatial
+    assert cloud.source is not None
+    range_m = np.linalg.norm(cloud.points - RADAR.position_m, axis=1)
+    # Between 1.4 m and its front 0.22 m further; the walker is 4 m away, and comes nearer.
+    of_cart = (range_m < 2.0) & (np.abs(cloud.velocity - 1.5) < 0.2)
+    assert of_cart.sum() > 10
+    assert (cloud.source[of_cart] == 1).mean() > 0.9
+    assert (cloud.source[range_m > 3.0] == 0).mean() > 0.8

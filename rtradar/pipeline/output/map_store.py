@@ -54,7 +54,8 @@ _MAPS = {
     "detections": _Map(_FRAME, "1 where a target is detected", np.uint8, "1", sparse=True),
     "source": _Map(
         _FRAME,
-        "index of the person who returned most of a detected cell; -1: the room, or nobody",
+        "index of the person, or after them the object, that returned most of a detected cell; "
+        "-1: the room, or nobody",
         np.int16,
         "1",
         sparse=True,
