@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
+from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 Make = Callable[..., Any]
 VACUUM = Material(name="vacuum", source="", bands=(PowerLaw(0.0, np.inf, 1.0, 0.0, 0.0, 0.0),))
+SMALL = replace(Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 # Of targets `scattering_length` chooses its own number of facets and of bounces.
 RAYS, FACETS = {"rays_per_wavelength": 2.5, "bounces": 1}, {"facets": 5120}
@@ -45,19 +47,33 @@ def received(echoes: Echoes, radar: Radar, which: NDArray[np.bool_] | None = Non
     return np.asarray((amplitude * np.exp(2j * np.pi * turns)).sum(axis=3))
 
 
-@pytest.mark.parametrize("fidelity", MODELS.built_in)
-def test_walls_that_are_not_there_change_nothing(fidelity: str) -> None:
-    body = Body.from_motion(rt.synthetic_motion("kick", duration_s=0.1))
-    radar = replace(Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2)
+def error_of_vacuum(fidelity: str, radar: Radar, chirps: list[int], body_material: str) -> float:
+    """Largest difference of a room of walls that are not there to free space, over the rms."""
+    body = Body.from_motion(rt.synthetic_motion("kick", duration_s=0.1), material=body_material)
     # One wall stands between the radar and the body, another behind the body.
     sides = dict.fromkeys(SIDES, Surface(material=VACUUM, thickness_m=0.1))
     walls = room_walls((3.5, 5.0, 3.0), (-1.0, -2.5), sides)
-    scene = Scene(walls=walls[:2])
-    chirps, options = np.array([103, 604]), OPTIONS.get(fidelity, {})
-    found = build_model(fidelity, radar, body, scene=scene, **options).echoes(chirps)
-    free = received(build_model(fidelity, radar, body, **options).echoes(chirps), radar)
-    error = np.abs(received(found, radar) - free).max()
-    assert error < 1e-6 * np.sqrt((np.abs(free) ** 2).mean())
+    models = (
+        build_model(fidelity, radar, body, scene=scene, **OPTIONS.get(fidelity, {}))
+        for scene in (Scene(walls=walls[:2]), None)
+    )
+    room, free = (received(model.echoes(np.array(chirps)), radar) for model in models)
+    return float(np.abs(room - free).max() / np.sqrt((np.abs(free) ** 2).mean()))
+
+
+@pytest.mark.parametrize("fidelity", MODELS.built_in)
+def test_walls_that_are_not_there_change_nothing(fidelity: str) -> None:
+    assert error_of_vacuum(fidelity, SMALL, [103, 604], "perfect-conductor") < 1e-6
+
+
+@pytest.mark.parametrize("fidelity", ["analytic", "specular", "physical-optics"])
+def test_skin_and_patterns_are_in_rooms_what_they_are_in_free_space(fidelity: str) -> None:
+    # Rooms interpolate them over 20 ms, and follow the specular point where free space has that of
+    # a far radar.
+    assert error_of_vacuum(fidelity, SMALL, [103], "skin") < 1e-5
+    beam = Antenna(pattern="cosine", exponent=3.0)
+    shaped = replace(SMALL, tx_antenna=beam, rx_antenna=beam)
+    assert error_of_vacuum(fidelity, shaped, [103], "skin") < 1e-3
 
 
 # -- one mirror ------------------------------------------------------------------------------------
