@@ -23,7 +23,7 @@ from rtradar.motion import place
 from rtradar.report.pages.html import grade, limits_table
 from rtradar.report.pages.inline import InlinePage
 from rtradar.report.pages.labels import quantity
-from rtradar.report.pages.run_page import write_report
+from rtradar.report.pages.run_page import _people, write_report
 from rtradar.report.view.three_d import (
     MOST_POINTS,
     posed_figure,
@@ -360,3 +360,19 @@ def test_an_inline_page_is_saved_whole_or_refused(tmp_path: Path) -> None:
         page.save(tmp_path)
     with pytest.raises(rt.InputError, match="missing"):
         page.save(tmp_path / "missing" / "page.html")
+
+
+def test_people_have_a_row_each() -> None:
+    one = {
+        "name": "walk <1>",
+        "position_m": [0.5, -1.0],
+        "heading_deg": 30.0,
+        "material": "skin",
+        "echo_power_m2": 0.00123,
+        "snr_db": 17.26,
+    }
+    text = _people([one, one | {"name": "kick", "snr_db": None}])
+    assert "walk &lt;1&gt;</th><td>(0.5, -1) m</td><td>30°</td><td>skin</td>" in text
+    assert "<td>17.3 dB</td>" in text
+    assert "<td>-</td>" in text
+    assert "<tbody></tbody>" in _people([])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from itertools import chain
 from pathlib import Path
@@ -190,7 +190,16 @@ def _pictures(pictures: Mapping[str, Path]) -> Iterator[str]:
 def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
     parameters = dict(summary.get("parameters", {}))
     settings = parameters.pop("radar", {})
-    own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled", "room")
+    own = (
+        "parameters",
+        "limits",
+        "stages",
+        "versions",
+        "part_power_m2",
+        "modelled",
+        "room",
+        "people",
+    )
     listed = (*own, *_COSTS, "fidelity", "seed", "files")
     others = {key: value for key, value in summary.items() if key not in listed}
     modelled = summary.get("modelled", {})
@@ -209,9 +218,26 @@ def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
         ("Settings of the run", mapping_table(parameters)),
         ("Radar", mapping_table(settings)),
         ("What was found", mapping_table(others)),
+        ("People", _people(summary.get("people", ()))),
         ("How parts were modelled, of all parts and time", table(fractions)),
         ("Echo power by part", table(powers, ("", "Mean, with spreading loss", "Of all"))),
     )
+
+
+def _people(people: Sequence[Mapping[str, Any]]) -> str:
+    """Make the table of who is where, and how strong their echoes are."""
+    rows = (
+        (
+            one["name"],
+            "({:g}, {:g}) m".format(*one["position_m"]),
+            f"{one['heading_deg']:g}°",
+            one["material"],
+            f"{one['echo_power_m2']:.3g} m²",
+            "-" if one["snr_db"] is None else f"{one['snr_db']:.1f} dB",
+        )
+        for one in people
+    )
+    return table(rows, ("", "Place", "Heading", "Material", "Echo power", "Over noise"))
 
 
 _COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
