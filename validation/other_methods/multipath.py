@@ -568,7 +568,8 @@ def shadow_rows(
         cycles = room.reshape(-1, radar.n_tx, *room.shape[1:])
         shadows.append(cycles - cycles.mean(axis=0))
     first, last = shadows
-    quantity = f"shadow at keyframes {clutter_shadow.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms"
+    used_ms = shadow.step * radar.chirp_interval_s * 1e3
+    quantity = f"shadow at keyframes {used_ms:.3g} ms apart against 2.5 ms"
     error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported("living room, walk", quantity, "dB", error)
     yield reported(

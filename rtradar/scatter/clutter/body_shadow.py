@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.body.body import Poses
 from rtradar.kernels.scatter.silhouettes import Shadow, occluded_fractions, wave_table
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
@@ -37,27 +38,28 @@ Indices = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _SHORTEST_M = 1e-6
-KEYFRAMES_S = 12.5e-3
-"""Keyframe spacing of the body shadow [s]. `validation/other_methods/shadow.py` has the error of
-interpolating between them."""
+KEYFRAMES_S, KEYFRAMES_M = 40e-3, 0.075
+"""Longest time between keyframes of the shadow [s], and the way that the fastest part may make in
+it [m]. `validation/other_methods/shadow.py` has the error of the cubics in between."""
 _KEPT_KEYFRAMES = 8
 """Keyframes in the cache: those on both sides of a chirp, and a few before."""
 SWEEP_NODES = 5
 """Frequencies at which the shadow of what walls reflect is computed."""
 MIRROR_LINES, POINT_LINES = 48, 12
 """Lines through a leg over which Kirchhoff's integral is taken: an error of 0.4 % and of 3 %."""
-MIRROR_FADE, POINT_FADE = 0.1, 0.3
-"""Damping ``eps`` of the integral: what a mirror loses to an edge two Fresnel radii aside is less
-by two thirds. A point stands for facets or a cell as wide as such a zone, which sees no fringes."""
-MIRROR_REACH, POINT_REACH = 3.5, 2.0
+MIRROR_FADE, POINT_FADE = 0.2, 0.3
+"""Damping ``eps`` of the integral: fringes of an edge two Fresnel radii aside are a tenth of what
+they are without. A point stands for facets or a cell as wide as such a zone, which sees no fringes."""
+MIRROR_REACH, POINT_REACH = 2.5, 2.0
 """Fresnel radii beyond which parts are left out: fringes are then below 0.2 %."""
 _WEAK = 0.03
 """Power of the points seen from the array's middle only, over that of all that the body may come
 near."""
 _FAINT = 2e-3
 """Power of the points whose shadow is left out, over that of all that the body may come near."""
-_TRACK_S, _MOST_INSTANTS = 0.1, 200
-"""Spacing of the instants at which it is asked what the body comes near [s], and most of them."""
+_TRACK_S, _MOST_INSTANTS, _SPEED_S = 0.05, 400, 5e-3
+"""Spacing of the instants at which it is asked what the body comes near and how fast it is [s],
+most of them, and the time over which speeds are taken [s]."""
 _LEGS_A_THREAD = 256
 
 
@@ -75,14 +77,19 @@ class ClutterShadow:
         self._antennas, self._tx_weights, self._rx_weights = shadow_nodes(radar)
         self._middle = self._antennas.mean(axis=0)
         self._extent = float(np.linalg.norm(self._antennas - self._middle, axis=1).max())
-        self.step = keyframe_step(radar, KEYFRAMES_S)
         self.starts = np.cumsum([0, *(own.n_echoes for own in clutter.objects)])
         self.frequency = sweep_nodes(radar, SWEEP_NODES)
         objects = enumerate(clutter.objects)
         self.mirrors = tuple(number for number, own in objects if own.kind == "mirror")
         self._legs = _mirror_legs([clutter.objects[number] for number in self.mirrors], radar)
         self._points, self._of_point, power = _shared_points(clutter, self.starts)
-        self._keep_points(power)
+        count = min(int(body.duration_s / _TRACK_S) + 2, _MOST_INSTANTS)
+        instants = np.linspace(0.0, max(body.duration_s - _SPEED_S, 0.0), count)
+        poses, later = body.at(instants), body.at(instants + _SPEED_S)
+        fastest = float(np.linalg.norm(later.centres - poses.centres, axis=-1).max()) / _SPEED_S
+        apart_s = min(KEYFRAMES_S, KEYFRAMES_M / max(fastest, 1e-9))
+        self.step = keyframe_step(radar, apart_s)
+        self._keep_points(power, poses)
         self._kept: KeyframeCache[int, Shadow] = KeyframeCache(0, _KEPT_KEYFRAMES)
 
     def at(self, keyframe: int) -> Shadow:
@@ -155,11 +162,9 @@ class ClutterShadow:
         thread_map(fill, range(0, len(out), _LEGS_A_THREAD))
         return out
 
-    def _keep_points(self, power: Array) -> None:
-        """Keep the points that the body comes near, without the weakest of them."""
+    def _keep_points(self, power: Array, poses: Poses) -> None:
+        """Keep the points that the body comes near in some poses, without the weakest of them."""
         self._measure()
-        count = min(int(self._body.duration_s / _TRACK_S) + 2, _MOST_INSTANTS)
-        poses = self._body.at(np.linspace(0.0, self._body.duration_s, count))
         near = np.zeros(len(self._points), dtype=bool)
         for centres in poses.centres:
             near |= self._passes(*_ball(centres, poses.semi_axes.max(axis=1)))
