@@ -48,8 +48,8 @@ SWEEP_NODES = 5
 MIRROR_LINES, POINT_LINES = 48, 12
 """Lines through a leg over which Kirchhoff's integral is taken: an error of 0.4 % and of 3 %."""
 MIRROR_FADE, POINT_FADE = 0.2, 0.3
-"""Damping ``eps`` of the integral: fringes of an edge two Fresnel radii aside are a tenth of what
-they are without. A point stands for facets or a cell as wide as such a zone, which sees no fringes."""
+"""Damping ``eps`` of the integral: an edge two Fresnel radii aside has a tenth of its fringes. A
+point stands for facets or a cell as wide as such a zone, which sees none."""
 MIRROR_REACH, POINT_REACH = 2.5, 2.0
 """Fresnel radii beyond which parts are left out: fringes are then below 0.2 %."""
 _WEAK = 0.03
