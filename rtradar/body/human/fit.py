@@ -21,7 +21,7 @@ _LIMB_JOINTS: Mapping[str, Mapping[str, float]] = {
     "knee": {"lowerleg01.{}.head": 1.0},
     "ankle": {"foot.{}.head": 1.0},
     "toe": {"toe2-3.{}.tail": 1.0},
-    "shoulder": {"upperarm01.{}.head": 0.75, "shoulder01.{}.head": 0.25},
+    "shoulder": {"upperarm01.{}.head": 0.65, "shoulder01.{}.head": 0.35},
     "elbow": {"lowerarm01.{}.head": 1.0},
     "wrist": {"wrist.{}.head": 1.0},
     "hand": {"finger3-3.{}.tail": 1.0},
@@ -202,12 +202,26 @@ def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
 
 
 def _pelvis_frame(joints: Array) -> Array:
-    """Axes left, back and up of the pelvis, as columns."""
-    left = joints[NODES.index("l_hip")] - joints[NODES.index("r_hip")]
+    """Axes left, back and up of the pelvis, as columns; left is exact."""
     up = joints[NODES.index("lowerback")] - _middle(joints, "hip")
-    back = np.cross(up, left)
-    left, back = left / np.linalg.norm(left), back / np.linalg.norm(back)
+    left = _leftward(joints, "hip")
+    left, back = _units(left, np.cross(up, left))
     return np.stack([left, back, np.cross(left, back)], axis=1)
+
+
+def _chest_frame(joints: Array) -> Array:
+    """Axes left, back and up of the thorax, as columns; up, along its bone, is exact."""
+    up = joints[NODES.index("thorax")] - joints[NODES.index("upperback")]
+    up, back = _units(up, np.cross(up, _leftward(joints, "shoulder")))
+    return np.stack([np.cross(back, up), back, up], axis=1)
+
+
+def _leftward(joints: Array, node: str) -> Array:
+    return np.asarray(joints[NODES.index(f"l_{node}")] - joints[NODES.index(f"r_{node}")])
+
+
+def _units(first: Array, second: Array) -> tuple[Array, Array]:
+    return first / np.linalg.norm(first), second / np.linalg.norm(second)
 
 
 def _directions(joints: Array) -> Array:
@@ -224,15 +238,22 @@ def _strain(joints: Array, pose: Array) -> float:
 
 
 def _carried(joints: Array, pose: Array) -> Array:
-    """Rotations (node, 3, 3) of the mesh's parts to a pose, each the least after its parent's."""
+    """Rotations (node, 3, 3) of the mesh's parts to a pose, each the least after its parent's.
+
+    Hips and shoulders say how pelvis and thorax are turned about their bones.
+    """
     frames = np.empty((len(NODES), 3, 3))
     frames[0] = _pelvis_frame(pose) @ _pelvis_frame(joints).T
     for node, (way, wanted) in enumerate(
         zip(_directions(joints), _directions(pose), strict=True), start=1
     ):
         parent = frames[NODE_PARENTS[node]]
-        rigid = NODES[node].endswith("hip")
-        frames[node] = parent if rigid else _least_rotation(parent @ way, wanted) @ parent
+        if NODES[node].endswith("hip"):
+            frames[node] = parent
+        elif NODES[node] == "thorax":
+            frames[node] = _chest_frame(pose) @ _chest_frame(joints).T
+        else:
+            frames[node] = _least_rotation(parent @ way, wanted) @ parent
     return frames
 
 

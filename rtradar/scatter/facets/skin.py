@@ -122,7 +122,7 @@ class SkinFacets:
         self.frequency = sweep_nodes(radar, nodes)
         stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
         self._skins = [skin_of(person, stop_hz) for person in body.people]
-        self._coarse, fine = (self._joined(which) for which in ("coarse", "fine"))
+        fine = self._fine()
         counts = np.cumsum([0, *(len(person.semi_axes) for person in body.people)])
         part = np.concatenate(
             [skin.part + first for skin, first in zip(self._skins, counts[:-1], strict=True)]
@@ -132,14 +132,13 @@ class SkinFacets:
         self._tracing = threading.Lock()
         self._looks: KeyframeCache[int, NDArray[np.bool_]] = KeyframeCache(0, _KEPT)
 
-    def _joined(self, which: str) -> Indices:
-        """Faces of all skins, numbered among the vertices of all."""
-        found, first = [], 0
-        for skin in self._skins:
-            faces: Indices = getattr(skin, which)
-            found.append(faces + first)
-            first += int(faces.max()) + 1
-        return np.concatenate(found)
+    def _fine(self) -> Indices:
+        """Fine faces of all skins, numbered among the vertices of all."""
+        counts = [int(skin.fine.max()) + 1 for skin in self._skins]
+        firsts = np.cumsum([0, *counts[:-1]])
+        return np.concatenate(
+            [skin.fine + first for skin, first in zip(self._skins, firsts, strict=True)]
+        )
 
     def amplitude(
         self,
@@ -189,21 +188,32 @@ class SkinFacets:
 
     def _look(self, time: float) -> NDArray[np.bool_]:
         """Which facets (eye, facet) are seen past all skins at a time [s]."""
-        vertices = np.concatenate([skin.posed(time)[0] for skin in self._skins])
-        surfaces = MeshSurfaces(self._mi, vertices, self._coarse, same=_SAME)
-        corners = vertices[self._coarse]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        # Those at the corners, in their order, then the one between.
-        middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
-        seen = np.zeros((len(self._eyes), len(self._coarse), 4), dtype=bool)
-        for eye, place in enumerate(self._eyes):
-            facing = np.flatnonzero(np.sum(normals * (place - corners[:, 0]), axis=1) > 0)
-            points = middles[facing].reshape(-1, 3)
-            clear = surfaces.sees(
-                np.broadcast_to(place, points.shape), points, np.repeat(facing, 4)
-            )
-            seen[eye, facing] = clear.reshape(-1, 4)
-        return seen.reshape(len(self._eyes), -1)
+        posed = [skin.posed(time)[0] for skin in self._skins]
+        # Each in a scene about its own middle: float32 rounds alike whoever else is there.
+        scenes = [
+            MeshSurfaces(self._mi, vertices, skin.coarse, same=_SAME)
+            for skin, vertices in zip(self._skins, posed, strict=True)
+        ]
+        found = []
+        for skin, vertices, own in zip(self._skins, posed, scenes, strict=True):
+            corners = vertices[skin.coarse]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            # Those at the corners, in their order, then the one between.
+            middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
+            seen = np.zeros((len(self._eyes), len(corners), 4), dtype=bool)
+            for eye, place in enumerate(self._eyes):
+                facing = np.flatnonzero(np.sum(normals * (place - corners[:, 0]), axis=1) > 0)
+                points = middles[facing].reshape(-1, 3)
+                clear, start = (
+                    np.ones(len(points), dtype=bool),
+                    np.broadcast_to(place, points.shape),
+                )
+                for scene in scenes:
+                    whose = np.repeat(facing if scene is own else np.full_like(facing, -1), 4)
+                    clear &= scene.sees(start, points, whose)
+                seen[eye, facing] = clear.reshape(-1, 4)
+            found.append(seen.reshape(len(self._eyes), -1))
+        return np.concatenate(found, axis=1)
 
 
 def _piece(fine: Indices, part: Indices, own: int) -> _Piece:

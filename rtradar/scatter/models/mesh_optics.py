@@ -69,7 +69,8 @@ class MeshOptics(PhysicalOptics):
         unevenness: float = 0.02,
         frequencies: int = 3,
     ) -> None:
-        self._look_s = anchor_s
+        # An edge that crosses a limb fades over half an interval, not a whole one.
+        self._look_s = anchor_s / 2
         super().__init__(
             radar,
             body,
