@@ -79,6 +79,7 @@ _STAGES = {
     "range": "Range spectra", "clutter removal": "Clutter removal", "write": "Writing files",
     "doppler": "Range-Doppler maps", "cfar": "Detection", "cloud": "Clouds", "angle": "Angles",
     "received": "Frame before clutter removal", "spectrogram": "Spectrogram",
+    "sources": "Who returned each detection",
     "pictures": "Pictures", "view": "Echoes for the view", "report": "This page",
 }  # fmt: skip
 _UNITS = {
