@@ -103,12 +103,16 @@ class RigidLegs:
         return clear
 
     def longer_m(self, point: Array) -> float:
-        """Length that slabs add to the strongest wave over both legs to a point (3,) [m]."""
+        """Length that slabs add to the strongest wave over both legs to a point (3,) [m].
+
+        A leg adds none where no wave comes to the point.
+        """
         total = 0.0
         for leg, antenna in self._sides:
             waves, _ = self._waves(leg, antenna, point[None])
             powers = [float((np.abs(field) ** 2).sum()) for _, field in waves]
-            total += float(waves[int(np.argmax(powers))][0][0])
+            if waves:
+                total += float(waves[int(np.argmax(powers))][0][0])
         return total
 
     def factor(self, points: Array, normals: Array, made_of: Material, longer_m: float) -> Field:
