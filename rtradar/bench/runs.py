@@ -25,7 +25,7 @@ from rtradar.validate import validation_folder
 
 MOTION = "synthetic:walk"
 
-OTHER_PRODUCTS = ("spectrogram", "angle")
+OTHER_PRODUCTS = ("spectrogram", "angle", "sources")
 """Stages of a run that the range-Doppler-time cloud does not need."""
 
 FILES = ("write", "pictures", "view", "report")
