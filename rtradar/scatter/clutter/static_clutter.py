@@ -103,6 +103,12 @@ def _rough_returns(room: _Room, seed: int) -> _Found:
     return tuple((_item(echoes, radar), echoes) for echoes in found)
 
 
+def forget_rooms() -> None:
+    """Drop the rooms that were traced."""
+    for kept in (_smooth_returns, _rough_returns):
+        kept.cache_clear()
+
+
 class Clutter:
     """Static clutter of a scene.
 
