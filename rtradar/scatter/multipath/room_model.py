@@ -360,12 +360,11 @@ class RoomModel:
     def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathSummary, ...]:
         """Leave out echoes over walls that stay below the noise, and summarize each path.
 
-        One chirp every 20 ms of the capture is evaluated. Left out is an echo whose mean power,
-        after the gain of the samples, cycles and channels of a frame, is more than `MARGIN_DB`,
-        by geometric optics,
-        below the noise of one IF sample [m^2]; without noise, what is never visible. Window
-        functions, which lose 1.8 dB each (Hann), are not counted: what is left out is weaker than
-        that. Direct echoes always stay.
+        One chirp every 20 ms of the capture is evaluated, by geometric optics. Left out is an echo
+        whose mean power, after the gain of the samples, cycles and channels of a frame, is more
+        than `MARGIN_DB` below the noise of one IF sample [m^2]; without noise, what is never
+        visible. Window functions, which lose 1.8 dB each (Hann), are not counted: what is left out
+        is weaker than that. Direct echoes always stay.
         """
         radar, columns = self._radar, self._columns
         evaluated = np.arange(0, n_chirps, self._step)
