@@ -16,6 +16,7 @@ import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.scatter import build_model, chirp_poses
 from rtradar.scatter.antenna_gain import leg_gain, specular_points
+from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -222,9 +223,19 @@ def test_a_part_straight_between_tx_and_rx_has_no_echo_and_no_nan() -> None:
     np.testing.assert_array_equal(leg_gain(shaped, at) * far_field_echo(at)[1], 0)
 
 
-def test_patterns_are_refused_where_paths_lead_over_walls(tmp_path: Path) -> None:
-    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
-    radar = rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, tx_antenna=Antenna(pattern="dipole"))
-    with pytest.raises(rt.InputError, match="not followed; take free-space"):
-        rt.run(motion, radar, rt.Scene.load("living-room"), out=tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+@pytest.mark.parametrize(("side", "heard"), [("near", False), ("far", True)])
+def test_a_room_is_heard_through_the_pattern(side: str, heard: bool) -> None:
+    """A wall ahead answers as before, to the last bit of the peak; one behind does not at all."""
+    room = rt.Scene.load("living-room")
+    walls = tuple(wall for wall in room.walls if wall.name == side)
+    scene = rt.Scene(walls=walls, radar_position_m=room.radar_position_m)
+    looking = Antenna(pattern="cosine", exponent=2)
+    powers = [
+        sum(item.power_m2 for item in Clutter(scene.place(radar), scene, order=1).kept)
+        for radar in (
+            rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0),
+            rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, tx_antenna=looking, rx_antenna=looking),
+        )
+    ]
+    assert powers[0] > 0
+    assert powers[1] == pytest.approx(powers[0] if heard else 0, rel=1e-3)

@@ -70,7 +70,8 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["parameters"]["scene"] == "room"
     paths = {row["path"]: row for row in summary["room"]["paths"]}
-    assert set(paths) == {"body", "side > body", "body > side"}
+    walls = {"body", "side > body", "body > side"}
+    assert set(paths) == walls | {"shelf front > body", "body > shelf front"}
     # The wall is to the radar's left, and both legs see it: nothing of these paths is far below the
     # direct one.
     assert paths["side > body"]["over_noise_db"] > paths["body"]["over_noise_db"] - 10
@@ -104,7 +105,10 @@ def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
     body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0, duration_s=0.2)))
     model = build_model("analytic", radar, body, scene=room)
     found = {ghost.path: ghost for ghost in ghosts(model, radar, 0.1)}
-    assert set(found) == {"side > body", "body > side"}
+    assert set(found) == {"side > body", "body > side", "shelf front > body", "body > shelf front"}
+    # The shelf is 2.5 m behind.
+    behind = [found.pop("shelf front > body"), found.pop("body > shelf front")]
+    assert min(ghost.range_m for ghost in behind) > max(ghost.range_m for ghost in found.values())
     # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few
     # centimetres.
     place_of_radar, person = np.array([-4, 1, 1.0]), body.at([0.1]).centres[0].mean(axis=0)

@@ -48,7 +48,8 @@ def test_they_reach_every_map(tmp_path: Path, options: dict[str, Any], kept: set
     assert found.keys() == usual.keys()
     for name, values in found.items():
         difference = np.abs(values - usual[name]).max() / usual[name].max()
-        assert (difference == 0) if name in kept else (difference > 0.01), name
+        truth = name.startswith(("person", "joint"))
+        assert (difference == 0) if truth or name in kept else (difference > 0.01), name
 
 
 def test_an_unknown_one_is_refused_before_anything_is_written(tmp_path: Path) -> None:

@@ -33,7 +33,12 @@ def bits(folder: Path) -> dict[str, bytes]:
     """Every map and cloud as bytes."""
     found = {}
     with h5py.File(folder / "maps.h5") as maps:
-        found |= {name: data[()].tobytes() for name, data in maps.items()}
+        # Texts are given as objects, whose bytes are where they lie.
+        values = {name: data[()] for name, data in maps.items()}
+        found |= {
+            name: repr(own.tolist()).encode() if own.dtype.kind == "O" else own.tobytes()
+            for name, own in values.items()
+        }
     for name in ("cloud_rdt.npz", "cloud_xyz.npz"):
         with np.load(folder / name) as cloud:
             found |= {f"{name} {key}": cloud[key].tobytes() for key in cloud.files}

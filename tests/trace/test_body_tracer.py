@@ -76,6 +76,7 @@ class BesideADisc:
         self._body, self.duration_s = body, body.duration_s
         self.part_names = (*body.part_names, "disc")
         self.semi_axes = np.concatenate([body.semi_axes, [[0.5, 100.0, 100.0]]])
+        self.owner = np.zeros(len(self.semi_axes), dtype=np.int64)
 
     def at(self, times: Array) -> Poses:
         poses = self._body.at(times)

@@ -133,7 +133,7 @@ def test_a_model_of_skin_is_the_conductor_times_its_factor(fidelity: str) -> Non
     traced = {"variant": "scalar"} if fidelity == "specular" else {}
     metal, named, skin = (
         build_model(fidelity, radar, body, **traced, **option).echoes(chirps)  # type: ignore[arg-type]
-        for option in ({}, {"material": "perfect-conductor"}, {"material": "skin"})
+        for option in ({}, {"materials": ["perfect-conductor"] * 21}, {"materials": ["skin"] * 21})
     )
     np.testing.assert_array_equal(named.amplitude, metal.amplitude)
     np.testing.assert_array_equal(skin.length, metal.length)
