@@ -26,7 +26,7 @@ _RANGES = {"snr_db": "SNR [dB]", "heading_deg": "heading [deg]"}
 _MOST_SHOWN = 12
 _LIMITS = """\
 - Everything here is simulated. The person is 21 ellipsoids on the bones of a skeleton, conductors
-  unless another material is said above: no clothing, no soft tissue, no breath.
+  unless another material is said above: no clothing, no soft tissue.
 - rtradar's documentation says how far each fidelity level is from the truth.
 - Motions of synthetic actors are made by formulas. They are cleaner and less varied than those of
   people: test what learns from them on recordings."""

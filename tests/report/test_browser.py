@@ -98,12 +98,14 @@ def test_playing(browser: Any, report: tuple[str, int]) -> None:
         """Angle by which a view turns under the mouse, and stays turned [deg]."""
         before = eye(view)[:2]
         browser.drag(view, 200)
+        camera = f"document.getElementById('{view}')._fullLayout.scene._scene.getCamera().eye"
+        browser.wait(f"Math.hypot({camera}.x - {before[0]}, {camera}.y - {before[1]}) > 0.1")
         time.sleep(1.0)
         after = eye(view)[:2]
         cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
         return float(np.degrees(np.arccos(cosine)))
 
-    browser.open(report[0], width=640)  # a small view is drawn more quickly
+    browser.open(report[0], width=480)  # a small view is drawn more quickly
     x, y, width, height = browser.place("scene-figure")
     first = frame()
     browser.wait(f"Number({FIGURE}.dataset.frame) !== {first}")

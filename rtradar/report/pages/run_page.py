@@ -229,15 +229,13 @@ def _people(people: Sequence[Mapping[str, Any]]) -> str:
     rows = (
         (
             one["name"],
-            "({:g}, {:g}) m".format(*one["position_m"]),
-            f"{one['heading_deg']:g}°",
+            "({:g}, {:g}) m, {:g}°".format(*one["position_m"], one["heading_deg"]),
             one["material"],
-            f"{one['echo_power_m2']:.3g} m²",
             "-" if one["snr_db"] is None else f"{one['snr_db']:.1f} dB",
         )
         for one in people
     )
-    return table(rows, ("", "Place", "Heading", "Material", "Echo power", "Over noise"))
+    return table(rows, ("", "Place, heading", "Material", "SNR"))
 
 
 _COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
