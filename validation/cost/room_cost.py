@@ -83,7 +83,13 @@ def measure(quick: bool) -> list[Row]:
             "two people over one in a furnished room, motion to cloud by `specular`",
         ),
     ):
-        found.append(judged(claim, what, "1", ours[0] / base[0], most, says=words))
+        ratio = ours[0] / base[0]
+        # The limits are those of 3 s: in half a second what a run costs once weighs more.
+        found.append(
+            reported(claim, what, "1", ratio, says=words)
+            if quick
+            else judged(claim, what, "1", ratio, most, says=words)
+        )
         found.append(reported(claim, f"{what}, processor", "1", ours[1] / base[1]))
     error = error_db(walk, min(duration_s, 1.0))
     found.append(reported(claim, "error of ghosts over the person's power", "dB", error))

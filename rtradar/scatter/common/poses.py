@@ -49,6 +49,12 @@ class BuiltInModel:
     model), which `scattering_length` calls; None where there is none."""
 
 
+def owners_of(body: Body) -> NDArray[np.int64]:
+    """Return the person that each part (part,) belongs to; one, where a body knows no people."""
+    found: NDArray[np.int64] | None = getattr(body, "owner", None)
+    return np.zeros(len(body.part_names), dtype=np.int64) if found is None else found
+
+
 class EchoModel(Protocol):
     """An echo model of a body seen by a radar, for any chirps of the capture.
 

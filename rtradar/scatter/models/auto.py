@@ -18,7 +18,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses, owners_of
 from rtradar.scatter.fresnel_zones.keyframes import BEND, ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS
 from rtradar.scatter.models.analytic import far_field_echo
@@ -256,8 +256,8 @@ class Auto(BuiltInModel):
         )
         chosen = np.empty(budget.true.shape, dtype=np.int64)
         # A tolerance is one for each person, whoever else is there.
-        for person in range(self._body.owner.max() + 1):
-            own = self._body.owner == person
+        for person in range(owners_of(self._body).max() + 1):
+            own = owners_of(self._body) == person
             alone = ErrorBudget(**{name: a[..., own] for name, a in budget._asdict().items()})
             tolerances = self._power_fraction, self._complex_fraction
             chosen[:, own] = select_candidates(alone, *tolerances)

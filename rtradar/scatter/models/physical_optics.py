@@ -16,7 +16,13 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import (
+    BuiltInModel,
+    ChirpPoses,
+    chirp_poses,
+    one_echo_a_part,
+    owners_of,
+)
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
 from rtradar.scatter.facets.skin import SkinFacets
@@ -97,7 +103,7 @@ class PhysicalOptics(BuiltInModel):
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
-        self._envelope = Envelope(self._sample, body.owner, tolerance, end)
+        self._envelope = Envelope(self._sample, owners_of(body), tolerance, end)
 
     def _surface_of(self, variant: str, facets: int | None, nodes: int) -> FacetBody | SkinFacets:
         return FacetBody(
@@ -139,7 +145,7 @@ class PhysicalOptics(BuiltInModel):
         coarse = self._at_nodes(time, pose, self._coarse, parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
-        scale = whole_echo(coarse, self._body.owner) if whole is None else whole[parts]
+        scale = whole_echo(coarse, owners_of(self._body)) if whole is None else whole[parts]
         uneven = (
             np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1))
             > self._unevenness * scale

@@ -18,7 +18,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, owners_of
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
@@ -85,7 +85,7 @@ class Rays(BuiltInModel):
         self._grid = EllipsoidGrid.cover(body.semi_axes, radar.wavelength_m / rays_per_wavelength)
         backend = select(variant)
         self.variant: str | None = backend.kind
-        self._surfaces = BodySurfaces(use(backend), body.semi_axes, body.owner)
+        self._surfaces = BodySurfaces(use(backend), body.semi_axes, owners_of(body))
         self._posed: tuple[int, PosedGrid] | None = None
         self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 
