@@ -223,8 +223,8 @@ def test_a_part_straight_between_tx_and_rx_has_no_echo_and_no_nan() -> None:
     np.testing.assert_array_equal(leg_gain(shaped, at) * far_field_echo(at)[1], 0)
 
 
-@pytest.mark.parametrize(("side", "heard"), [("near", False), ("far", True)])
-def test_a_room_is_heard_through_the_pattern(side: str, heard: bool) -> None:
+@pytest.mark.parametrize(("side", "received"), [("near", False), ("far", True)])
+def test_a_room_is_received_through_the_pattern(side: str, received: bool) -> None:
     """A wall ahead answers as before, to the last bit of the peak; one behind does not at all."""
     room = rt.Scene.load("living-room")
     walls = tuple(wall for wall in room.walls if wall.name == side)
@@ -238,4 +238,4 @@ def test_a_room_is_heard_through_the_pattern(side: str, heard: bool) -> None:
         )
     ]
     assert powers[0] > 0
-    assert powers[1] == pytest.approx(powers[0] if heard else 0, rel=1e-3)
+    assert powers[1] == pytest.approx(powers[0] if received else 0, rel=1e-3)

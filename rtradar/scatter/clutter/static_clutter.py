@@ -4,7 +4,7 @@ It holds specular reflections by walls up to an order of images, furniture by ph
 facets, corner reflectors with several bounces, and the diffuse returns of rough walls. It does not
 hold the direct coupling from Tx to Rx, which is the radar's and not the room's; bounces between
 furniture and walls or other furniture; waves diffracted at edges of walls. Antennas look as their
-patterns say: isotropic ones hear what is right below, above and behind the radar as no real ones
+patterns say: isotropic ones receive what is right below, above and behind the radar as no real ones
 would. A room at rest is the same in every TDM cycle: its IF is computed once.
 """
 
