@@ -368,11 +368,10 @@ def test_people_have_a_row_each() -> None:
         "position_m": [0.5, -1.0],
         "heading_deg": 30.0,
         "material": "skin",
-        "echo_power_m2": 0.00123,
         "snr_db": 17.26,
     }
     text = _people([one, one | {"name": "kick", "snr_db": None}])
-    assert "walk &lt;1&gt;</th><td>(0.5, -1) m</td><td>30°</td><td>skin</td>" in text
+    assert "walk &lt;1&gt;</th><td>(0.5, -1) m, 30°</td><td>skin</td>" in text
     assert "<td>17.3 dB</td>" in text
     assert "<td>-</td>" in text
     assert "<tbody></tbody>" in _people([])
