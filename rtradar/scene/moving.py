@@ -7,10 +7,11 @@ pivot is from its position, in world axes, at any time since the start of the ca
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,36 +34,8 @@ MOTION_LIMITS: Limits = {
 """Least and largest value of each number of a motion; velocities are up to 1 km/s."""
 
 
-class RigidMotion(Protocol):
-    """What an `Object` asks of its motion."""
-
-    def pose(self, times: Array) -> tuple[Array, Array]:
-        """Rotations (time, 3, 3) about the pivot, in the mesh's own axes, and shifts (time, 3) [m].
-
-        The latter are from the position of the object to its pivot, in world axes.
-        """
-        ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class _AboutAxis:
-    """Rotation about an axis through the pivot, by an angle that depends on the time."""
-
-    axis: Vector = (0.0, 0.0, 1.0)
-    phase_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        where = f"motion {type(self).__name__}"
-        axis = check_vector(where, "axis", self.axis, 3)
-        if not any(axis):
-            raise InputError(f"{where}: axis = {brief(self.axis)}; it must have a direction")
-        object.__setattr__(self, "axis", axis)
-        for key, limits in MOTION_LIMITS.items():
-            if hasattr(self, key):
-                object.__setattr__(self, key, check_number(where, key, getattr(self, key), *limits))
-
-    def _angle_rad(self, times: Array) -> Array:
-        raise NotImplementedError
+class RigidMotion:
+    """What an `Object` asks of its motion; this one rests."""
 
     def pose(self, times: Array) -> tuple[Array, Array]:
         """Compute rotation about the pivot and shift of it.
@@ -79,11 +52,42 @@ class _AboutAxis:
         shift : (time, 3) float64
             Vector from the position of the object to its pivot, world axes [m].
         """
+        return self._rotations(times), self._shifts(times)
+
+    def _rotations(self, times: Array) -> Array:
+        return np.tile(np.eye(3), (len(times), 1, 1))
+
+    def _shifts(self, times: Array) -> Array:
+        return np.zeros((len(times), 3))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AboutAxis(RigidMotion, ABC):
+    """Rotation about an axis through the pivot, by an angle that depends on the time."""
+
+    axis: Vector = (0.0, 0.0, 1.0)
+    phase_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        where = f"motion {type(self).__name__}"
+        axis = check_vector(where, "axis", self.axis, 3)
+        if not any(axis):
+            raise InputError(f"{where}: axis = {brief(self.axis)}; it must have a direction")
+        object.__setattr__(self, "axis", axis)
+        for key, limits in MOTION_LIMITS.items():
+            if hasattr(self, key):
+                object.__setattr__(self, key, check_number(where, key, getattr(self, key), *limits))
+
+    @abstractmethod
+    def _angle_rad(self, times: Array) -> Array:
+        """Angles at some times (time,), of any number of turns."""
+
+    def _rotations(self, times: Array) -> Array:
         from scipy.spatial.transform import Rotation  # slow to import
 
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         turns: Any = Rotation.from_rotvec(self._angle_rad(times)[:, None] * axis)
-        return np.asarray(turns.as_matrix(), dtype=np.float64), np.zeros((len(times), 3))
+        return np.asarray(turns.as_matrix(), dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +156,7 @@ class Swinging(_AboutAxis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FollowingPath:
+class FollowingPath(RigidMotion):
     """Motion without rotation along a path: at one velocity, or over way-points, as of a cart.
 
     Parameters
@@ -187,10 +191,12 @@ class FollowingPath:
             object.__setattr__(self, "velocity_mps", velocity)
         if self.points_m is None or self.times_s is None:
             return
-        count = len(self.points_m)
+        listed = isinstance(self.points_m, Sequence | np.ndarray)
+        count = len(self.points_m) if listed else 0
         if not 2 <= count <= MOST_WAY_POINTS:
             raise InputError(
-                f"{where}: points_m has {count} way-points; 2 to {MOST_WAY_POINTS} are allowed"
+                f"{where}: points_m = {brief(self.points_m)}; it must be a list of 2 to "
+                f"{MOST_WAY_POINTS} way-points"
             )
         points = tuple(check_vector(where, "points_m", point, 3) for point in self.points_m)
         times = check_vector(where, "times_s", self.times_s, count, 1e6)
@@ -199,55 +205,35 @@ class FollowingPath:
         object.__setattr__(self, "points_m", points)
         object.__setattr__(self, "times_s", times)
 
-    def pose(self, times: Array) -> tuple[Array, Array]:
-        """Compute rotation about the pivot and shift of it.
-
-        Parameters
-        ----------
-        times : (time,) float64
-            Times since the start of the capture [s].
-
-        Returns
-        -------
-        rotation : (time, 3, 3) float64
-            Rotation in the mesh's own axes.
-        shift : (time, 3) float64
-            Vector from the position of the object to its pivot, world axes [m].
-        """
-        unturned = np.tile(np.eye(3), (len(times), 1, 1))
+    def _shifts(self, times: Array) -> Array:
         if self.velocity_mps is not None:
-            return unturned, times[:, None] * np.array(self.velocity_mps)
+            return times[:, None] * np.array(self.velocity_mps)
         from scipy.interpolate import PchipInterpolator  # slow to import
 
         ends = self.times_s or ()
         course = PchipInterpolator(np.array(ends), np.array(self.points_m))
-        shift = np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
-        return unturned, shift
+        return np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
 
 
-MOTIONS: Mapping[str, type[Turning | Swinging | FollowingPath]] = {
-    "turning": Turning,
-    "swinging": Swinging,
-    "path": FollowingPath,
+_Keys = tuple[str, ...]
+_KINDS: Mapping[str, tuple[type[RigidMotion], _Keys, _Keys]] = {
+    "turning": (Turning, ("rate_hz",), ("axis", "phase_deg")),
+    "swinging": (Swinging, ("amplitude_deg", "period_s"), ("axis", "phase_deg")),
+    "path": (FollowingPath, (), ("velocity_mps", "points_m", "times_s")),
 }
-"""Motions by the ``kind`` that a scene file names."""
-
-_KEYS = {
-    "turning": (("kind", "rate_hz"), ("axis", "phase_deg")),
-    "swinging": (("kind", "amplitude_deg", "period_s"), ("axis", "phase_deg")),
-    "path": (("kind",), ("velocity_mps", "points_m", "times_s")),
-}
+"""Motions by the ``kind`` that a scene file names, the keys that each needs, and the others."""
 
 
 def motion_of(where: str, table: object) -> RigidMotion:
     """Make a motion of the ``motion`` table of a scene file; ``where`` ends with a blank."""
     kind = table.get("kind") if isinstance(table, dict) else None
-    if not isinstance(table, dict) or not isinstance(kind, str) or kind not in MOTIONS:
+    if not isinstance(table, dict) or not isinstance(kind, str) or kind not in _KINDS:
         raise InputError(
-            f"{where}motion = {brief(table)}; it must be a table with kind = {' or '.join(MOTIONS)}"
+            f"{where}motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
         )
-    check_keys(f"{where}motion: ", table, *_KEYS[kind])
-    return MOTIONS[kind](**{key: value for key, value in table.items() if key != "kind"})
+    motion, needed, others = _KINDS[kind]
+    check_keys(f"{where}motion: ", table, ("kind", *needed), others)
+    return motion(**{key: value for key, value in table.items() if key != "kind"})
 
 
 @dataclass(frozen=True)
@@ -306,7 +292,7 @@ class Object(Furniture):
         super().__post_init__()
         pivot = check_vector(self._where, "pivot_m", self.pivot_m, 3)
         object.__setattr__(self, "pivot_m", pivot)
-        if self.motion is not None and not hasattr(self.motion, "pose"):
+        if not isinstance(self.motion, RigidMotion | None):
             raise InputError(
                 f"{self._where}: motion = {brief(self.motion)}; allowed: Turning, Swinging, "
                 "FollowingPath"
@@ -350,11 +336,8 @@ class Object(Furniture):
             Place of the pivot, world [m].
         """
         at = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        position = np.array(self.position_m)
-        if self.motion is None:
-            return np.tile(self.yaw, (len(at), 1, 1)), np.tile(position, (len(at), 1))
-        rotation, shift = self.motion.pose(at)
-        return self.yaw @ rotation, position + shift
+        rotation, shift = (self.motion or RigidMotion()).pose(at)
+        return self.yaw @ rotation, np.array(self.position_m) + shift
 
     def triangles(self, time_s: float = 0.0) -> Triangles:
         """Return the mesh where it is at a time since the start of the capture [s].
