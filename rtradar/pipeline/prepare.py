@@ -26,8 +26,8 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget, link_budget
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scatter.together import World, build_world, model_of_people
 from rtradar.scatter.validity import warn_of
+from rtradar.scatter.world import World, build_world, model_of_people
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise

@@ -24,7 +24,7 @@ import trimesh
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.scatter.together import build_world
+from rtradar.scatter.world import build_world
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

@@ -18,7 +18,7 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scatter.together import World
+from rtradar.scatter.world import World
 from rtradar.scene import Scene, Triangles
 
 MAX_STEPS = 400

@@ -20,8 +20,8 @@ from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.rigid import RigidEchoes
-from rtradar.scatter.rigid_legs import Past
+from rtradar.scatter.rigid.echoes import RigidEchoes
+from rtradar.scatter.rigid.legs import Past
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use

@@ -10,7 +10,7 @@ An object is seen over some lengths, one echo each, about that over its point of
 facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
 phases change slowly against those at the point of reference, the field is computed at knots in
 time for all pairs of antennas, with polynomials in between; else at every chirp. A sheet reflects
-several times, too (`rtradar.scatter.rigid_bounces`).
+several times, too (`rtradar.scatter.rigid.bounces`).
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ from rtradar.scatter.multipath.image_paths import WallPath
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.rigid_bounces import SheetBounces
-from rtradar.scatter.rigid_legs import Past, RigidLegs
+from rtradar.scatter.rigid.bounces import SheetBounces
+from rtradar.scatter.rigid.legs import Past, RigidLegs
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map

@@ -1,4 +1,4 @@
-"""Objects that move against `scattering_length` of their posed meshes, and who hides whom."""
+"""Objects that move against `scattering_length` of their posed meshes, closed forms and images."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
-from rtradar.scatter.rigid import RigidEchoes
-from rtradar.scatter.together import World, build_world, together
+from rtradar.scatter.rigid.echoes import RigidEchoes
+from rtradar.scatter.world import build_world
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -107,48 +107,6 @@ def test_too_near_to_an_antenna_is_refused() -> None:
         RigidEchoes(RADAR, coming, 0.5, None)
 
 
-def test_people_and_objects_hide_each_other() -> None:
-    radar = dataclasses.replace(RADAR, position_m=(-3.0, 0.0, 1.0))
-    standing = place(rt.synthetic_motion("punch", seed=0), duration_s=0.1)
-    body = Body.from_motion(standing)
-    sheet = trimesh.creation.box((0.02, 1.0, 2.2))
-    chirps, power = np.arange(2), {}
-    for name, x in (("before", -1.0), ("behind", 1.0), ("beside", 1.0)):
-        y = 3.0 if name == "beside" else 0.0
-        screen = rt.Object("screen", sheet, "metal", position_m=(x, y, 1.1))
-        scene = rt.Scene(objects=(screen,))
-        model = build_world("specular", radar, body, scene=scene)
-        echoes = model.echoes(chirps)
-        every = (np.abs(echoes.amplitude[1]) ** 2).sum(axis=(0, 1))
-        own = echoes.part == len(body.part_names)
-        power[name] = every[~own].sum(), every[own].sum()
-    # The screen before the person leaves little of them; behind, they leave less of it.
-    assert power["before"][0] < 0.02 * power["beside"][0]
-    assert power["behind"][0] == pytest.approx(power["beside"][0])
-    assert power["behind"][1] < 0.5 * power["before"][1]
-
-
-def test_echoes_together_are_the_sum_of_each() -> None:
-    rng = np.random.default_rng(0)
-    several = []
-    for nodes in (1, 3, 2):
-        shape = (nodes, 4, 2, 5)
-        several.append(
-            rt.Echoes(
-                length=np.broadcast_to(rng.uniform(2, 8, (2, 5)), shape[1:]),
-                amplitude=rng.normal(size=shape) + 1j * rng.normal(size=shape),
-                frequency=RADAR.start_frequency_hz + rng.uniform(0, 4e9, nodes),
-                tx=RADAR.tx_of_chirp(np.arange(4)),
-                part=np.arange(5),
-                bounces=np.ones(5, dtype=np.int64),
-            )
-        )
-    times = RADAR.chirp_times(4)
-    found = rt.signal.synthesize(together(several), RADAR, times)
-    expected = sum(rt.signal.synthesize(own, RADAR, times) for own in several)
-    np.testing.assert_allclose(found, expected, atol=1e-7)
-
-
 def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
     radar = dataclasses.replace(
         RADAR, tx_y=1, tx_z=0, rx_y=1, rx_z=0, start_frequency_hz=11.9e9, bandwidth_hz=0.2e9
@@ -221,22 +179,3 @@ def test_over_a_conducting_wall_it_is_its_mirror_image() -> None:
     found = field(RigidEchoes(RADAR, own, 0.1, None, walls=(behind,), path=path).echoes(chirp))
     expected = field(RigidEchoes(RADAR, mirrored, 0.1, None).echoes(chirp))
     np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())
-
-
-def test_ghosts_below_the_noise_or_far_below_their_object_are_left_out() -> None:
-    body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.05))
-    radar = dataclasses.replace(RADAR, position_m=(-2.0, 1.0, 1.0))
-    plate = dataclasses.replace(box(None), position_m=(0.5, 1.0, 1.0))
-    walls = (wall("perfect-conductor", 2.0, -1.0),)
-    scene = rt.Scene(walls=walls, objects=(plate,))
-    world = build_world("specular", radar, body, scene=scene)
-    assert isinstance(world, World)
-    (found,) = world.prune(radar, 300, 0.0)
-    # The wall behind it: over it the object is seen from its other side.
-    names = [row["path"] for row in found["paths"]]
-    assert names == ["object", "object > wall", "wall > object"]
-    powers = [row["power_m2"] for row in found["paths"]]
-    assert powers[1] == pytest.approx(powers[2], rel=0.05)
-    assert len(world.objects[0]) == sum(power > 0 for power in powers)
-    world.prune(radar, 300, 1e9)
-    assert [path.path.name for path in world.objects[0]] == ["body"]

@@ -1,0 +1,1 @@
+"""Rigid objects that move: their facets, legs, and bounces on sheets."""
