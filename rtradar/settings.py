@@ -118,8 +118,7 @@ class RunSettings:
     pfa : float
         False-alarm rate that the detector is designed for in each cell.
     seed : int
-        Seed of noise, diffuse returns, the sampling of clouds and, on the command line, of
-        synthetic motion.
+        Seed of noise, the sampling of clouds and, on the command line, of synthetic motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, for models that trace rays; ``auto`` and ``cpu`` take llvm, or scalar
         where that does not work, and ``cuda`` traces the rays on a GPU.

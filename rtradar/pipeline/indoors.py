@@ -46,14 +46,14 @@ def indoors(
 ) -> Indoors:
     """Trace a room with a person in it, and leave out what stays below the noise.
 
-    The settings give the backend, the order of the paths, the seed of diffuse returns, and whether
-    everything is kept. The powers are those of the person's echoes without the room, and of noise,
-    per IF sample [m^2]. What is not worth its cost is taken out of the model.
+    The settings give the backend, the order of the paths, and whether everything is kept. The
+    powers are those of the person's echoes without the room, and of noise, per IF sample [m^2].
+    What is not worth its cost is taken out of the model.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     paths = model.prune(n_chirps, noise)
     order = max(settings.order, 1)
-    clutter = Clutter(radar, scene, variant=variant, seed=settings.seed, order=order).prune(noise)
+    clutter = Clutter(radar, scene, variant=variant, order=order).prune(noise)
     room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body))
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {

@@ -78,35 +78,18 @@ class _Room:
         still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
         return cls(radar, still, digest.digest(), backend)
 
-    def tracer(self) -> RoomTracer:
-        """Return a tracer of the furniture."""
-        return RoomTracer(use(self.backend), self.scene)
-
-
-_Found = tuple[tuple[ClutterItem, RoomEchoes], ...]
-
 
 @lru_cache(maxsize=KEPT_ROOMS)
-def _smooth_returns(room: _Room, order: int) -> _Found:
-    """Trace walls as mirrors, and furniture: none of it depends on the seed."""
-    radar, scene = room.radar, room.scene
-    mirrors = specular_returns(radar, scene, room.tracer(), order)
-    furniture = furniture_returns(use(room.backend), radar, scene)
-    return tuple((_item(echoes, radar), echoes) for echoes in (*mirrors, *furniture))
-
-
-@lru_cache(maxsize=KEPT_ROOMS)
-def _rough_returns(room: _Room, seed: int) -> _Found:
-    """Trace the diffuse returns of rough walls."""
-    radar = room.radar
-    found = rough_returns(radar, room.scene, room.tracer(), seed)
+def _returns(room: _Room, order: int) -> tuple[tuple[ClutterItem, RoomEchoes], ...]:
+    """Trace walls as mirrors, furniture, and the diffuse returns of rough walls."""
+    radar, scene, mi = room.radar, room.scene, use(room.backend)
+    tracer = RoomTracer(mi, scene)
+    found = (
+        *specular_returns(radar, scene, tracer, order),
+        *furniture_returns(mi, radar, scene),
+        *rough_returns(radar, scene, tracer),
+    )
     return tuple((_item(echoes, radar), echoes) for echoes in found)
-
-
-def forget_rooms() -> None:
-    """Drop the rooms that were traced."""
-    for kept in (_smooth_returns, _rough_returns):
-        kept.cache_clear()
 
 
 class Clutter:
@@ -115,24 +98,23 @@ class Clutter:
     Traced rooms are kept, `KEPT_ROOMS` of them: the next recording in one finds it traced.
 
     The radar is at its position in the scene, where `Scene.place` puts it; ``variant`` is Mitsuba's
-    backend, ``seed`` that of the positions and phases of diffuse returns, ``order`` the largest
-    number of walls on a specular path, 0 to 3. ``objects`` are the echoes that are kept, the
-    strongest object first; ``kept`` and ``dropped`` the same in figures, and what is too far for
-    the radar or was taken out by `prune`.
+    backend, ``order`` the largest number of walls on a specular path, 0 to 3. ``objects`` are
+    the echoes that are kept, the strongest object first; ``kept`` and ``dropped`` the same in
+    figures, and what is too far for the radar or was taken out by `prune`.
 
     An `InputError` is raised if an option is out of range, a mesh cannot be used, or walls change a
     return faster over the sweep than a polynomial follows to a thousandth of the strongest.
     """
 
     def __init__(
-        self, radar: Radar, scene: Scene, *, variant: str = "auto", seed: int = 0, order: int = 2
+        self, radar: Radar, scene: Scene, *, variant: str = "auto", order: int = 2
     ) -> None:
         if isinstance(order, bool) or not (isinstance(order, int) and 0 <= order <= MOST_ORDER):
             raise InputError(
                 f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
             )
         self.radar, room = radar, _Room.of(radar, scene, select(variant))
-        found = [*_smooth_returns(room, order), *_rough_returns(room, seed)]
+        found = _returns(room, order)
         _refuse_not_followed([echoes for _, echoes in found], scene)
         ranked = sorted(found, key=lambda one: -one[0].cell_m2)
         self.objects = tuple(echoes for item, echoes in ranked if item.cell_m2 > 0)

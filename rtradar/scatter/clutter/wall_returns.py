@@ -151,18 +151,16 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
 # -- rough walls -----------------------------------------------------------------------------------
 
 
-def rough_returns(
-    radar: Radar, scene: Scene, tracer: RoomTracer, seed: int
-) -> Iterator[RoomEchoes]:
+def rough_returns(radar: Radar, scene: Scene, tracer: RoomTracer) -> Iterator[RoomEchoes]:
     """Yield the diffuse returns of every face of a rough wall that has antennas before it.
 
-    Furniture, which the tracer knows, occludes points. The seed, with the wall and the face, fixes
-    positions and phases.
+    Furniture, which the tracer knows, occludes points. Positions and phases belong to the wall's
+    number and face, whatever the seed of a run: a room is the same for all who walk in it.
     """
     for (number, wall), back in product(enumerate(scene.walls), (False, True)):
         before = [(height(wall, places, back=back) > 0).any() for places in (radar.tx, radar.rx)]
         if wall.roughness_m > 0 and all(before):
-            rng = np.random.default_rng(stream(seed, number, int(back)))
+            rng = np.random.default_rng(stream(0, number, int(back)))
             echoes = _rough_face(Face(wall, back), rng, radar, scene, tracer)
             if echoes.n_echoes:
                 yield echoes
