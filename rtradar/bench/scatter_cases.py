@@ -347,15 +347,6 @@ def _facets_by_length(k: Any) -> Calls:
     return added, lambda: k.facets_by_length_reference(facets, views, grid, True)
 
 
-@kernel_case("scatter.facets_by_length.between_knots", "100 chirps between 12 knots", 1e-6)
-def _between_knots(k: Any) -> Calls:
-    rng = np.random.default_rng(0)
-    field = rng.normal(size=(12, 3, 4, 3, 20)) + 1j * rng.normal(size=(12, 3, 4, 3, 20))
-    given = field, rng.integers(0, 5, 100), rng.uniform(0, 1, 100), rng.integers(0, 3, 100)
-    call = filled(k.between_knots, *given, out=(np.empty((3, 100, 4, 20), np.complex64),))
-    return call, lambda: k.between_knots_reference(*given)
-
-
 # -- static clutter --------------------------------------------------------------------------------
 
 

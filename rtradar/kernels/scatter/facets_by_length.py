@@ -34,9 +34,6 @@ Array = NDArray[np.float64]
 _MOST_TURN = 1.0
 """Phase [rad] that may change over half the sweep between the ends of one piece of a facet."""
 
-KNOTS = 8
-"""Knots in time of one polynomial."""
-
 _OVER_ROOT_PI = 1 / math.sqrt(math.pi)
 
 _BOWED = 0.75
@@ -259,39 +256,3 @@ def facets_by_length_reference(facets, views, grid, spreading):
             field = (phases * views.factor[pose]) @ size
             out.append(np.conj(1j * grid.wavenumber / np.sqrt(np.pi) * field))
     return np.reshape(out, (*views.rx.shape[:2], -1))
-
-
-@compiled()
-def between_knots(field, first, fraction, tx, out):
-    """Fill ``out (node, chirp, rx, echo)`` with polynomials through values at knots in time.
-
-    These are ``field (knot, tx, rx, node, echo)``. A chirp of the Tx ``tx (chirp,)`` is at
-    ``fraction (chirp,)`` of the interval in the middle of the `KNOTS` from ``first (chirp,)`` on;
-    the polynomial is that of Lagrange.
-    """
-    weights = np.empty(KNOTS)
-    for chirp in range(len(first)):
-        knot, own = first[chirp], tx[chirp]
-        for i in range(KNOTS):
-            weights[i] = 1.0
-            for other in range(KNOTS):
-                if other != i:
-                    weights[i] *= (fraction[chirp] + KNOTS // 2 - 1 - other) / (i - other)
-        for r in range(out.shape[2]):
-            for node in range(out.shape[0]):
-                for echo in range(out.shape[3]):
-                    total = 0.0 + 0.0j
-                    for i in range(KNOTS):
-                        total += weights[i] * field[knot + i, own, r, node, echo]
-                    out[node, chirp, r, echo] = total
-
-
-def between_knots_reference(field, first, fraction, tx):
-    """The same by NumPy's polynomials, chirp by chirp."""
-    out = []
-    for chirp, knot in enumerate(first):
-        values = field[knot : knot + KNOTS, tx[chirp]].reshape(KNOTS, -1)
-        fitted = np.polynomial.polynomial.polyfit(np.arange(KNOTS) - 3, values, KNOTS - 1)
-        out.append(np.polynomial.polynomial.polyval(fraction[chirp], fitted))
-    shaped = np.reshape(out, (len(first), *field.shape[2:]))
-    return np.moveaxis(shaped, 2, 0)

@@ -11,19 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.facets_by_length import KNOTS, between_knots
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import SHEET_BOUNCES
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
+from rtradar.scatter.rigid.knots import Knots
 from rtradar.trace.bounces import MeshSurfaces
 
 Array = NDArray[np.float64]
@@ -75,27 +76,19 @@ class SheetBounces:
         Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``. All
         echoes are there if ``whole``, else those that are not 0.
         """
-        numbers = np.floor(times / self._knot_s).astype(np.int64)
-        wanted = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
-        for number in wanted.tolist():
-            if number not in self._knots:
-                self._knots.keep(number, self._knot(number * self._knot_s))
-        field = np.stack([self._knots[number] for number in wanted.tolist()])
+        knots = Knots(times, self._knot_s)
+        field = np.stack(
+            [self._knots.get(own, partial(self._knot, own)) for own in knots.numbers.tolist()]
+        )
         used = field.any(axis=(0, 1, 2, 3)) | whole
-        out = np.empty(
-            (len(self._wavenumber), len(times), field.shape[2], int(used.sum())), np.complex64
-        )
-        first, fraction = (
-            np.searchsorted(wanted, numbers - KNOTS // 2 + 1),
-            times / self._knot_s - numbers,
-        )
-        between_knots(np.ascontiguousarray(field[..., used]), first, fraction, tx, out)
+        out = knots.between(field[..., used], tx)
         beyond = np.arange(-self._half, self._half + 2) * self._step
         bounces = np.repeat(self._orders, self._count).astype(np.int64)
         return np.tile(beyond, len(self._orders))[used], out, bounces[used]
 
-    def _knot(self, time_s: float) -> NDArray[np.complex128]:
-        """Amplitudes (tx, rx, node, echo) at one time, the echoes of each number of bounces."""
+    def _knot(self, number: int) -> NDArray[np.complex128]:
+        """Amplitudes (tx, rx, node, echo) at one knot, the echoes of each number of bounces."""
+        time_s = number * self._knot_s
         radar, ((rotation,), (at,)) = self._radar, self._pose(np.array([time_s]))
         corners = (self._triangles @ rotation.T + at).reshape(-1, 3)
         surfaces = MeshSurfaces(self._mi, corners, np.arange(len(corners)).reshape(-1, 3))

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,11 +27,9 @@ from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets_by_length import (
-    KNOTS,
     LengthGrid,
     RigidFacets,
     RigidViews,
-    between_knots,
     facets_by_length,
 )
 from rtradar.radar import Radar
@@ -42,6 +41,7 @@ from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.rigid.bounces import SheetBounces
+from rtradar.scatter.rigid.knots import Knots
 from rtradar.scatter.rigid.legs import Past, RigidLegs
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
@@ -169,9 +169,9 @@ class RigidEchoes:
         shape, middles = self.moving.shape, self._legs.middles[:, None, None]
         times = np.linspace(0.0, duration_s, _SAMPLES)
         points = np.concatenate([shape.vertices, self._reference[None]])
+        poses = [self.moving.pose(at) for at in (times, times + _STEP_S)]
         early, late = (
-            np.einsum("tij,vj->tvi", rotation, points) + place[:, None]
-            for rotation, place in (self.moving.pose(at) for at in (times, times + _STEP_S))
+            np.einsum("tij,vj->tvi", rotation, points) + place[:, None] for rotation, place in poses
         )
         # Of both legs (2, instant, vertex).
         ranges, later = (np.linalg.norm(at - middles, axis=-1) for at in (early, late))
@@ -179,9 +179,8 @@ class RigidEchoes:
         if self.path.order == 0:
             self._refuse_too_near(times, ranges[0])
         rates = float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
-        rotations = [self.moving.pose(at)[0] for at in (times, times + _STEP_S)]
         # The chord of a small rotation, over all three axes, is sqrt(2) of its angle.
-        change = np.linalg.norm(rotations[1] - rotations[0], axis=(1, 2)) / math.sqrt(2)
+        change = np.linalg.norm(poses[1][0] - poses[0][0], axis=(1, 2)) / math.sqrt(2)
         nearest = max(float(ranges.min()), MINIMUM_ANTENNA_DISTANCE_M)
         return nearest, rates, speeds[:, :-1] / 2, float(change.max()) / _STEP_S
 
@@ -226,17 +225,14 @@ class RigidEchoes:
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         apart = len(chirps) and chirps[-1] - chirps[0] >= 2 * len(chirps)
-        numbers = np.floor(times / self._knot_s).astype(np.int64)
-        knots = np.unique(numbers[:, None] + np.arange(KNOTS) - KNOTS // 2 + 1)
-        if len(knots) * radar.n_tx < len(chirps):
-            every = np.repeat(knots * self._knot_s, radar.n_tx)
-            field = self._field(every, np.tile(np.arange(radar.n_tx), len(knots)))
+        knots = Knots(times, self._knot_s)
+        count = len(knots.numbers)
+        if count * radar.n_tx < len(chirps):
+            every = np.repeat(knots.numbers * self._knot_s, radar.n_tx)
+            field = self._field(every, np.tile(np.arange(radar.n_tx), count))
             used = field.any(axis=(0, 1, 2))
-            field = field[..., used].reshape(len(knots), radar.n_tx, *field.shape[1:3], -1)
-            amplitude = np.empty((_NODES, len(chirps), radar.n_rx, field.shape[-1]), np.complex64)
-            fraction = times / self._knot_s - numbers
-            first = np.searchsorted(knots, numbers - KNOTS // 2 + 1)
-            between_knots(field, first, fraction, tx, amplitude)
+            field = field[..., used].reshape(count, radar.n_tx, *field.shape[1:3], -1)
+            amplitude = knots.between(field, tx)
         else:
             field = self._field(times, tx)
             used = field.any(axis=(0, 1, 2)) | bool(apart)
@@ -274,7 +270,10 @@ class RigidEchoes:
         place = times / self._keyframe_s
         before = np.floor(place).astype(np.int64)
         numbers = np.unique([before, before + 1])
-        keyframes = self._find(numbers.tolist())
+        keyframes = [
+            self._keyframes.get(number, partial(self._keyframe, number))
+            for number in numbers.tolist()
+        ]
         rx = self._radar.rx_of_tx[tx]
         views = RigidViews(
             tx=np.einsum("tji,tj->ti", rotation, legs.tx[tx] - at),
@@ -296,14 +295,6 @@ class RigidEchoes:
         return out
 
     # -- keyframes ---------------------------------------------------------------------------------
-
-    def _find(self, numbers: list[int]) -> list[_Keyframe]:
-        found = []
-        for number in numbers:
-            if number not in self._keyframes:
-                self._keyframes.keep(number, self._keyframe(number))
-            found.append(self._keyframes[number])
-        return found
 
     def _keyframe(self, number: int) -> _Keyframe:
         time_s, facets = number * self._keyframe_s, self._facets

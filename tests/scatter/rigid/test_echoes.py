@@ -15,8 +15,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
+from rtradar.scatter.rigid import bounces
 from rtradar.scatter.rigid.echoes import RigidEchoes
-from rtradar.scatter.world import build_world
+from rtradar.scatter.world import World, build_world
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -136,6 +137,24 @@ def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
     wavelength = SPEED_OF_LIGHT_MPS / 12e9
     closed = 4 * np.pi * 0.4**4 / (3 * wavelength**2)
     np.testing.assert_allclose(10 * np.log10(power / closed), 0, atol=0.3)
+
+
+def test_a_pass_may_need_more_knots_of_bounces_than_are_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(bounces, "_KEPT_KNOTS", 2)
+    monkeypatch.setattr(bounces, "_PASSING", 1)
+    radar = dataclasses.replace(RADAR, tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+    turning = rt.Turning(rate_hz=0.5)
+    corner = rt.Object(
+        "corner", "dihedral", "metal", position_m=(3, 0, 1), yaw_deg=180, motion=turning
+    )
+    body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.1))
+    world = build_world("specular", radar, body, scene=rt.Scene(objects=(corner,)))
+    assert isinstance(world, World)
+    moving, chirps = world.objects[0][0], np.arange(0, 40, 5)
+    found = field(moving.echoes(chirps))
+    np.testing.assert_allclose(field(moving.echoes(chirps[-1:])), found[:, -1:], atol=1e-6)
 
 
 def wall(made_of: str, x: float, normal_x: float) -> Wall:
