@@ -17,7 +17,7 @@ from rtradar.motion.skeleton import NODE_PARENTS, NODES
 Array = NDArray[np.float64]
 
 _LIMB_JOINTS: Mapping[str, Mapping[str, float]] = {
-    "hip": {"upperleg01.{}.head": 0.77, "upperleg01.{}.tail": 0.1, "pelvis.{}.head": 0.13},
+    "hip": {"upperleg01.{}.head": 0.67, "upperleg01.{}.tail": 0.2, "pelvis.{}.head": 0.13},
     "knee": {"lowerleg01.{}.head": 1.0},
     "ankle": {"foot.{}.head": 1.0},
     "toe": {"toe2-3.{}.tail": 1.0},
