@@ -16,7 +16,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import ExtensionError, InputError
 from rtradar.radar import Radar
 from rtradar.scatter.antenna_gain import over_legs
-from rtradar.scatter.common.poses import EchoModel, account_of
+from rtradar.scatter.common.poses import EchoModel, account_of, has_mesh
 from rtradar.scene import Scene
 from rtradar.system.registries import MODELS
 
@@ -100,8 +100,7 @@ def build_model(
 def _kind_for(fidelity: str, body: Body, model_options: Iterable[str]) -> Callable[..., EchoModel]:
     """Return what makes the model of that name for such a body; refuse options it does not have."""
     kind: Callable[..., EchoModel] = MODELS.find(fidelity)
-    # Other bodies of ellipsoids than `Body` need not know of people and meshes.
-    if any(getattr(person, "mesh", None) is not None for person in getattr(body, "people", ())):
+    if has_mesh(body):
         from rtradar.scatter.models.mesh_optics import mesh_model
 
         kind = mesh_model(fidelity)

@@ -55,6 +55,12 @@ def owners_of(body: Body) -> NDArray[np.int64]:
     return np.zeros(len(body.part_names), dtype=np.int64) if found is None else found
 
 
+def has_mesh(body: Body) -> bool:
+    """Whether any of the people has a mesh; other bodies than `Body` need not know of either."""
+    people = getattr(body, "people", ())
+    return any(getattr(person, "mesh", None) is not None for person in people)
+
+
 class EchoModel(Protocol):
     """An echo model of a body seen by a radar, for any chirps of the capture.
 

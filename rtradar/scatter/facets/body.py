@@ -8,18 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facet_shadows import shade
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import sweep_nodes
+from rtradar.scatter.common.interpolation import ArrayNodes, sweep_nodes
 from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.facets.surfaces import (
     body_facets,
     ellipsoid_facets,
     facet_integral,
     subdivisions_for,
 )
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -99,6 +103,23 @@ class FacetBody:
         self.variant = backend.kind
         tracer = BodyTracer(use(backend), body.semi_axes)
         self.seen = FacetShadows(tracer, self._facets, body.semi_axes).seen
+
+    def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
+        """Path [m] and strength of each part (chirp, rx, part) by its specular point."""
+        length, strength, _ = solve_specular_points(
+            at, polarization=self._radar.polarization, spreading=self._spreading
+        )
+        return length, strength
+
+    def field(
+        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
+    ) -> NDArray[np.complex128]:
+        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m]."""
+        antennas = nodes.antennas
+        seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
+        index = np.arange(len(antennas))[None]
+        places = (pose.centres, pose.frames), antennas[None], nodes.pairs
+        return self.amplitude(*places, length[None], seen, index, parts)[:, 0]
 
     def amplitude(
         self,

@@ -16,15 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body, unit_sphere
+from rtradar.body.body import Poses
 from rtradar.body.human.mesh import MOST_DIVISIONS, loop_subdivision
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
+from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.facets.surfaces import body_facets, facet_integral, facet_normals
 from rtradar.scatter.ray_tubes.tubes import in_four
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import MeshSurfaces
 
@@ -139,6 +143,26 @@ class SkinFacets:
         return np.concatenate(
             [skin.fine + first for skin, first in zip(self._skins, firsts, strict=True)]
         )
+
+    def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
+        """Path [m] over the specular point of each part's ellipsoid, and 1 / (R1 R2) of its middle.
+
+        Both (chirp, rx, part); 1 without spreading.
+        """
+        length, _, _ = solve_specular_points(at)
+        if not self._spreading:
+            return length, np.ones_like(length)
+        to_tx, to_rx = (
+            np.linalg.norm(place - at.centres[:, None], axis=-1)
+            for place in (at.tx[:, None, None], at.rx[:, :, None])
+        )
+        return length, 1 / (to_tx * to_rx)
+
+    def field(
+        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
+    ) -> NDArray[np.complex128]:
+        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m]."""
+        return self.amplitude(time, pose.centres[0], nodes.antennas, nodes.pairs, length, parts)
 
     def amplitude(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +19,8 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import (
     BuiltInModel,
-    ChirpPoses,
     chirp_poses,
+    has_mesh,
     one_echo_a_part,
     owners_of,
 )
@@ -27,14 +28,11 @@ from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
 from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.scatter.facets.target import facet_scattering
-from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
 
 _MOST_FREQUENCIES = 9
-
-Array = NDArray[np.float64]
 
 
 class PhysicalOptics(BuiltInModel):
@@ -43,8 +41,8 @@ class PhysicalOptics(BuiltInModel):
     Parameters
     ----------
     facets : int, optional
-        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
-        grown person.
+        Least number per ellipsoid; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for
+        a grown person. A mesh is always divided by the wavelength.
     anchor_s : float
         Time between keyframes [s]; where the echo bends it comes down to an eighth of it.
     tolerance : float
@@ -65,6 +63,7 @@ class PhysicalOptics(BuiltInModel):
 
     Notes
     -----
+    The carrier of a part goes by the specular point of its ellipsoid, of a mesh too.
     Equation :eq:`envelope` of the theory page; :eq:`po` in each keyframe.
     """
 
@@ -94,8 +93,19 @@ class PhysicalOptics(BuiltInModel):
         for name, value in positive.items():
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"physical-optics: {name} = {value}; it must be positive")
-        self._radar, self._body, self._spreading = radar, body, spreading
-        self._surface = self._surface_of(variant, facets, frequencies)
+        self._radar, self._body = radar, body
+        common: dict[str, Any] = {"variant": variant, "spreading": spreading, "nodes": frequencies}
+        self._surface: FacetBody | SkinFacets
+        if not has_mesh(body):
+            self._surface = FacetBody(radar, body, facets=facets, **common)
+        elif facets is None:
+            # An edge that crosses a limb fades over half an interval, not a whole one.
+            self._surface = SkinFacets(radar, body, look_s=anchor_s / 2, **common)
+        else:
+            raise InputError(
+                f"physical-optics: facets = {facets}; a mesh is divided by the wavelength: leave "
+                "facets out, or take body = 'ellipsoids'"
+            )
         self.variant: str | None = self._surface.variant
         self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
         # From coarse nodes to fine ones, which stand at antennas or between them.
@@ -104,39 +114,6 @@ class PhysicalOptics(BuiltInModel):
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
         self._envelope = Envelope(self._sample, owners_of(body), tolerance, end)
-
-    def _surface_of(self, variant: str, facets: int | None, nodes: int) -> FacetBody | SkinFacets:
-        return FacetBody(
-            self._radar,
-            self._body,
-            variant=variant,
-            spreading=self._spreading,
-            facets=facets,
-            nodes=nodes,
-        )
-
-    def _carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
-        """Path [m] and strength [m] of each part (chirp, rx, part), which the envelope is over."""
-        length, strength, _ = solve_specular_points(
-            at, polarization=self._radar.polarization, spreading=self._spreading
-        )
-        return length, strength
-
-    def _field(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
-    ) -> NDArray[np.complex128]:
-        """Amplitude (node, pair, n) of parts (n,) at one time, for paths (pair, n)."""
-        surface, antennas = self._surface, nodes.antennas
-        assert isinstance(surface, FacetBody)
-        return surface.amplitude(
-            (pose.centres, pose.frames),
-            antennas[None],
-            nodes.pairs,
-            length[None],
-            surface.seen(pose.centres[0], pose.frames[0], antennas, parts),
-            np.arange(len(antennas))[None],
-            parts,
-        )[:, 0]
 
     def _sample(self, place: float, parts: NDArray[np.int64], whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
@@ -163,8 +140,10 @@ class PhysicalOptics(BuiltInModel):
             np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
         )
         ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
-        length, strength = self._carriers(Geometry(*ends, centres, frames, pose.semi_axes[parts]))
-        amplitude = self._field(time, pose, nodes, length[:, 0], parts)
+        length, strength = self._surface.carriers(
+            Geometry(*ends, centres, frames, pose.semi_axes[parts])
+        )
+        amplitude = self._surface.field(time, pose, nodes, length[:, 0], parts)
         specular = strength[:, 0]
         # Without a specular point there is next to nothing to see either: antennas on opposite
         # sides.
@@ -175,7 +154,7 @@ class PhysicalOptics(BuiltInModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength = self._carriers(at)
+        length, strength = self._surface.carriers(at)
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals, envelope, weights = chirps // self._step, self._envelope, self._fine.weights
         # Power is measured at keyframes, where nothing is asked of what comes after.

@@ -13,7 +13,7 @@ from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
-_NODES = 7
+NODES = 7
 """Frequencies over the sweep. What is left of a part whose specular point is occluded comes from
 beside it, and its phase changes over the sweep: three frequencies would not follow it."""
 
@@ -45,7 +45,7 @@ class Reference(BuiltInModel):
     ) -> None:
         self._radar, self._body = radar, body
         self._surface = FacetBody(
-            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=_NODES
+            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=NODES
         )
         self.variant: str | None = self._surface.variant
 

