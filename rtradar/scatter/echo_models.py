@@ -79,6 +79,11 @@ def build_model(
     """
     kind = _kind_for(fidelity, body, model_options)
     room = scene if scene is not None and not scene.is_empty else None
+    if room is not None and not spreading:
+        raise InputError(
+            f"scene '{room.name}': spreading may be off in free space only; leave --no-spreading "
+            "out"
+        )
     # What traces nothing takes no backend.
     backend = {"variant": variant} if takes_backend(fidelity) else {}
 
@@ -91,10 +96,9 @@ def build_model(
 
     if room is None:
         return over_legs(conductor(radar), radar, body, materials)
-    from rtradar.scatter.multipath.room_model import Level, RoomModel  # which takes long to import
+    from rtradar.scatter.multipath.room_model import RoomModel  # which takes long to import
 
-    level = Level(conductor, takes_backend(fidelity), spreading)
-    return RoomModel(level, room, radar, body, materials, order=order)
+    return RoomModel(conductor, room, radar, body, materials, order=order, **backend)
 
 
 def _kind_for(fidelity: str, body: Body, model_options: Iterable[str]) -> Callable[..., EchoModel]:

@@ -35,8 +35,8 @@ class BuiltInModel:
     """Whether the model traces rays, so that parts of the body occlude each other."""
 
     fast_over_walls: ClassVar[bool] = False
-    """Whether one model computes all paths of a room, as `RoomReady` says; else each path has one
-    of its own, before images of the antennas."""
+    """Whether one model computes all paths of a room, as `HasFormula` or `HasSpecularPoints`; else
+    each path has one of its own, before images of the antennas."""
 
     accepts_meshes: ClassVar[bool] = False
     """Whether `scattering_length` by this model takes meshes as well as ellipsoids."""

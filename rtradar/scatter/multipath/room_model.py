@@ -12,7 +12,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
@@ -66,18 +65,6 @@ _KEYFRAMES_AT_ONCE = 32
 _CHIRPS_AT_ONCE = 64
 
 
-class Level(NamedTuple):
-    """A fidelity level: ``before(radar)`` builds its model of a conductor before that radar.
-
-    ``traces`` says whether parts and furniture occlude each other, ``spreading`` whether amplitudes
-    hold 1 / (R1 R2).
-    """
-
-    before: Callable[[Radar], EchoModel]
-    traces: bool
-    spreading: bool
-
-
 @runtime_checkable
 class HasFormula(EchoModel, Protocol):
     """A model with one formula for all echoes: direct ones, and with images those over walls."""
@@ -108,9 +95,11 @@ class HasSpecularPoints(EchoModel, Protocol):
 class RoomModel:
     """A fidelity level in a room; its model of the ``person`` alone is that of free space.
 
-    Radar and body are at their positions in the scene; ``materials (part,)`` are those of the
-    parts, by default perfect conductors. ``order`` is the largest number of reflections at walls
-    on both legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
+    ``before(radar)`` builds the model of that level, for conductors before that radar. Radar and
+    body are at their positions in the scene; ``materials (part,)`` are those of the parts, by
+    default perfect conductors. ``order`` is the largest number of reflections at walls on both
+    legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
+    ``variant`` asks for the backend that traces what occludes; None is for no occlusion.
 
     A model whose class says ``fast_over_walls`` computes the echoes over all paths, with points or
     a formula of its own. Of any other level each path has a model before the images of the antennas
@@ -121,22 +110,18 @@ class RoomModel:
 
     def __init__(
         self,
-        level: Level,
+        before: Callable[[Radar], EchoModel],
         scene: Scene,
         radar: Radar,
         body: Body,
         materials: Sequence[str] = (),
         *,
         order: int = 1,
+        variant: str | None = None,
     ) -> None:
-        if not level.spreading and not scene.is_empty:
-            raise InputError(
-                f"scene '{scene.name}': spreading may be off in free space only; leave "
-                "--no-spreading out"
-            )
         check_order(order)
-        self._level, self._radar, self._body = level, radar, body
-        self._conductor = conductor = level.before(radar)
+        self._before, self._radar, self._body = before, radar, body
+        self._conductor = conductor = before(radar)
         self.person = over_legs(conductor, radar, body, materials)
         self._fast = bool(getattr(conductor, "fast_over_walls", False))
         self._models: dict[int, EchoModel] = {0: conductor}
@@ -145,9 +130,11 @@ class RoomModel:
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
         tracers = None
-        if level.traces:
-            backend = use(select(conductor.variant or "auto"))
-            tracers = BodyTracer(backend, body.semi_axes), RoomTracer(backend, scene)
+        self.variant: str | None = None
+        if variant is not None:
+            backend = select(variant)
+            self.variant, mi = backend.kind, use(backend)
+            tracers = BodyTracer(mi, body.semi_axes), RoomTracer(mi, scene)
         faces = reflecting_faces(scene, radar, body, tracers and tracers[1]) if order else ()
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order, faces)
         every = *series.walls, *(HALF_SPACE,) * len(faces)
@@ -167,11 +154,6 @@ class RoomModel:
         self._step = keyframe_step(radar, KEYFRAMES_S)
         self._keyframes: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
         self.not_followed: dict[str, float] = {}
-
-    @property
-    def variant(self) -> str | None:
-        """Backend that traces, None for no tracing."""
-        return self._conductor.variant
 
     @property
     def path_names(self) -> tuple[str, ...]:
@@ -298,7 +280,7 @@ class RoomModel:
 
     def _model(self, path: int) -> EchoModel:
         if path not in self._models:
-            self._models[path] = self._level.before(ImageRadar.over(self._radar, self.paths[path]))
+            self._models[path] = self._before(ImageRadar.over(self._radar, self.paths[path]))
         return self._models[path]
 
     def course(self, name: str, point: Array) -> Array:

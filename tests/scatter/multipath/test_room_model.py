@@ -19,7 +19,7 @@ from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
-from rtradar.scatter.multipath.room_model import KEYFRAMES_S, Level, RoomModel
+from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.trace.backends.backend import Backend
@@ -155,6 +155,15 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
     assert seen[by_name(second, "floor > body > floor")] == (not hides)
 
 
+def test_furniture_occludes_by_the_backend_that_was_asked_for_also_where_no_part_does(
+    one: Make, wall: Make, single: Make
+) -> None:
+    # `auto` traces nothing by itself where nothing comes near a line of sight.
+    scene = Scene(walls=(wall("left"),))
+    model = build_model("auto", single(), one(), scene=scene, variant="scalar")
+    assert model.variant == "scalar"
+
+
 def test_another_part_hides_a_leg_over_a_wall(
     backend: Backend, wall: Make, single: Make, still: Make
 ) -> None:
@@ -272,7 +281,7 @@ def test_direct_echoes_and_ghosts_follow_from_one_formula(
     for walls in ((), (wall("left"),)):
         usual, double = (
             RoomModel(
-                Level(partial(kind, body=body), traces=False, spreading=True),
+                partial(kind, body=body),
                 Scene(walls=walls),
                 radar,
                 body,  # type: ignore[arg-type]
