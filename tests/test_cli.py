@@ -508,6 +508,10 @@ def test_each_motion_has_its_place_in_order(
     assert (kicker.position_m, kicker.heading_deg) == ((-0.5, -1.0), 90.0)
 
 
+def test_exact_ghosts_may_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(people_of(monkeypatch, "synthetic:walk", "--path-tolerance-db", "-inf")) == 1
+
+
 def test_actors_of_one_activity_are_two_people(monkeypatch: pytest.MonkeyPatch) -> None:
     words = "synthetic:walk", "synthetic:walk", "--at", "0,1", "--at", "0,-1"
     one, other = people_of(monkeypatch, *words)

@@ -92,10 +92,10 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def _joined(args: Sequence[str]) -> list[str]:
-    """Join an option and a value that begins with a negative number, such as ``--at -1,0.5``."""
+    """Join an option and a value that argparse takes for another one: ``--at -1,0.5``, ``-inf``."""
     found: list[str] = []
     for text in args:
-        if found and found[-1].startswith("--") and re.match(r"-\.?\d[^ ]*,", text):
+        if found and found[-1].startswith("--") and re.match(r"-(inf$|\.?\d[^ ]*,)", text):
             found[-1] += "=" + text
         else:
             found.append(text)
