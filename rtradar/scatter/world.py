@@ -126,27 +126,16 @@ def build_world(
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
     if not scene.objects:
         return model
-    objects, tracers = [], None
-    paths = wall_paths(scene.walls, np.array(radar.position_m), order)
+    past = None
     if model.variant is not None:
         mi = use(select(variant))
-        tracers = mi, RoomTracer(mi, scene), BodyTracer(mi, body.semi_axes)
-    for moving in scene.objects:
-        past = None
-        if tracers is not None:
-            mi, room, people = tracers
-            others = tuple(other for other in scene.objects if other is not moving)
-            past = Past(mi, room, RoomTracer(mi, replace(scene, objects=others)), body, people)
-        rigid = partial(
-            RigidEchoes,
-            radar,
-            moving,
-            body.duration_s,
-            past,
-            walls=scene.walls,
-            spreading=spreading,
-        )
-        objects.append([rigid(path=path) for path in paths])
+        past = Past(mi, RoomTracer(mi, scene), body, BodyTracer(mi, body.semi_axes))
+    rigid = partial(RigidEchoes, radar, past=past, walls=scene.walls, spreading=spreading)
+    paths = wall_paths(scene.walls, np.array(radar.position_m), order)
+    objects = [
+        [rigid(moving=moving, duration_s=body.duration_s, path=path) for path in paths]
+        for moving in scene.objects
+    ]
     return World(model, len(body.part_names), objects)
 
 

@@ -2,7 +2,7 @@
 
 Walls are rectangles, and few, so they are done in closed form in float64. Mitsuba works in float32,
 so each scene of its is centred on what it holds, and rays start where they enter the ball around
-it. A moving object has a scene in its own axes: to pose it, rays are taken there.
+it. A moving object has a scene in its own axes, into which rays are taken.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.scene import Scene, Triangles
+from rtradar.scene import Object, Scene, Triangles
 from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import any_met, ball_around
 
@@ -58,30 +58,27 @@ class _Solid:
 
 
 class RoomTracer:
-    """The furniture and the moving objects of a scene for Mitsuba, ``mi`` with its variant set.
-
-    Objects are where `pose` puts them, at first where they are at the start of the capture.
-    """
+    """The furniture and the moving objects of a scene for Mitsuba, ``mi`` with its variant set."""
 
     def __init__(self, mi: Any, scene: Scene) -> None:
         pieces = [piece.triangles() for piece in scene.furniture]
         self._still = _Solid(mi, pieces) if pieces else None
-        self._objects = scene.objects
-        self._solids = [_Solid(mi, [moving.shape]) for moving in scene.objects]
-        self.pose(0.0)
-
-    def pose(self, time_s: float) -> None:
-        """Put the objects where they are at a time since the start of the capture [s]."""
-        self._poses = [moving.pose(time_s) for moving in self._objects]
+        self._moving = [(moving, _Solid(mi, [moving.shape])) for moving in scene.objects]
 
     def blocked(
-        self, origins: ArrayLike, targets: ArrayLike, times: ArrayLike | None = None
+        self,
+        origins: ArrayLike,
+        targets: ArrayLike,
+        times: ArrayLike | None = None,
+        *,
+        but: Object | None = None,
     ) -> NDArray[np.bool_]:
         """Whether anything is between two points, ``origins`` and ``targets (..., 3)``, world [m].
 
         Both are drawn in by `CLEAR_M`, so either may be on a surface. The answer is False in an
-        empty room, and where two points are at most twice `CLEAR_M` apart. With ``times (...)`` [s]
-        objects are where they are at each of them, and stay where they are last.
+        empty room, and where two points are at most twice `CLEAR_M` apart. Objects, ``but`` one,
+        are where they are at the ``times (...)`` since the start of the capture [s]; without times
+        only what stands still is asked.
         """
         starts, ends = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
@@ -93,21 +90,17 @@ class RoomTracer:
             return met.reshape(shape)
         if self._still is not None:
             met |= self._still.meets(starts, ends)
-        if times is None or not self._solids:
-            return self._past_objects(starts, ends, met).reshape(shape)
-        moments, moment = np.unique(np.broadcast_to(times, shape), return_inverse=True)
-        for number, time_s in enumerate(moments.tolist()):
-            own = np.flatnonzero(moment.ravel() == number)
-            self.pose(time_s)
-            met[own] = self._past_objects(starts[own], ends[own], met[own])
+        if times is not None and self._moving:
+            moments, moment = np.unique(np.broadcast_to(times, shape), return_inverse=True)
+            for moving, solid in self._moving:
+                if moving is but:
+                    continue
+                clear = np.flatnonzero(~met)
+                rotation, place = (own[moment.ravel()[clear]] for own in moving.pose(moments))
+                met[clear] = solid.meets(
+                    *(
+                        np.einsum("ri,rij->rj", points[clear] - place, rotation)
+                        for points in (starts, ends)
+                    )
+                )
         return met.reshape(shape)
-
-    def _past_objects(
-        self, starts: Array, ends: Array, met: NDArray[np.bool_]
-    ) -> NDArray[np.bool_]:
-        """Add to what rays (ray, 3) have ``met (ray,)`` the objects where they are posed."""
-        for solid, (rotation, place) in zip(self._solids, self._poses, strict=True):
-            clear = np.flatnonzero(~met)
-            own = ((points[clear] - place[0]) @ rotation[0] for points in (starts, ends))
-            met[clear] = solid.meets(*own)
-        return met

@@ -103,5 +103,8 @@ def test_a_turning_plate_is_in_the_way_when_it_is_broadside(backend: Backend) ->
         (0.25, [True, True, False]),
         (0.5, [False] * 3),
     ):
-        tracer.pose(time_s)
-        assert tracer.blocked(origins, targets).tolist() == expected
+        assert tracer.blocked(origins, targets, time_s).tolist() == expected
+    times = [0.25, 0.0, 0.25]
+    assert tracer.blocked(origins, targets, times).tolist() == [True, False, False]
+    assert not tracer.blocked(origins, targets, 0.25, but=turning).any()
+    assert not tracer.blocked(origins, targets).any()

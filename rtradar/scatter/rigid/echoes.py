@@ -316,7 +316,7 @@ class RigidEchoes:
         (rotation,), (at,) = self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
         asked = np.ones((len(legs.places), len(middles)), dtype=bool)
-        clear = legs.seen(time_s, middles, asked, others=True).mean(axis=1)
+        clear = legs.seen(time_s, middles, asked, but=self.moving).mean(axis=1)
         left = legs.factor(at[None], np.eye(3)[:1], self.moving.material, self._longer_m)
         root = np.sqrt(np.abs(left[_NODES // 2, 0]))
         return legs.tx_weight @ clear * root, legs.rx_weight @ clear * root

@@ -19,10 +19,10 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
-from rtradar.scatter.common.polarization import antenna_field, bisector, unit
+from rtradar.scatter.common.polarization import antenna_field, bisector, sent_field, unit
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scene import Material, reflection
+from rtradar.scene import Material, Object, reflection
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
@@ -36,14 +36,10 @@ at half of it polynomials through three nodes err by 16 % of the wave that comes
 
 
 class Past(NamedTuple):
-    """What may hide an object: Mitsuba, tracers of all in the room and of the others, and people.
-
-    ``others`` are furniture and the objects but for this one.
-    """
+    """What may hide an object: Mitsuba, furniture and all objects, and people."""
 
     mi: Any
     room: RoomTracer
-    others: RoomTracer
     body: Body
     people: BodyTracer
 
@@ -73,10 +69,12 @@ class RigidLegs:
         position = np.array(radar.position_m)
         self.middles = np.stack([images(leg, position) for leg, _ in self._sides])
 
-    def seen(self, time_s: float, points: Array, asked: Bools, *, others: bool = False) -> Bools:
+    def seen(
+        self, time_s: float, points: Array, asked: Bools, *, but: Object | None = None
+    ) -> Bools:
         """Which points (point, 3) [m] are free for each place at a time [s], of those ``asked``.
 
-        Both are (place, point). With ``others`` the object does not hide itself.
+        Both are (place, point). All objects ``but`` one may hide them.
         """
         free = asked.copy()
         for leg, own in ((self.path.out, self._sends), (self.path.back, ~self._sends)):
@@ -85,17 +83,15 @@ class RigidLegs:
             open_ = free[places] & (extent != 0)
             for origins, targets in pairwise(along):
                 start, end, _ = np.broadcast_arrays(origins, targets, open_[..., None])
-                open_[open_] = self._clear(time_s, start[open_], end[open_], others)
+                open_[open_] = self._clear(time_s, start[open_], end[open_], but)
             free[places] = open_
         return free
 
-    def _clear(self, time_s: float, origins: Array, targets: Array, others: bool) -> Bools:
+    def _clear(self, time_s: float, origins: Array, targets: Array, but: Object | None) -> Bools:
         if self._past is None or len(origins) == 0:
             return np.ones(len(origins), dtype=bool)
         body, people = self._past.body, self._past.people
-        room = self._past.others if others else self._past.room
-        room.pose(time_s)
-        clear = ~room.blocked(origins, targets)
+        clear = ~self._past.room.blocked(origins, targets, time_s, but=but)
         poses = body.at([min(max(time_s, 0.0), body.duration_s)])
         people.pose(poses.centres[0], poses.frames[0])
         on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
@@ -158,8 +154,6 @@ class RigidLegs:
         radar, middle = self._radar, np.array(self._radar.position_m)
         along, extent = self._walls.edges.leg(leg, middle, points)
         ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        field = antenna_field(ways[0], radar.polarization) * extent[..., None]
-        if antenna is not None:
-            field = field * np.sqrt(antenna.relative(ways[0], radar.polarization))[..., None]
-        waves = self._walls.along(leg, along, ways, field)
+        sent = sent_field(antenna, ways[0], radar.polarization)
+        waves = self._walls.along(leg, along, ways, sent * extent[..., None])
         return [(wave.extra_m, wave.field) for wave in waves], ways[-1]
