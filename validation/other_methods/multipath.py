@@ -29,13 +29,10 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.process import angle, power_map, range_spectrum
 from rtradar.scatter import build_model
-from rtradar.scatter.clutter import body_shadow as clutter_shadow
-from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.multipath import room_model
 from rtradar.scatter.multipath.image_paths import WallPath
 from rtradar.scene import Scene, Surface, Wall, material, room_walls
 from rtradar.signal import synthesize
-from rtradar.signal.static_clutter import RoomIf
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 
@@ -545,38 +542,12 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
         of_path = np.array([[own == path for path in paths] for own in owned], dtype=np.float64)
         fields[apart_s] = field @ of_path
     first, last = fields.values()
-    yield from shadow_rows(radar, scene, body, chirps)
     error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported(
         "living room, walk",
         f"ghosts at keyframes {room_model.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms",
         "dB",
         error,
-    )
-
-
-def shadow_rows(
-    radar: rt.Radar, scene: Scene, body: rt.Body, chirps: NDArray[np.int64]
-) -> Iterator[Row]:
-    """The same for the moving shadow in the clutter, over its change in that time."""
-    clutter = Clutter(radar, scene, order=1)
-    shadows = []
-    for apart_s in (2.5e-3, clutter_shadow.KEYFRAMES_S):
-        with mock.patch.object(clutter_shadow, "KEYFRAMES_S", apart_s):
-            shadow = clutter_shadow.ClutterShadow(clutter, body)
-            room = RoomIf(radar, clutter.cycle(), shadow).clutter_if(chirps)
-        cycles = room.reshape(-1, radar.n_tx, *room.shape[1:])
-        shadows.append(cycles - cycles.mean(axis=0))
-    first, last = shadows
-    used_ms = shadow.step * radar.chirp_interval_s * 1e3
-    quantity = f"shadow at keyframes {used_ms:.3g} ms apart against 2.5 ms"
-    error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
-    yield reported("living room, walk", quantity, "dB", error)
-    yield reported(
-        "living room, walk",
-        "what changes of the shadow in 0.1 s, per IF sample",
-        "dB re 1 m2",
-        power_db((np.abs(first) ** 2).mean()),
     )
 
 

@@ -116,11 +116,8 @@ def walker_rows(quick: bool) -> Iterator[Row]:
             changed += float((np.abs(fields[0]) ** 2).sum())
         error, quantity = power_db(wrong / changed), f"{activity}, over the change in 0.1 s"
         claim = f"shadow at keyframes {shadow.step * radar.chirp_interval_s * 1e3:.3g} ms apart"
-        if activity == "walk":
-            says = "shadow of a walker in the clutter between keyframes, over its change"
-            yield judged(claim, quantity, "dB", error, MOST_ERROR_DB, says=says, cases=2)
-        else:
-            yield reported(claim, quantity, "dB", error)
+        says = f"shadow in the clutter between keyframes, {activity}, over its change"
+        yield judged(claim, quantity, "dB", error, MOST_ERROR_DB, says=says, cases=2)
 
 
 def measure(quick: bool) -> list[Row]:

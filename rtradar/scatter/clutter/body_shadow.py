@@ -9,7 +9,9 @@ reflect every leg of every Tx and Rx is computed, at `SWEEP_NODES` frequencies, 
 over the sweep. Points on furniture and on rough walls, which all antennas share, are many and weak:
 the fraction is that at the sweep's centre and at the ends of each line of Tx and the middle of each
 of Rx, linear in between; for the weakest it is that in the array's middle. Nobody is seen past an
-edge here, so no ray is traced.
+edge here, so no ray is traced. The time between keyframes follows from the error of cubics between
+them, which is measured beforehand: that of a trunk that walks past is small, that of hands alone,
+as in jumping jacks, is much of all that changes.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.silhouettes import Shadow, occluded_fractions, wave_table
+from rtradar.kernels.still_room import cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
@@ -38,9 +41,16 @@ Indices = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _SHORTEST_M = 1e-6
-KEYFRAMES_S, KEYFRAMES_M = 40e-3, 0.075
-"""Longest time between keyframes of the shadow [s], and the way that the fastest part may make in
-it [m]. `validation/other_methods/shadow.py` has the error of the cubics in between."""
+KEYFRAMES_S, SHORTEST_S, TRIED_S = 30e-3, 4e-3, 10e-3
+"""Longest and shortest time between keyframes of the shadow, and that for which the error of the
+cubics in between is measured [s]. `validation/other_methods/shadow.py` judges the one chosen."""
+_ERROR_DB, _ERROR_POWER = -32.0, 3.0
+"""Error that is aimed at, over what changes of the shadow in `_CHANGE_S` [dB], and the power of the
+time between keyframes with which its power grows, as `validation/other_methods/shadow.py` has
+it."""
+_CHANGE_S, _TESTS, _EVERY = 0.1, 12, 4
+"""Time of a change [s], the instants of the capture at which the error is measured, and one of how
+many points it is measured for."""
 _KEPT_KEYFRAMES = 8
 """Keyframes in the cache: those on both sides of a chirp, and a few before."""
 SWEEP_NODES = 5
@@ -57,9 +67,8 @@ _WEAK = 0.03
 near."""
 _FAINT = 2e-3
 """Power of the points whose shadow is left out, over that of all that the body may come near."""
-_TRACK_S, _MOST_INSTANTS, _SPEED_S = 0.05, 400, 5e-3
-"""Spacing of the instants at which it is asked what the body comes near and how fast it is [s],
-most of them, and the time over which speeds are taken [s]."""
+_TRACK_S, _MOST_INSTANTS = 0.05, 400
+"""Spacing of the instants at which it is asked what the body comes near [s], and most of them."""
 _LEGS_A_THREAD = 256
 
 
@@ -84,12 +93,10 @@ class ClutterShadow:
         self._legs = _mirror_legs([clutter.objects[number] for number in self.mirrors], radar)
         self._points, self._of_point, power = _shared_points(clutter, self.starts)
         count = min(int(body.duration_s / _TRACK_S) + 2, _MOST_INSTANTS)
-        instants = np.linspace(0.0, max(body.duration_s - _SPEED_S, 0.0), count)
-        poses, later = body.at(instants), body.at(instants + _SPEED_S)
-        fastest = float(np.linalg.norm(later.centres - poses.centres, axis=-1).max()) / _SPEED_S
-        apart_s = min(KEYFRAMES_S, KEYFRAMES_M / max(fastest, 1e-9))
-        self.step = keyframe_step(radar, apart_s)
-        self._keep_points(power, poses)
+        self._keep_points(power, body.at(np.linspace(0.0, body.duration_s, count)))
+        mirrors = [clutter.objects[number].amplitude for number in self.mirrors]
+        self._mirror_m = np.array([np.abs(own).max() for own in mirrors])
+        self.step = keyframe_step(radar, min(KEYFRAMES_S, max(SHORTEST_S, self._apart_s())))
         self._kept: KeyframeCache[int, Shadow] = KeyframeCache(0, _KEPT_KEYFRAMES)
 
     def at(self, keyframe: int) -> Shadow:
@@ -97,10 +104,45 @@ class ClutterShadow:
         return self._kept.get(keyframe, partial(self._find, keyframe))
 
     def _find(self, keyframe: int) -> Shadow:
-        at = chirp_poses(self._radar, self._body, np.array([max(keyframe, 0) * self.step]))
-        maps = np.swapaxes(at.frames[0], 1, 2) / at.semi_axes[:, :, None]
-        body = at.centres[0], np.ascontiguousarray(maps), at.semi_axes.max(axis=1)
+        body = self._posed(max(keyframe, 0) * self.step)
         return Shadow(*self._of_points(body), *self._of_mirrors(body))
+
+    def _posed(self, chirp: int) -> tuple[Array, Array, Array]:
+        at = chirp_poses(self._radar, self._body, np.array([chirp]))
+        maps = np.swapaxes(at.frames[0], 1, 2) / at.semi_axes[:, :, None]
+        return at.centres[0], np.ascontiguousarray(maps), at.semi_axes.max(axis=1)
+
+    def _apart_s(self) -> float:
+        """Time between keyframes at which the error is as large as it may be [s].
+
+        Measured is that of cubics between keyframes `TRIED_S` apart.
+        """
+        ends = np.array([-1.5, -0.5, 0.5, 1.5]) * TRIED_S
+        around = np.array([0.0, *ends, -_CHANGE_S / 2, _CHANGE_S / 2])
+        middles = np.linspace(0.0, self._body.duration_s, _TESTS + 2)[1:-1, None]
+        chirps = np.clip(middles + around, 0, self._body.duration_s) / self._radar.chirp_interval_s
+        error = change = 0.0
+        for now, *rest in (map(self._lost_m, own) for own in chirps.astype(np.int64)):
+            error += (np.abs(now - cubic_weights([0.5])[0] @ rest[:4]) ** 2).sum()
+            change += np.var([now, *rest[4:]], axis=0).sum()
+        if not error > 0:
+            return KEYFRAMES_S
+        return float(TRIED_S * (change / error * 10 ** (_ERROR_DB / 10)) ** (1 / _ERROR_POWER))
+
+    def _lost_m(self, chirp: int) -> Field:
+        """What some points lose for the array's middle, and mirrors for one channel (loss,) [m]."""
+        body = self._posed(chirp)
+        points = np.zeros(len(self._points), dtype=np.complex128)
+        near = np.flatnonzero(self._passes(*_ball(body[0], body[2])))
+        near = near[near % _EVERY == 0]
+        points[near] = 1 - (1 - self._seen_from(self._middle[None], near, body)[0]) ** 2
+        legs = self._legs
+        some = np.flatnonzero(legs.channel == self._radar.n_channels // 2)
+        geometry = tuple(array[some] for array in legs.geometry)
+        lost = self._lost(geometry, body, MIRROR_REACH, MIRROR_LINES, np.ones(1), MIRROR_FADE)
+        kept = np.ones(len(self.mirrors), dtype=np.complex128)
+        np.multiply.at(kept, legs.mirror[some], 1 - lost[:, 0])
+        return np.concatenate([points * self._point_m * _EVERY**0.5, (1 - kept) * self._mirror_m])
 
     def _of_mirrors(self, body: tuple[Array, Array, Array]) -> tuple[Indices, Field]:
         """Which mirrors are occluded, and what of each is lost (node, tx, rx, mirror)."""
@@ -173,7 +215,7 @@ class ClutterShadow:
         chosen = np.sort(order[share >= _FAINT])
         strong = np.zeros(len(self._points), dtype=bool)
         strong[order[share >= _WEAK]] = True
-        self._strong = strong[chosen]
+        self._strong, self._point_m = strong[chosen], np.sqrt(power[chosen])
         self._points, self._of_point = self._points[chosen], self._of_point[chosen]
         self._measure()
 
