@@ -244,27 +244,27 @@ class Body:
         """The people whose parts these are: this one alone; `Bodies` has several."""
         return (self,)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the `people`."""
         return (self.motion.name,)
 
-    @property
+    @cached_property
     def owner(self) -> NDArray[np.int64]:
         """Index of the person that each part (part,) belongs to."""
         return np.zeros(len(self.semi_axes), dtype=np.int64)
 
-    @property
+    @cached_property
     def materials(self) -> tuple[str, ...]:
         """Name of the material of each part."""
         return (self.material,) * len(self.semi_axes)
 
-    @property
+    @cached_property
     def part_names(self) -> tuple[str, ...]:
         """Names of the 21 parts."""
         return PART_NAMES
 
-    @property
+    @cached_property
     def duration_s(self) -> float:
         """End of the motion [s]; it begins at 0."""
         return self.motion.duration_s
@@ -297,19 +297,9 @@ class Body:
         centres, frames = np.empty(shape), np.empty((*shape, 3))
         parents = np.array(self.motion.parents)
         pose_ellipsoids(positions, quaternions, parents, self._rest_frames, centres, frames)
-        centres[:, _CHEST] += self._breath(positions, frames, breath_times)
+        if self.breathing is not None:
+            centres[:, _CHEST] += _breath(self.breathing, positions, frames, breath_times)
         return Poses(centres, frames, self.semi_axes)
-
-    def _breath(self, positions: _Array, frames: _Array, times: ArrayLike) -> _Array:
-        """Displacement (time, 2, 3) of the `_CHEST` by breath, 0 without it [m]."""
-        if self.breathing is None:
-            return np.zeros((len(positions), len(_CHEST), 3))
-        left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
-        ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
-        ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
-        turned = 2 * np.pi * self.breathing.rate_hz * np.asarray(times, np.float64)
-        breath = np.sin(turned + np.radians(self.breathing.phase_deg))
-        return np.asarray(1e-3 * self.breathing.amplitude_mm * breath[:, None, None] * ahead)
 
     def skin(self, times: ArrayLike, divisions: int = 0) -> _Array:
         """Pose the vertices of the mesh at any times; past the end of the motion it rests.
@@ -338,7 +328,8 @@ class Body:
         vertices = self.mesh.vertices(moving, divisions)
         if self.breathing is not None:
             poses = self._posed(moving, moving)
-            moved = self._breath(self.motion.at(moving)[0], poses.frames, instants)
+            positions = self.motion.at(moving)[0]
+            moved = _breath(self.breathing, positions, poses.frames, instants)
             vertices += np.einsum("vp,tpx->tvx", self.mesh.weights(divisions)[:, _CHEST], moved)
         return vertices
 
@@ -367,6 +358,16 @@ class Body:
         across = np.cross(np.eye(3)[np.argmin(np.abs(along), axis=1)], along)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         return np.stack([across, np.cross(along, across), along], axis=2)
+
+
+def _breath(breathing: Breathing, positions: _Array, frames: _Array, times: ArrayLike) -> _Array:
+    """Displacement (time, 2, 3) of the `_CHEST` by breath [m]."""
+    left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
+    ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
+    ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
+    turned = 2 * np.pi * breathing.rate_hz * np.asarray(times, np.float64)
+    breath = np.sin(turned + np.radians(breathing.phase_deg))
+    return np.asarray(1e-3 * breathing.amplitude_mm * breath[:, None, None] * ahead)
 
 
 # -- meshes ----------------------------------------------------------------------------------------

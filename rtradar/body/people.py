@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rtradar.body.body import Body, Poses
 from rtradar.body.human import HumanMesh
@@ -139,54 +139,31 @@ class Bodies(Body):
     """
 
     def __init__(self, people: Sequence[Body], duration_s: float | None = None) -> None:
+        names = distinct_names([person.motion.name for person in people])
+        sizes = [len(person.part_names) for person in people]
         shortest = min(person.duration_s for person in people)
+        own = list(zip(names, people, strict=True))
         for name, value in (
             ("motion", people[0].motion),
             ("semi_axes", np.concatenate([person.semi_axes for person in people])),
-            ("breathing", None),
-            ("material", people[0].material),
             ("_people", tuple(people)),
-            ("_duration_s", shortest if duration_s is None else duration_s),
+            ("names", names),
+            (
+                "part_names",
+                tuple(f"{name}: {part}" for name, one in own for part in one.part_names),
+            ),
+            ("owner", np.repeat(np.arange(len(sizes)), sizes)),
+            ("materials", tuple(name for person in people for name in person.materials)),
+            ("duration_s", shortest if duration_s is None else duration_s),
         ):
             object.__setattr__(self, name, value)
 
     _people: tuple[Body, ...]
-    _duration_s: float
 
     @property
     def people(self) -> tuple[Body, ...]:
         """The people, in the order in which they were given."""
         return self._people
-
-    @property
-    def part_names(self) -> tuple[str, ...]:
-        """Names of the parts of all people, ``NAME: part``."""
-        return tuple(
-            f"{name}: {part}"
-            for name, person in zip(self.names, self.people, strict=True)
-            for part in person.part_names
-        )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the people: those of their motions, numbered where two are alike."""
-        return distinct_names([person.motion.name for person in self.people])
-
-    @property
-    def owner(self) -> NDArray[np.int64]:
-        """Index of the person that each part (part,) belongs to."""
-        sizes = [len(person.part_names) for person in self.people]
-        return np.repeat(np.arange(len(sizes)), sizes)
-
-    @property
-    def materials(self) -> tuple[str, ...]:
-        """Name of the material of each part."""
-        return tuple(name for person in self.people for name in person.materials)
-
-    @property
-    def duration_s(self) -> float:
-        """Time up to which the set may be asked [s]."""
-        return self._duration_s
 
     def at(self, times: ArrayLike) -> Poses:
         """Pose the ellipsoids of all people at any times from 0 to `duration_s`.

@@ -72,17 +72,15 @@ def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
 def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
     """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
     (x, y), limits = _place_and_limits(scene, radar)
-    person = scene.person_position_m
     axes = figure_for(height_of_plan(limits)).add_subplot() if ax is None else ax
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
     draw_radar(axes, (x, y))
-    people = {"person": person} | {
+    # Who are there, whoever may come.
+    people = {
         f"{number}: {one.motion.name}": one.position_m
         for number, one in enumerate(scene.people, start=1)
-    }
-    if scene.people:  # who are there, whoever may come
-        del people["person"]
+    } or {"person": scene.person_position_m}
     for place in people.values():
         axes.plot(*place, "o", color=theme.person, markersize=7)
     title = printable(f"{scene.name}: {scene.description}")

@@ -42,7 +42,7 @@ class _Map(NamedTuple):
     meaning: str
     dtype: type = np.float32
     unit: str = "m2"
-    sparse: bool = False  # mostly zeros, which cost nothing once compressed
+    sparse: bool = False  # mostly of one value, which costs nothing once compressed
 
 
 _CELLS = "power summed over detected cells"
