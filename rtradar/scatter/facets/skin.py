@@ -75,7 +75,7 @@ def skin_of(person: Body, frequency_hz: float) -> Skin:
     def posed(time: float) -> tuple[Array, Array]:
         return tuple(person.skin([time], level)[0] for level in (divisions - 1, divisions))
 
-    coarse, fine = mesh.faces_of(divisions - 1), mesh.faces_of(divisions)
+    coarse, fine = mesh.faces(divisions - 1), mesh.faces(divisions)
     return Skin(coarse[order], _four_of(fine, order), part[order], posed)
 
 
@@ -228,10 +228,8 @@ class SkinFacets:
             for eye, place in enumerate(self._eyes):
                 facing = np.flatnonzero(np.sum(normals * (place - corners[:, 0]), axis=1) > 0)
                 points = middles[facing].reshape(-1, 3)
-                clear, start = (
-                    np.ones(len(points), dtype=bool),
-                    np.broadcast_to(place, points.shape),
-                )
+                clear = np.ones(len(points), dtype=bool)
+                start = np.broadcast_to(place, points.shape)
                 for scene in scenes:
                     whose = np.repeat(facing if scene is own else np.full_like(facing, -1), 4)
                     clear &= scene.sees(start, points, whose)
