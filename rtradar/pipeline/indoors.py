@@ -58,6 +58,7 @@ def indoors(
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
         "paths": [asdict(path) for path in paths],
+        "faces": [face._asdict() for face in model.faces],
         "clutter": {
             "power_m2": room.power_m2,
             "signal_to_clutter_db": None if ratio is None else float(10 * np.log10(ratio)),

@@ -117,6 +117,11 @@ def _left_out(room: Mapping[str, Any], clutter: Mapping[str, Any]) -> str:
         (item["name"], _KINDS.get(item["kind"], item["kind"]), str(item["reason"]))
         for item in clutter.get("dropped", ())
     ]
+    rows += [
+        (face["name"], "ghosts over a face", str(face["reason"]))
+        for face in room.get("faces", ())
+        if face["reason"]
+    ]
     if not rows:
         return '<h3>What was left out</h3><p class="note">Nothing was left out.</p>'
     return "<h3>What was left out, and why</h3>" + _first(rows, ("", "What", "Why"))

@@ -8,10 +8,12 @@ are smaller than a Fresnel zone, or no rectangles, send no ghosts.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,28 +62,43 @@ class SolidFace(Wall):
         """A half-space has no thickness to be checked."""
 
 
+class FaceSummary(NamedTuple):
+    """What became of a face: its area [m^2], and the ``reason`` why it was left out, "" if not."""
+
+    name: str
+    area_m2: float
+    reason: str
+
+
 def reflecting_faces(
     scene: Scene, radar: Radar, body: Body, room: RoomTracer | None
-) -> tuple[Face, ...]:
+) -> tuple[tuple[Face, ...], tuple[FaceSummary, ...]]:
     """Find the faces of furniture over which the radar may see parts of a body at some time.
 
     Their specular points, for the middle of the array, are at most the radius of the Fresnel zone
     beside the face, the face is as wide as that, furniture leaves both legs free, and the ghosts
     are not expected more than `FAINT_DB` below the direct echoes, in the mean over the parts and
-    `_TIMES` poses.
+    `_TIMES` poses. Returned are these faces, and what became of every face.
     """
     place = np.asarray(radar.position_m, dtype=np.float64)
     points = body.at(np.linspace(0.0, body.duration_s, _TIMES)).centres.reshape(-1, 3)
-    found = []
-    for piece in scene.furniture:
-        for own in faces_of(piece):
-            above = float(height(own, place))
-            face = Face(own, back=above < 0)
-            if above > 0 or own.sheet:
-                expected = _expected(face, own.filled_m2 / own.area_m2, place, points, radar, room)
-                if expected.sum() > 10 ** (-FAINT_DB / 10) * len(points):
-                    found.append(face)
-    return tuple(found)
+    found, summaries = [], []
+    for own in chain.from_iterable(map(faces_of, scene.furniture)):
+        above = float(height(own, place))
+        face, expected, reason = Face(own, back=above < 0), 0.0, "looks away from the radar"
+        if above > 0 or own.sheet:
+            filled = own.filled_m2 / own.area_m2
+            seen = _expected(face, filled, place, points, radar, room)
+            expected = float(seen.sum()) / len(points)
+            reason = "nobody is seen over it, or it is narrower than a Fresnel zone"
+        if expected > 10 ** (-FAINT_DB / 10):
+            found.append(face)
+            reason = ""
+        elif expected > 0:
+            below = -10 * math.log10(expected)
+            reason = f"ghosts over it are expected {below:.0f} dB below the direct echoes"
+        summaries.append(FaceSummary(own.name, own.filled_m2, reason))
+    return tuple(found), tuple(summaries)
 
 
 def _expected(

@@ -30,8 +30,8 @@ from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
-from rtradar.scatter.multipath.furniture_faces import reflecting_faces
-from rtradar.scatter.multipath.image_paths import corners, wall_paths
+from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
+from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
@@ -104,7 +104,8 @@ class RoomModel:
     A model whose class says ``fast_over_walls`` computes the echoes over all paths, with points or
     a formula of its own. Of any other level each path has a model before the images of the antennas
     over its legs. ``paths`` are all paths, the direct one first;
-    ``not_followed``, known after `prune`, are the walls whose frequency response is not known to
+    ``faces`` says of each face of furniture whether paths lead over it; ``not_followed``, known
+    after `prune`, are the walls whose frequency response is not known to
     `FIELD_ERROR`, with the fraction of the echo power that meets each.
     """
 
@@ -135,7 +136,10 @@ class RoomModel:
             backend = select(variant)
             self.variant, mi = backend.kind, use(backend)
             tracers = BodyTracer(mi, body.semi_axes), RoomTracer(mi, scene)
-        faces = reflecting_faces(scene, radar, body, tracers and tracers[1]) if order else ()
+        faces: tuple[Face, ...] = ()
+        self.faces: tuple[FaceSummary, ...] = ()
+        if order:
+            faces, self.faces = reflecting_faces(scene, radar, body, tracers and tracers[1])
         self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order, faces)
         every = *series.walls, *(HALF_SPACE,) * len(faces)
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)

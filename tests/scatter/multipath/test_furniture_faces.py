@@ -54,18 +54,22 @@ def test_the_doors_of_the_wardrobe_are_one_face_and_a_lamp_has_none() -> None:
 def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: Any) -> None:
     # The front of the block looks at radar and body; nothing is seen over its other faces.
     body = one(centre=(0.0, 0.1, 1.1))
-    for made, place, names in (
-        ("metal", (-2.6, 2.2, 1.0), ["block right"]),
+    for made, high, place, reason in (
+        ("metal", 1.5, (-2.6, 2.2, 1.0), ""),
         # Out of the way.
-        ("metal", (-2.6, 2.2, 4.0), []),
-        ("vacuum", (-2.6, 2.2, 1.0), []),
+        ("metal", 1.5, (-2.6, 2.2, 4.0), "nobody is seen"),
+        ("vacuum", 1.5, (-2.6, 2.2, 1.0), "nobody is seen"),
+        ("ceiling-board", 1.5, (-2.0, 30.0, 1.0), "dB below the direct echoes"),
+        # 6 cm are less than a zone.
+        ("metal", 0.06, (-2.6, 2.2, 1.0), "nobody is seen"),
     ):
-        piece = block(tmp_path, (1.0, 0.3, 1.5), made, position_m=place)
-        scene = Scene(furniture=(piece,))
-        assert [face.wall.name for face in reflecting_faces(scene, RADAR, body, None)] == names
-    # 6 cm are less than a zone.
-    thin = block(tmp_path, (1.0, 0.3, 0.06), position_m=(-2.6, 2.2, 1.0))
-    assert not reflecting_faces(Scene(furniture=(thin,)), RADAR, body, None)
+        piece = block(tmp_path, (1.0, 0.3, high), made, position_m=place)
+        faces, summaries = reflecting_faces(Scene(furniture=(piece,)), RADAR, body, None)
+        assert [face.wall.name for face in faces] == ([] if reason else ["block right"])
+        reasons = {face.name: face.reason for face in summaries}
+        assert len(reasons) == 6
+        assert reason in reasons["block right"]
+        assert reasons["block left"] == "looks away from the radar"
 
 
 @pytest.mark.parametrize("made", ["perfect-conductor", "wood"])
