@@ -114,7 +114,7 @@ class Wall:
 
     def _checked_openings(self, where: str) -> tuple[Opening, ...]:
         """Openings that lie in the wall, and nowhere in each other."""
-        width, height = (float(np.linalg.norm(edge)) for edge in (self.edge_u_m, self.edge_v_m))
+        width, height = self.size_m
         given: object = self.openings
         if not isinstance(given, list | tuple):
             raise InputError(
@@ -152,10 +152,15 @@ class Wall:
         corner, u, v = map(np.array, (self.corner_m, self.edge_u_m, self.edge_v_m))
         return np.stack([corner, corner + u, corner + u + v, corner + v])
 
+    @cached_property
+    def size_m(self) -> tuple[float, float]:
+        """Lengths of both edges [m]."""
+        return float(np.linalg.norm(self.edge_u_m)), float(np.linalg.norm(self.edge_v_m))
+
     @property
     def area_m2(self) -> float:
         """Area of one face [m^2]."""
-        return float(np.linalg.norm(self.edge_u_m) * np.linalg.norm(self.edge_v_m))
+        return self.size_m[0] * self.size_m[1]
 
     def depth_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute the depth of points behind the front face.
@@ -171,12 +176,8 @@ class Wall:
             Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle and in an
             opening.
         """
-        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
-        inside = np.ones(away.shape[:-1], dtype=bool)
-        for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
-            fraction = away @ edge / (edge @ edge)
-            inside &= (fraction >= 0) & (fraction <= 1)
-        inside &= ~self.in_opening(points)
+        away, across = self._across(points)
+        inside = ((across >= 0) & (across <= 1)).all(axis=-1) & ~self.in_opening(points)
         return np.where(inside, -(away @ self.normal), np.nan)
 
     def in_opening(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -191,13 +192,19 @@ class Wall:
         -------
         (...) bool
         """
-        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
-        edges = (np.array(edge) for edge in (self.edge_u_m, self.edge_v_m))
-        along, up = (away @ (edge / np.linalg.norm(edge)) for edge in edges)
-        open_here = np.zeros(away.shape[:-1], dtype=bool)
+        along, up = np.moveaxis(self._across(points)[1] * self.size_m, -1, 0)
+        open_here = np.zeros(along.shape, dtype=bool)
         for u, v, wide, high in self.openings:
             open_here |= (along > u) & (along < u + wide) & (up > v) & (up < v + high)
         return open_here
+
+    def _across(
+        self, points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Vectors from the corner (..., 3) [m], and fractions of both edges they reach (..., 2)."""
+        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
+        edges = np.array([self.edge_u_m, self.edge_v_m])
+        return away, away @ edges.T / np.square(self.size_m)
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell whether points lie inside the slab.

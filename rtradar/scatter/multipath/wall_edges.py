@@ -196,8 +196,7 @@ def _axes(wall: Wall) -> Array:
 
 def _rectangles(wall: Wall) -> list[Array]:
     """Ends of a wall along its edges, and those of its openings, (2, 2) each [m]."""
-    wide, high = (float(np.linalg.norm(edge)) for edge in (wall.edge_u_m, wall.edge_v_m))
-    of_wall = (0.0, 0.0, wide, high), *wall.openings
+    of_wall = (0.0, 0.0, *wall.size_m), *wall.openings
     own = wall.patches if isinstance(wall, SolidFace) else of_wall
     return [np.array([[u, u + a], [v, v + b]]) for u, v, a, b in own]
 
