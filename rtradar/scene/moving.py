@@ -224,15 +224,15 @@ _KINDS: Mapping[str, tuple[type[RigidMotion], _Keys, _Keys]] = {
 """Motions by the ``kind`` that a scene file names, the keys that each needs, and the others."""
 
 
-def motion_of(where: str, table: object) -> RigidMotion:
-    """Make a motion of the ``motion`` table of a scene file; ``where`` ends with a blank."""
+def motion_of(table: object) -> RigidMotion:
+    """Make a motion of the ``motion`` table of a scene file."""
     kind = table.get("kind") if isinstance(table, dict) else None
     if not isinstance(table, dict) or not isinstance(kind, str) or kind not in _KINDS:
         raise InputError(
-            f"{where}motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
+            f"motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
         )
     motion, needed, others = _KINDS[kind]
-    check_keys(f"{where}motion: ", table, ("kind", *needed), others)
+    check_keys("motion: ", table, ("kind", *needed), others)
     return motion(**{key: value for key, value in table.items() if key != "kind"})
 
 

@@ -342,6 +342,8 @@ class Furniture:
         _check(self, where, FURNITURE_LIMITS)
         if not isinstance(self.sheet, bool):
             raise InputError(f"{where}: sheet = {brief(self.sheet)}; it must be true or false")
+        if not self._settled and not isinstance(self.mesh, str | Path):
+            raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be a name or a file")
         if self._built_in and self.mesh not in mesh_names():
             raise InputError(
                 f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -123,8 +123,9 @@ class Scene:
                 raise InputError(f"scene: {key} = {brief(getattr(self, key))}; it must be a string")
         where = f"scene '{self.name}'"
         for key, kind in (("walls", Wall), ("furniture", Furniture), ("objects", Object)):
-            pieces = tuple(getattr(self, key))
-            if not all(type(piece) is kind for piece in pieces):
+            given = getattr(self, key)
+            pieces = tuple(given) if isinstance(given, Iterable) else ()
+            if not isinstance(given, Iterable) or not all(type(piece) is kind for piece in pieces):
                 raise InputError(f"{where}: {key} must be a tuple of {kind.__name__}")
             names = [piece.name for piece in pieces]
             twice = sorted({name for name in names if names.count(name) > 1})
@@ -366,10 +367,10 @@ def _pieces(
         own: dict[str, Any] = {}
         if "mesh" in entry:
             own["mesh"] = _mesh(where, entry["mesh"], folder)
-        if "motion" in entry:
-            own["motion"] = motion_of(where, entry["motion"])
         chosen = _material(where, entry["material"], materials)
         with _prefixed(where):
+            if "motion" in entry:
+                own["motion"] = motion_of(entry["motion"])
             found.append(kind(**{**entry, **own, "material": chosen}))
     return tuple(found)
 

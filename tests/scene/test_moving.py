@@ -75,6 +75,9 @@ def test_a_mesh_in_memory_is_a_closed_body_or_a_sheet_by_itself() -> None:
         ),
         (lambda: rt.Object("a", "fan", "metal", motion="turning"), "allowed: Turning"),
         (lambda: rt.Object("a", "fann", "metal"), "object 'a': mesh = 'fann' is unknown"),
+        (lambda: rt.Object("a", None, "metal", metres_per_unit=1), "mesh = None; it must be"),
+        (lambda: rt.FollowingPath(points_m=5, times_s=(0, 1)), "points_m = 5; it must be a list"),
+        (lambda: rt.Scene(objects=5), "objects must be a tuple of Object"),
         (lambda: rt.Scene(furniture=(rt.Object("a", "fan", "metal"),)), "tuple of Furniture"),
     ],
 )
@@ -93,4 +96,7 @@ def test_a_scene_file_says_how_its_objects_move(tmp_path: Path) -> None:
     assert fan.motion == rt.Turning(rate_hz=3, axis=(1, 0, 0))
     path.write_text(path.read_text().replace("turning", "spinning"))
     with pytest.raises(rt.InputError, match="kind = turning or swinging or path"):
+        rt.Scene.load(path)
+    path.write_text(path.read_text().replace("spinning", "turning").replace("= 3", "= true"))
+    with pytest.raises(rt.InputError, match=r"\[\[objects\]\] number 1 motion Turning: rate_hz"):
         rt.Scene.load(path)
