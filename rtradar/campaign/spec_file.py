@@ -10,7 +10,7 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -157,13 +157,15 @@ def _spec(table: Table, folder: Path) -> Spec:
 
 def _keep(table: Table) -> tuple[str, ...]:
     """Return the kinds of arrays to keep, in the order of `KEPT`."""
-    kinds = table.get("keep", [])
-    known = isinstance(kinds, list) and all(
-        isinstance(kind, str) and kind in KEPT for kind in kinds
-    )
-    if not known:
-        raise InputError(f"keep = {brief(kinds)}; it must be a list of: {', '.join(KEPT)}")
+    kinds = _names("keep", table.get("keep", []), KEPT)
     return tuple(kind for kind in KEPT if kind in kinds)
+
+
+def _names(key: str, value: object, allowed: Collection[str]) -> list[str]:
+    """Return a list of allowed names as it is."""
+    if isinstance(value, list) and all(isinstance(one, str) and one in allowed for one in value):
+        return value
+    raise InputError(f"{key} = {brief(value)}; it must be a list of: {', '.join(allowed)}")
 
 
 def _others(table: Table) -> Others | None:
@@ -172,16 +174,10 @@ def _others(table: Table) -> Others | None:
         return None
     given = table_at("others", table)
     check_keys("[others] ", given, ("count",), tuple(OTHERS))
-    count = given["count"]
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_OTHERS:
-        raise InputError(
-            f"[others] count = {brief(count)}; it must be a whole number from 1 to {MOST_OTHERS}"
-        )
-    labels = given.get("labels", OTHERS["labels"])
-    if not (isinstance(labels, list) and labels and all(one in ACTIVITIES for one in labels)):
-        raise InputError(
-            f"[others] labels = {brief(labels)}; it must be a list of: {', '.join(ACTIVITIES)}"
-        )
+    count = _whole("[others] ", "count", given["count"], 1, MOST_OTHERS)
+    labels = _names("[others] labels", given.get("labels", OTHERS["labels"]), ACTIVITIES)
+    if not labels:
+        raise InputError("[others] labels = []; give at least one")
     low, high = PERSON_LIMITS["position_m"]
     x_m, y_m = (
         _range(key, given.get(key, OTHERS[key]), low, high, "[others]") for key in ("x_m", "y_m")
@@ -428,9 +424,9 @@ def _range(
     return low, high
 
 
-def _whole(where: str, key: str, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _MOST:
+def _whole(where: str, key: str, value: object, least: int = 0, most: int = _MOST) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
         raise InputError(
-            f"{where}{key} = {brief(value)}; it must be a whole number from 0 to {_MOST}"
+            f"{where}{key} = {brief(value)}; it must be a whole number from {least} to {most}"
         )
     return value

@@ -317,6 +317,8 @@ def test_people_of_a_scene_belong_to_its_digest() -> None:
         (("count = 2", "count = true"), "count = True"),
         (("count = 2\n", ""), "count"),
         (('["stand"]', '["sit"]'), "labels = "),
+        (('["stand"]', '[["stand"]]'), "labels = "),
+        (('["stand"]', "[]"), "labels = "),
         (("[-1, 1]", "[1, -1]"), r"\[others\] x_m"),
         (("[-2, 2]", "[0, 0.1]"), "hold no place 1 m from"),
     ],
