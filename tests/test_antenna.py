@@ -15,9 +15,9 @@ from scipy.integrate import quad
 import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.scatter import build_model, chirp_poses
-from rtradar.scatter.antenna_gain import leg_gain, specular_points
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.free_space_legs import leg_gain, specular_points
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points
 

@@ -29,10 +29,10 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
-from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.common.interpolation import array_nodes
 from rtradar.scatter.common.polarization import bisector, unit
 from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.free_space_legs import leg_gain
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points

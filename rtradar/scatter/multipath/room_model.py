@@ -24,12 +24,12 @@ from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.antenna_gain import over_legs
 from rtradar.scatter.common.echo_sets import take, times_factor, together
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
+from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
 from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
