@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
 from rtradar.errors import InputError
-from rtradar.system.checks import check_number, check_order
+from rtradar.system.checks import brief, check_number, check_order
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -53,6 +53,14 @@ class Breathing:
         for name, allowed in limits.items():
             value = check_number("breathing", name, getattr(self, name), *allowed)
             object.__setattr__(self, name, value)
+
+
+def check_breathing(where: str, value: object) -> None:
+    """Raise an `InputError` if this is neither a `Breathing` nor None."""
+    if value is not None and not isinstance(value, Breathing):
+        raise InputError(
+            f"{where}breathing = {brief(value)}; give rt.Breathing(amplitude_mm, rate_hz)"
+        )
 
 
 class _Seed(TypedDict, total=False):
@@ -157,7 +165,7 @@ class RunSettings:
     ------
     InputError
         If ``fidelity`` or ``detector`` is no such name, or ``snr_db``, ``noise_power_m2``, ``pfa``,
-        ``seed``, ``order`` or ``path_tolerance_db`` no such value.
+        ``seed``, ``order``, ``breathing`` or ``path_tolerance_db`` no such value.
     """
 
     fidelity: str = "specular"
@@ -192,6 +200,7 @@ class RunSettings:
         DETECTORS.check(self.detector)
         check_seed("", self.seed)
         check_order(self.order)
+        check_breathing("", self.breathing)
         if self.path_tolerance_db == -math.inf:
             object.__setattr__(self, "path_tolerance_db", None)
         elif self.path_tolerance_db is not None and not -MAX_SNR_DB <= self.path_tolerance_db <= 0:

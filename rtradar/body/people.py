@@ -15,7 +15,7 @@ from rtradar.body.human import HumanMesh
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
-from rtradar.settings import Breathing, RunSettings
+from rtradar.settings import Breathing, RunSettings, check_breathing
 from rtradar.system.checks import brief, check_number, check_text, check_vector
 
 if TYPE_CHECKING:
@@ -91,6 +91,7 @@ class Person:
             )
         if self.material is not None:
             check_text(where, "material", self.material)
+        check_breathing(f"{where}: ", self.breathing)
 
     def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
         """Pose a mesh of human shape where the person is, whichever ``body`` they have.

@@ -82,6 +82,7 @@ def test_names_that_come_twice_are_numbered() -> None:
         ({"start_s": 1}, "start_s = 1; it must be a number from 0 to 0.6"),
         ({"body": "bones"}, "body = 'bones'; allowed: ellipsoids, mesh"),
         ({"material": 3}, "material = 3"),
+        ({"breathing": (3, 0.25)}, r"walk': breathing = \(3, 0.25\); give rt.Breathing"),
     ],
 )
 def test_a_person_without_meaning_is_refused(options: dict, message: str) -> None:
