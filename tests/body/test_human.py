@@ -5,12 +5,13 @@ import importlib.util
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body import PART_NAMES
 from rtradar.body.human import shape
 from rtradar.body.human.mesh import loop_subdivision
-from rtradar.motion.skeleton import NODES
+from rtradar.motion.skeleton import NODE_PARENTS, NODES
 
 needs_anny = pytest.mark.skipif(
     importlib.util.find_spec("anny") is None,
@@ -55,6 +56,20 @@ def test_knees_elbows_and_wrists_are_where_the_recording_has_them(person):
 
 
 @needs_anny
+def test_bones_of_the_mesh_end_where_those_of_the_recording_do(person):
+    fit, bones = person.fit, np.arange(1, len(NODES))
+    places, quaternions = person.motion.at([0.1, 0.9])
+    turns = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix().reshape(2, -1, 3, 3)
+    for part, node in enumerate(bones):
+        # What ends in a joint ends where the bones after it begin.
+        for after in bones[np.array(NODE_PARENTS)[1:] == node]:
+            own = fit.stretch[part] @ (fit.starts[after - 1] - fit.starts[part])
+            moved = turns[:, fit.turned_by[part]] @ fit.mounting[part] @ own
+            found = places[:, NODE_PARENTS[node]] + moved
+            np.testing.assert_allclose(found, places[:, node], atol=1e-9, err_msg=NODES[node])
+
+
+@needs_anny
 def test_left_is_left_and_every_part_is_there(person):
     assert set(person.part) == set(range(21))
     vertices, joints = person.vertices([0.3])[0], person.motion.at([0.3])[0][0]
@@ -89,8 +104,11 @@ def test_the_build_of_a_person_is_their_girth(person):
 def test_divisions_are_limited(person):
     assert person.divisions_for(16e9) == 1
     assert person.divisions_for(81e9) == 2
-    with pytest.raises(rt.InputError, match="divisions = 9; allowed are 0 to 4"):
-        person.vertices([0.0], 9)
+    for wrong in (9, 1.5):
+        with pytest.raises(rt.InputError, match=f"divisions = {wrong}; allowed are 0 to 4"):
+            person.vertices([0.0], wrong)
+    with pytest.raises(rt.InputError, match="frequency_hz = 0; it must be positive"):
+        person.divisions_for(0)
 
 
 def test_without_the_package_there_is_one_line(monkeypatch):

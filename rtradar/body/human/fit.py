@@ -77,8 +77,8 @@ NOMINAL_STATURE_M = 1.75
 class Fit:
     """A mesh in rest, its axes x left, y back, z up [m], and how it hangs on a skeleton.
 
-    ``vertices (vertex, 3)``; ``faces (face, 3)``; ``weights (vertex, part)``; ``joints (node, 3)``,
-    the places of the skeleton's nodes in it; ``stretch (part, 3, 3)``; ``mounting (part, 3, 3)``,
+    ``vertices (vertex, 3)``; ``faces (face, 3)``; ``weights (vertex, part)``; ``starts (part, 3)``,
+    where the parts' bones begin in it; ``stretch (part, 3, 3)``; ``mounting (part, 3, 3)``,
     the mesh's axes in those of the bone; ``turned_by (part,)``, the node whose rotation is the
     part's; ``height_m`` of the mesh as stretched by the stature.
     """
@@ -86,7 +86,7 @@ class Fit:
     vertices: Array
     faces: NDArray[np.int64]
     weights: Array
-    joints: Array
+    starts: Array
     stretch: Array
     mounting: Array
     turned_by: NDArray[np.int64]
@@ -96,8 +96,7 @@ class Fit:
         """Sparse matrix (vertex, 4 rows a part): weights times stretched places, and weights."""
         from scipy.sparse import csr_matrix  # slow to import
 
-        starts = self.joints[list(NODE_PARENTS[1:])]
-        own = np.einsum("pij,vpj->vpi", self.stretch, self.vertices[:, None] - starts)
+        own = np.einsum("pij,vpj->vpi", self.stretch, self.vertices[:, None] - self.starts)
         rows = np.concatenate([own, np.ones((*own.shape[:2], 1))], axis=2)
         return csr_matrix((rows * self.weights[..., None]).reshape(len(rows), -1))
 
@@ -125,12 +124,17 @@ def fit_to(motion: Motion) -> Fit:
     build = 1.0 if motion.girth == 1 else motion.girth * NOMINAL_STATURE_M / height
     frames = _carried(joints, pose)
     stretch = _stretches(joints, lengths, pose, frames, scale, build)
-    turned_by = np.arange(1, len(NODES))
+    starts, turned_by = joints[list(NODE_PARENTS[1:])], np.arange(1, len(NODES))
+    # The pelvis hangs on its hips, not on the root: skeletons differ in where that is.
+    hips = _middle(pose, "hip") - pose[0]
     for side in ("l_hip", "r_hip"):
-        turned_by[NODES.index(side) - 1] = 0
+        part = NODES.index(side) - 1
+        turned_by[part] = 0
+        below = np.linalg.solve(frames[part + 1] @ stretch[part], hips)
+        starts[part] = _middle(joints, "hip") - below
     mounting = np.swapaxes(turns[turned_by], 1, 2) @ frames[1:]
     weights = _part_weights(shapes, vertices)
-    return Fit(vertices, shapes.faces, weights, joints, stretch, mounting, turned_by, height)
+    return Fit(vertices, shapes.faces, weights, starts, stretch, mounting, turned_by, height)
 
 
 def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:

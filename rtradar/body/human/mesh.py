@@ -150,7 +150,14 @@ class HumanMesh:
         -------
         int
             0 to 4.
+
+        Raises
+        ------
+        InputError
+            Where the frequency is not positive.
         """
+        if not 0 < frequency_hz < math.inf:
+            raise InputError(f"HumanMesh: frequency_hz = {frequency_hz}; it must be positive")
         corners = self.fit.vertices[self.fit.faces]
         edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
         sag = 4 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * edge**2 / (8 * _RADIUS_M)
@@ -186,7 +193,7 @@ class HumanMesh:
 
     def _divided(self, divisions: int) -> tuple[Any, NDArray[np.int64]]:
         """Skinning as a sparse matrix (vertex, 4 rows a part), and faces, of the divided mesh."""
-        if not 0 <= divisions <= MOST_DIVISIONS:
+        if divisions not in range(MOST_DIVISIONS + 1):
             raise InputError(
                 f"HumanMesh: divisions = {divisions}; allowed are 0 to {MOST_DIVISIONS}"
             )
