@@ -18,24 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
-from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
-from rtradar.kernels.scatter.nearby_points import Nearby
-from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
+from rtradar.kernels.scatter.rooms import PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import take, times_factor, together
 from rtradar.scatter.common.interpolation import ArrayEnds
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
 from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
-from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
+from rtradar.scatter.multipath.keyframes import Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
+from rtradar.scatter.multipath.room_keyframes import RoomKeyframes, nearby_points
 from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
@@ -48,20 +46,12 @@ from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
 
-KEYFRAMES_S = 20e-3
-"""Keyframe spacing of echoes over walls [s]. Interpolating leaves an error of -21 dB of the ghosts
-(`validation/other_methods/multipath.py`)."""
-
 FIELD_ERROR = 0.02
 """Largest error of the field of an echo over or through a wall, over the sweep, without a limit."""
 
 _ENOUGH, _MOST_NODES = 0.015, 3
 """Part of it that polynomials through so many nodes may take; one pass of `synthesize` takes 3."""
 
-_KEPT_BYTES = 64e6
-"""Memory of the keyframes that stay, so that pruning and the signal trace once: 10 s in a box."""
-
-_KEYFRAMES_AT_ONCE = 32
 _CHIRPS_AT_ONCE = 64
 
 
@@ -144,7 +134,7 @@ class RoomModel:
         every = *series.walls, *(HALF_SPACE,) * len(faces)
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages(radar, self.paths)
-        self._columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
+        columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         self._around = Surroundings(
             radar,
             walls,
@@ -155,9 +145,12 @@ class RoomModel:
             # A formula alone knows neither polarisation nor occlusion.
             whole_level=not (self._fast or isinstance(conductor, HasFormula)),
         )
-        self._step = keyframe_step(radar, KEYFRAMES_S)
-        self._keyframes: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
+        self._keyframes = RoomKeyframes(self._around, columns, body)
         self.not_followed: dict[str, float] = {}
+
+    @property
+    def _columns(self) -> EchoColumns:
+        return self._keyframes.columns
 
     @property
     def path_names(self) -> tuple[str, ...]:
@@ -187,8 +180,8 @@ class RoomModel:
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
         at = chirp_poses(self._radar, self._body, chirps)
-        blend, before, after = self._around_chirps(chirps, at.tx_index)
-        near = self._near(blend, before, after)
+        blend, before, after = self._keyframes.around(chirps, at.tx_index)
+        near = nearby_points(blend, before, after)
         if unseen:
             near = near._replace(wanted=np.ones_like(near.wanted))
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
@@ -245,22 +238,20 @@ class RoomModel:
     def without_ghosts(self) -> RoomModel:
         """Return the model of the direct echoes alone, with what is already known of them."""
         direct = copy.copy(self)
-        direct._columns, direct._keyframes = copy.copy(self._columns), self._keyframes.copy()
-        keep = self._columns.direct
-        direct._restrict(keep[np.array(self._columns.echo)], keep)
+        direct._keyframes = self._keyframes.direct()
         return direct
 
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
         columns = self._columns
         at = chirp_poses(self._radar, self._body, chirps)
-        blend, before, after = self._around_chirps(chirps, at.tx_index)
+        blend, before, after = self._keyframes.around(chirps, at.tx_index)
         factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
         echo = np.array(columns.echo)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
             factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
-            extra = columns.lengths(at, self._near(blend, before, after).places(), extra)
+            extra = columns.lengths(at, nearby_points(blend, before, after).places(), extra)
         nodes = self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         path_amplitudes(np.ones(extra.shape), *factors, blend, left)
@@ -297,50 +288,6 @@ class RoomModel:
         out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
         return np.array([*out, *reversed(back[:-1])])
 
-    @staticmethod
-    def _near(blend: Blend, before: PathKeyframes, after: PathKeyframes) -> Nearby:
-        """Expected specular points."""
-        wanted = np.any(before.seen | after.seen, axis=(2, 3))
-        interval, fraction, line, tx_weight, _ = blend
-        return Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
-
-    def _around_chirps(
-        self, chirps: NDArray[np.int64], tx: NDArray[np.int64]
-    ) -> tuple[Blend, PathKeyframes, PathKeyframes]:
-        """Where the chirps are, and the keyframes before and after each interval."""
-        numbers, rest = np.divmod(chirps, self._step)
-        starts, interval = np.unique(numbers, return_inverse=True)
-        fraction = rest / self._step
-        # Where every chirp of an interval is its first, the keyframe after it does not matter.
-        stops = starts + (np.bincount(interval, weights=fraction) > 0)
-        found = self._find(np.union1d(starts, stops).tolist())
-        before, after = (
-            _stack([found[number] for number in ends.tolist()], len(self._columns))
-            for ends in (starts, stops)
-        )
-        ends = self._around.ends
-        blend = Blend(
-            interval, fraction, ends.line_of_tx[tx], ends.tx_weight[tx], ends.rx_weight[tx]
-        )
-        return blend, before, after
-
-    def _find(self, numbers: list[int]) -> dict[int, PathKeyframes]:
-        """Keyframes with these numbers, from the cache or many at a time."""
-        cache = self._keyframes
-        found = {number: cache[number] for number in numbers if number in cache}
-        missing = [number for number in numbers if number not in cache]
-        for first in range(0, len(missing), _KEYFRAMES_AT_ONCE):
-            some = missing[first : first + _KEYFRAMES_AT_ONCE]
-            chirps = np.array(some) * self._step
-            at, times = chirp_poses(self._radar, self._body, chirps), self._radar.centres_of(chirps)
-            keyframes = path_keyframes(self._around, self._columns, Poses(*at[3:]), times)
-            for place, number in enumerate(some):
-                own = PathKeyframes(*(array[place].copy() for array in keyframes))
-                cache.stay = int(_KEPT_BYTES / sum(array.nbytes for array in own))
-                cache.keep(number, own)
-                found[number] = own
-        return found
-
     # -- what is worth its cost --------------------------------------------------------------------
 
     def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathSummary, ...]:
@@ -353,7 +300,7 @@ class RoomModel:
         is weaker than that. Direct echoes always stay.
         """
         radar, columns = self._radar, self._columns
-        evaluated = np.arange(0, n_chirps, self._step)
+        evaluated = np.arange(0, n_chirps, self._keyframes.step)
         power = np.zeros(len(columns))
         for first in range(0, len(evaluated), _CHIRPS_AT_ONCE):
             echoes = self.optical_echoes(evaluated[first : first + _CHIRPS_AT_ONCE])
@@ -383,28 +330,5 @@ class RoomModel:
         )
         # Direct echoes have the first columns.
         worth |= direct[echo] & (np.arange(len(echo)) < len(direct))
-        self._restrict(worth, keep)
+        self._keyframes.restrict(worth, keep)
         return summaries
-
-    def _restrict(self, column: NDArray[np.bool_], echo: NDArray[np.bool_]) -> None:
-        """Leave out all other columns and all other echoes for good."""
-        self._columns.keep(column, echo)
-        self._keyframes.replace(
-            lambda own: PathKeyframes(
-                _widened(own.factor, len(column))[..., column].copy(),
-                own.seen[..., echo].copy(),
-                own.start[..., echo, :].copy(),
-            )
-        )
-
-
-def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:
-    factor = np.stack([_widened(own.factor, columns) for own in keyframes])
-    seen, start = (np.stack(arrays) for arrays in list(zip(*keyframes, strict=True))[1:])
-    return PathKeyframes(factor, seen, start)
-
-
-def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:
-    """Add empty columns for what was not yet known."""
-    missing = columns - factor.shape[-1]
-    return factor if not missing else np.pad(factor, [(0, 0)] * (factor.ndim - 1) + [(0, missing)])

@@ -19,7 +19,8 @@ from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
-from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
+from rtradar.scatter.multipath.room_keyframes import KEYFRAMES_S
+from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.trace.backends.backend import Backend
