@@ -167,7 +167,9 @@ class RigidEchoes:
         [m/s]; and the largest rate of rotation [rad/s].
         """
         shape, middles = self.moving.shape, self._legs.middles[:, None, None]
-        times = np.linspace(0.0, duration_s, _SAMPLES)
+        # Evenly spaced ones may all fall on one phase of a rotation.
+        random = np.random.default_rng(0).uniform(0.0, duration_s, _SAMPLES)
+        times = np.array([0.0, *np.sort(random), duration_s])
         points = np.concatenate([shape.vertices, self._reference[None]])
         poses = [self.moving.pose(at) for at in (times, times + _STEP_S)]
         early, late = (

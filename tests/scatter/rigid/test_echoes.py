@@ -82,6 +82,13 @@ def test_knots_in_time_give_what_every_chirp_gives() -> None:
     np.testing.assert_allclose(found, expected, atol=0.003 * np.abs(expected).max())
 
 
+def test_how_fast_it_turns_does_not_depend_on_the_length_of_the_capture() -> None:
+    # 199 equal parts of 100 s are a turn each.
+    turning = box(rt.Turning(rate_hz=1.99, phase_deg=90))
+    knots_s = [RigidEchoes(RADAR, turning, duration_s, None)._knot_s for duration_s in (3.0, 100.0)]
+    assert knots_s[1] == pytest.approx(knots_s[0], rel=0.05)
+
+
 def test_a_plate_of_wood_reflects_by_its_coefficient() -> None:
     ahead = dataclasses.replace(box(None), position_m=(2.5, 0.0, 1.0))
     plates = [
