@@ -78,7 +78,6 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
     inside, tones = None, model
-    around = model.person if isinstance(model, World) else model
     if isinstance(around, RoomModel):
         with processing.stages.time("room"):
             powers = budget.power, noise.power

@@ -15,7 +15,7 @@ async function main() {
   };
 
   const [x, y, z] = figure.ranges;
-  const body = await draw("scene-figure", figureTraces({ color: "#4c8fd6" }, ""), {
+  const body = await draw("scene-figure", figureTraces({ color: "#4c8fd6" }), {
     aspectmode: "data", domain: { x: [0, 1], y: [0, 1] },
     xaxis: metres("x [m]", x), yaxis: metres("y [m]", y), zaxis: metres("z [m]", z),
     camera: { eye: { x: -0.45, y: -1.65, z: 0.5 }, center: { x: -0.05, y: 0, z: -0.1 } },

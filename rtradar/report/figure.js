@@ -58,13 +58,13 @@ function pointsAt(time) {
   return [0, 1, 2].map((k) => chosen.map((index) => spatial.points[3 * index + k]));
 }
 
-/** Body, bones, floor, Tx and Rx: traces 0 to 4 of a 3D view. `paint` colours the body, `said` is added to the names of parts. */
-function figureTraces(paint, said) {
+/** Body, bones, floor, Tx and Rx: traces 0 to 4 of a 3D view. `paint` colours the body. */
+function figureTraces(paint) {
   const { mesh: [x, y, z], bones } = posed(0);
   return [
     {
       type: "mesh3d", name: "body", x, y, z, ...allFaces(), ...paint, opacity: 0.72, flatshading: false, text: each((part) => part),
-      hovertemplate: `%{text}${said}<extra></extra>`,
+      hovertemplate: "%{text}<extra></extra>",
       lighting: { ambient: 0.62, diffuse: 0.6, specular: 0.15, roughness: 0.6, fresnel: 0.1 }, lightposition: { x: -20, y: -20, z: 40 },
     },
     {

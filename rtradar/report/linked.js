@@ -216,7 +216,7 @@ async function drawLinked() {
   const paint = { intensity: each(() => 0), ...marking(first), showscale: first !== "part", colorbar: scaleBar(first) };
   const traces = [
     // Bones stand out too much beside colours that are to be told apart; the legend brings them back.
-    ...figureTraces(paint, "").map((trace, k) => (k === 1 ? { ...trace, visible: "legendonly" } : trace)), lines("direct paths", true, 3, 0.8), lines("paths over walls", false, 1.5, 0.4),
+    ...figureTraces(paint).map((trace, k) => (k === 1 ? { ...trace, visible: "legendonly" } : trace)), lines("direct paths", true, 3, 0.8), lines("paths over walls", false, 1.5, 0.4),
     ...pointsTraces().map((trace) => ({ ...trace, visible: "legendonly" })), ...roomTraces(),
   ];
   const pointsTrace = spatial ? 7 : -1;
