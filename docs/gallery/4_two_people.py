@@ -6,6 +6,7 @@ Several people in one scene hide one another, and each detection says who return
 """
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -22,16 +23,8 @@ SECONDS = float(os.environ.get("RTRADAR_GALLERY_S", 3.0))
 # cross, and one is there before the other. On the command line the same is ``rtradar run
 # synthetic:walk synthetic:walk --at 0,0,60 --at 0.9,0,-60 --out out/two``, and a scene file
 # has a table ``[[people]]`` for each.
-radar = rt.Radar(
-    name="12 GHz",
-    tx_y=2,
-    tx_z=2,
-    rx_y=8,
-    rx_z=8,
-    start_frequency_hz=12e9,
-    bandwidth_hz=4e9,
-    chirp_duration_s=125e-6,
-    samples_per_chirp=256,
+radar = replace(
+    rt.Radar.preset("paper-12ghz"), name="12 GHz", tx_y=2, tx_z=2, chirp_duration_s=125e-6
 )
 people = [
     rt.Person(rt.synthetic_motion("walk", seed=0, duration_s=SECONDS), (0.0, 0.0), 60),
