@@ -14,13 +14,14 @@ import rtradar as rt
 from rtradar.errors import InputError
 
 RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=0, rx_y=2, rx_z=0)
-WALLS = replace(rt.Scene.load("living-room"), furniture=())
+ROOM = rt.Scene.load("living-room")
+SMOOTH = [replace(wall, roughness_m=0.0) for wall in ROOM.walls]
+WALLS = replace(ROOM, furniture=(), walls=tuple(SMOOTH[:2]))
+WALK = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
 
 
 def simulated(radar: rt.Radar = RADAR, scene: rt.Scene = WALLS, **options: Any) -> rt.IfSamples:
-    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
-    given: dict[str, Any] = {"snr_db": math.inf, "duration_s": 0.2} | options
-    return rt.simulate(motion, radar, scene, **given)
+    return rt.simulate(WALK, radar, scene, snr_db=math.inf, **options)
 
 
 def power(samples: NDArray[np.complexfloating]) -> float:
