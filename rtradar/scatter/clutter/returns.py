@@ -31,7 +31,7 @@ Kind = Literal["mirror", "furniture", "reflector", "rough"]
 
 MOST_NODES = 13
 """Largest number of nodes over the sweep: with more, `synthesize` loses digits."""
-FURNITURE_NODES = 5
+FURNITURE_NODES, _PANE_NODES = 5, 9
 _NODES = (1, 3, 5, 7, 9, 11, MOST_NODES)
 FREQUENCY_ERROR = 1e-3
 """Error that amplitudes may have between nodes, over the strongest echo of an object."""
@@ -160,15 +160,19 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     one echo: their delays differ by the distance of Tx and Rx.
     """
     points = returns.points[0, 0, :, 0]
-    behind = np.zeros(len(points), dtype=bool)
+    behind, crossed = np.zeros(len(points), dtype=bool), set[int]()
     edges = WallEdges.of(scene.walls, radar)
     for number, antennas in product(range(len(scene.walls)), (radar.tx, radar.rx)):
-        behind |= edges.passage(number, antennas[:, None], points)[0].any(axis=0)
+        across = edges.passage(number, antennas[:, None], points)[0].any(axis=0)
+        behind |= across
+        if across.any():
+            crossed.add(number)
     if not behind.any():
         return returns
-    nodes = sweep_nodes(radar, FURNITURE_NODES)
+    count, series = _series_behind(scene.walls, crossed, radar)
+    nodes = sweep_nodes(radar, count)
     returns = replace(returns, amplitude=returns.at_nodes(nodes), frequency=nodes)
-    parts, off = _transmitted(returns.take(behind), radar, scene)
+    parts, off = _transmitted(returns.take(behind), radar, scene, series)
     parts = [returns.take(~behind), *parts]
     whole = replace(
         returns,
@@ -180,10 +184,25 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     return replace(whole, off_m=max(whole.off_m, off))
 
 
-def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[RoomEchoes], float]:
+def _series_behind(
+    walls: tuple[Wall, ...], crossed: set[int], radar: Radar
+) -> tuple[int, tuple[WallSeries, ...]]:
+    """Number of nodes, and the terms of all walls: of those that are crossed one, if it can be.
+
+    A pane of glass is then one echo of each point in place of a dozen, at a few nodes more.
+    """
+    for count in (FURNITURE_NODES, _PANE_NODES):
+        series = delayed(walls, radar, count)
+        if all(term.whole for number in crossed for term in series[number].terms[1]):
+            return count, series
+    return FURNITURE_NODES, delayed(walls, radar, FURNITURE_NODES)
+
+
+def _transmitted(
+    returns: RoomEchoes, radar: Radar, scene: Scene, series: tuple[WallSeries, ...]
+) -> tuple[list[RoomEchoes], float]:
     """Echoes behind walls, in groups of equal delays, and their error [m]."""
     points = returns.points[0, 0, :, 0]
-    series = delayed(scene.walls, radar, FURNITURE_NODES)
     walls = WallResponse(WallEdges.of(scene.walls, radar), series, returns.frequency)
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
