@@ -13,6 +13,7 @@ that is left over the sweep is small enough for a polynomial through `FURNITURE_
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple
@@ -109,9 +110,15 @@ def _facet_edge(corners: Array, radar: Radar) -> float:
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     nearest = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min()
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
+    edge = flat_edge(float((high - low).max()), float(nearest), wavenumber)
+    return min(edge, 2 * radar.range_bin_m)
+
+
+def flat_edge(extent: float, nearest: float, wavenumber: float) -> float:
+    """Longest side of facets [m], by the longest extent of a mesh and the nearest antenna [m]."""
     # Two legs bow by (edge / 2)^2 / 2R each over half a square.
-    flat = 2 * np.sqrt(_BOW_RAD * max(nearest, MINIMUM_ANTENNA_DISTANCE_M) / wavenumber)
-    return float(min(flat, 2 * radar.range_bin_m, _OF_PIECE * (high - low).max()))
+    flat = 2 * math.sqrt(_BOW_RAD * max(nearest, MINIMUM_ANTENNA_DISTANCE_M) / wavenumber)
+    return min(flat, _OF_PIECE * extent)
 
 
 def small_facets(corners: Array, first: int, edge: float) -> MeshGrid:

@@ -33,7 +33,7 @@ from rtradar.kernels.scatter.facets_by_length import (
     facets_by_length,
 )
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.furniture import small_facets
+from rtradar.scatter.clutter.furniture import flat_edge, small_facets
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.multipath.image_paths import WallPath
@@ -62,12 +62,6 @@ _NODES = 3
 _LENGTHS_A_CELL = 4.0
 """Echoes to a range cell of path, c / bandwidth: at three nodes, 0.1 % of a facet's field is lost
 at the ends of the sweep."""
-
-_BOW_RAD = 0.3
-"""Largest bow of paths over a facet [rad]; three quarters of it are corrected."""
-
-_OF_OBJECT = 0.125
-"""Largest facet over the longest extent of the object: what occludes it does so facet by facet."""
 
 _KNOT_RAD = 1.1
 """Phase against the point of reference from one knot to the next: a polynomial through eight is off
@@ -127,9 +121,7 @@ class RigidEchoes:
         nearest, rates, speeds, turning = self._kinematics(duration_s)
         wavenumber = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
         k = wavenumber[-1]
-        bow_m = 2 * math.sqrt(_BOW_RAD * nearest / k)
-        edge = min(bow_m, _OF_OBJECT * float((high - low).max()))
-        small = small_facets(own, 0, edge)
+        small = small_facets(own, 0, flat_edge(float((high - low).max()), nearest, k))
         self._facets = _rigid_facets(small.corners, not shape.closed)
         step = SPEED_OF_LIGHT_MPS / (_LENGTHS_A_CELL * radar.bandwidth_hz)
         half = math.ceil(2 * radius / step) + 1
@@ -183,8 +175,7 @@ class RigidEchoes:
         rates = float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
         # The chord of a small rotation, over all three axes, is sqrt(2) of its angle.
         change = np.linalg.norm(poses[1][0] - poses[0][0], axis=(1, 2)) / math.sqrt(2)
-        nearest = max(float(ranges.min()), MINIMUM_ANTENNA_DISTANCE_M)
-        return nearest, rates, speeds[:, :-1] / 2, float(change.max()) / _STEP_S
+        return float(ranges.min()), rates, speeds[:, :-1] / 2, float(change.max()) / _STEP_S
 
     def _refuse_too_near(self, times: Array, ranges: Array) -> None:
         radar = self._radar
