@@ -240,7 +240,8 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     """
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     duration_s = settings.duration_s
-    if duration_s is None and len(people) > 1:
+    # Whose recording ends before the start is refused by name.
+    if duration_s is None and len(people) > 1 and min(left) > 0:
         duration_s = min(left)
     bodies = []
     for person, rest in zip(people, left, strict=True):

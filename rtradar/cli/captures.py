@@ -305,7 +305,7 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
 def _people(options: argparse.Namespace) -> list[Motion | Person]:
     """Return the motions of the command line, as people where places are given."""
     names, places = options.motion, options.at
-    if len(places) not in (0 if len(names) < 2 else len(names), len(names)):
+    if len(places) != len(names) and (places or len(names) > 1):
         raise InputError(
             f"{len(names)} MOTION and {len(places)} --at; several people need places: give "
             "--at X,Y once for each MOTION, in the same order"

@@ -50,6 +50,8 @@ def test_the_shortest_ends_the_capture_and_who_ends_early_rests() -> None:
     assert (centres[0, ~rests] != centres[1, ~rests]).any()
     with pytest.raises(InputError, match="end past the recording"):
         body_of_people(people, RunSettings(duration_s=0.7))
+    with pytest.raises(InputError, match=r"start 0.4 s is not inside .*: synthetic:kick has 0.3 s"):
+        body_of_people(people, RunSettings(start_s=0.3))
 
 
 def test_each_person_breathes_in_their_own_way_and_goes_on_while_they_rest() -> None:

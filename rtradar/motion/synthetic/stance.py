@@ -40,7 +40,7 @@ LEAN = math.radians(2.5)
 """Mean lean: the centre of mass is 4 cm ahead of the ankles."""
 
 _TONES_HZ = np.geomspace(0.02, 2.0, 48)
-"""Frequencies of the sway; no two have a common period within an hour."""
+"""Frequencies of the sway, in a geometric progression, so that it does not repeat."""
 
 _PHASES = 2 * np.pi * np.outer([math.sqrt(2), math.sqrt(3)], np.arange(1, 49) ** 2)
 """Phases of the tones in both directions, without order (Weyl)."""

@@ -32,12 +32,9 @@ def truth_of(body: Body, times: NDArray[np.float64]) -> dict[str, NDArray[np.flo
     for person in body.people:
         end = person.duration_s
         joints.append(person.motion.at(np.minimum(times, end))[0])
-        before, after = (
-            person.motion.at(np.clip(times + side * _STEP_S / 2, 0.0, end))[0][:, 0]
-            for side in (-1, 1)
-        )
-        apart_s = np.clip(times + _STEP_S / 2, 0, end) - np.clip(times - _STEP_S / 2, 0, end)
-        away = np.linalg.norm(after - before, axis=1)
+        ends = np.clip([times - _STEP_S / 2, times + _STEP_S / 2], 0.0, end)
+        before, after = (person.motion.at(instants)[0][:, 0] for instants in ends)
+        apart_s, away = ends[1] - ends[0], np.linalg.norm(after - before, axis=1)
         speeds.append(np.divide(away, apart_s, out=np.zeros_like(away), where=apart_s > 0))
     together = np.stack(joints, axis=1)
     return {
