@@ -52,9 +52,9 @@ class PathKeyframes(NamedTuple):
     """What is left of the echoes at keyframes.
 
     ``factor (keyframe, node, line, 2, rx_end, column)`` complex64 is the co-polar field over that
-    of the bare return, for exp(+j omega t); for a direct echo over that of a conductor. ``seen
-    (keyframe, line, 2, rx_end, echo)`` bool. ``start (keyframe, line, 2, echo, 3)`` are specular
-    points for both ends of the lines of Tx in the axes of the parts [m].
+    of the bare return, for exp(+j omega t); for a direct echo, and any of a ``whole_level``, over
+    that of a conductor. ``seen (keyframe, line, 2, rx_end, echo)`` bool. ``start (keyframe, line,
+    2, echo, 3)`` are specular points for both ends of the lines of Tx in the axes of the parts [m].
     """
 
     factor: NDArray[np.complex64]
@@ -84,8 +84,8 @@ def path_keyframes(
 ) -> PathKeyframes:
     """Compute what is left of the echoes at some poses, with objects where they are at ``times``.
 
-    Columns that are met for the first time are added. Whether other parts occlude a direct echo is
-    decided by `SpecularVisibility`, not here.
+    Columns that are met for the first time are added. Whether other parts occlude a direct echo,
+    and any of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
     points, start, exists = _specular_points(around, columns, poses)
     legs = [
@@ -101,11 +101,10 @@ def path_keyframes(
             ("back", around.ends.rx, around.radar.rx_antenna),
         )
     ]
-    # Echoes whose bare return holds what the model itself knows of the last sections.
-    known = np.ones(len(columns.path), bool) if around.whole_level else columns.direct
-    direct = np.flatnonzero(known)
+    # Echoes of which the model itself knows how the last sections end.
+    known = np.flatnonzero(columns.direct | around.whole_level)
     factors = [
-        (chosen, met, _left(around, legs, direct, columns.part[chosen], chosen, *fields))
+        (chosen, met, _left(around, legs, known, columns.part[chosen], chosen, *fields))
         for chosen, met, fields in _pairs(around.paths, columns.path, legs)
     ]
     strength = np.zeros((*exists.shape[:2], 2, around.ends.rx.shape[1], len(columns.path)))
@@ -114,7 +113,7 @@ def path_keyframes(
     seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & (strength > 0)
     seen &= exists[:, :, None, None]
     if around.tracers is not None:
-        seen &= _not_occluded(*around.tracers, legs, seen, poses, columns.part, direct, times)
+        seen &= _not_occluded(*around.tracers, legs, seen, poses, columns.part, known, times)
     factor = _in_columns(columns, factors, strength)
     middle = factor[len(factor) // 2]
     change = np.abs(factor - middle) <= _FLAT * np.abs(middle)
@@ -246,7 +245,7 @@ def _pairs(
 def _left(
     around: Surroundings,
     legs: Sequence[_Carried],
-    direct: NDArray[np.int64],
+    known: NDArray[np.int64],
     part: NDArray[np.int64],
     chosen: NDArray[np.int64],
     sent: Field,
@@ -259,9 +258,9 @@ def _left(
     returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
     # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
     factor = np.asarray(-np.sum(received[:, :, :, None] * returned, axis=-1))
-    own = np.flatnonzero(np.isin(chosen, direct))
+    own = np.flatnonzero(np.isin(chosen, known))
     if len(own):
-        # The bare return of a direct echo holds the co-polar fraction of a conductor.
+        # The bare return of these holds the co-polar fraction of a conductor.
         ways = -out[..., own, :], -back[..., own, :]
         factor[..., own] = over_copolar(factor[..., own], *ways, around.radar.polarization)
     return factor
@@ -277,7 +276,7 @@ def _not_occluded(
     seen: NDArray[np.bool_],
     poses: Poses,
     part: NDArray[np.int64],
-    direct: NDArray[np.int64],
+    known: NDArray[np.int64],
     times: Array | None,
 ) -> NDArray[np.bool_]:
     """Whether furniture, objects and body leave both legs free.
@@ -297,7 +296,7 @@ def _not_occluded(
     for keyframe in range(len(seen)):
         body.pose(poses.centres[keyframe], poses.frames[keyframe])
         for leg, free in zip(legs, clear, strict=True):
-            _clear_of_body(body, leg, free[keyframe], keyframe, part, direct)
+            _clear_of_body(body, leg, free[keyframe], keyframe, part, known)
     return np.asarray(clear[0][:, :, :, None] & clear[1][:, :, None])
 
 
@@ -307,15 +306,15 @@ def _clear_of_body(
     clear: NDArray[np.bool_],
     keyframe: int,
     part: NDArray[np.int64],
-    direct: NDArray[np.int64],
+    known: NDArray[np.int64],
 ) -> None:
     """Take out of ``clear (line, end, echo)`` what the posed body occludes.
 
-    Of the last sections of ``direct`` echoes the model knows that itself.
+    Of the last sections of the ``known`` echoes the model knows that itself.
     """
     rays = []
     for chosen, origins, targets, last in leg.sections:
-        asked = ~np.isin(chosen, direct) if last else np.ones(len(chosen), dtype=bool)
+        asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
         line, end, echo = np.nonzero(clear[..., chosen] & asked)
         # At the specular point the part itself cannot be in the way, before a wall it can.
         own = part[chosen[echo]] if last else np.full(len(echo), -1)
