@@ -19,6 +19,7 @@ from scipy import fft
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.elementary import phasor
 from rtradar.kernels.jit import compiled
+from rtradar.kernels.nufft import closed_grid
 
 ANCHORS = 4
 """Anchors around a chirp through which the cubic goes."""
@@ -204,17 +205,7 @@ def _spread_anchored(anchors, between, sweep, half, values, grid):
                         real[cell + tap] += c1 * values[1, at, tap] + c2 * values[2, at, tap]
                     for tap in range(np.uint64(_TAPS)):
                         imaginary[cell + tap] += s1 * values[1, at, tap] + s2 * values[2, at, tap]
-            # Cells beyond an end belong to the other end; cell 0 of the grid lies at _BEFORE.
-            for place in range(_BEFORE):
-                real[cells + place] += real[place]
-                imaginary[cells + place] += imaginary[place]
-            for place in range(_BEFORE, _TAPS):
-                real[place] += real[cells + place]
-                imaginary[place] += imaginary[cells + place]
-            for place in range(cells):
-                grid[chirp, receiver, place] = complex(
-                    real[_BEFORE + place], imaginary[_BEFORE + place]
-                )
+            closed_grid(real, imaginary, _BEFORE, grid[chirp, receiver])
 
 
 def anchored_tones_reference(anchors, between, sweep, samples):

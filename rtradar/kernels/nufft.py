@@ -142,6 +142,23 @@ def _tap_polynomial(start, c0, c1, c2, width, variance, off):
     return constant, slant, bend, twist
 
 
+@inlined()
+def closed_grid(real, imaginary, before, out):
+    """Fill ``out (cell,)`` with sums whose first cell is number ``before``.
+
+    Cells beyond an end belong to the other end.
+    """
+    cells = len(out)
+    for cell in range(before):
+        real[cells + cell] += real[cell]
+        imaginary[cells + cell] += imaginary[cell]
+    for cell in range(before, len(real) - cells):
+        real[cell] += real[cells + cell]
+        imaginary[cell] += imaginary[cells + cell]
+    for cell in range(cells):
+        out[cell] = complex(real[before + cell], imaginary[before + cell])
+
+
 @compiled(parallel=True, fastmath={"contract"})
 def _spread_tones(tones, half, samples, gaussian, grid):
     """Fill ``grid (chirp, rx, cell)`` with Gaussians of the tones, phases about sample ``half``."""
@@ -199,14 +216,4 @@ def _spread_tones(tones, half, samples, gaussian, grid):
                     x = np.float32(tap) + nearest
                     re[tap] += taps[tap] * (c_re + x * (s_re + x * (b_re + x * t_re)))
                     im[tap] += taps[tap] * (c_im + x * (s_im + x * (b_im + x * t_im)))
-            # Cells beyond an end belong to the other end; cell 0 of the grid lies at _BEFORE.
-            for cell in range(_BEFORE):
-                real[cells + cell] += real[cell]
-                imaginary[cells + cell] += imaginary[cell]
-            for cell in range(_BEFORE, _TAPS):
-                real[cell] += real[cells + cell]
-                imaginary[cell] += imaginary[cells + cell]
-            for cell in range(cells):
-                grid[chirp, receiver, cell] = complex(
-                    real[_BEFORE + cell], imaginary[_BEFORE + cell]
-                )
+            closed_grid(real, imaginary, _BEFORE, grid[chirp, receiver])
