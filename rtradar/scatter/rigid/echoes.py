@@ -70,7 +70,7 @@ by 0.2 %."""
 _KEYFRAME_S, _KEYFRAME_RAD = 20e-3, math.radians(10.0)
 """Most time and most rotation from one keyframe to the next."""
 
-_KEPT_KEYFRAMES, _PASSING = 512, 64
+_KEPT_KEYFRAMES, _PASSING, _KEPT_KNOTS = 512, 64, 8
 _SAMPLES, _STEP_S = 200, 1e-5
 """Instants of a capture at which velocities and distances are looked at, and the time for both."""
 
@@ -133,6 +133,7 @@ class RigidEchoes:
         self._knot_s = _KNOT_RAD / max(k * rates, _KNOT_RAD / _KEYFRAME_S)
         self._keyframe_s = min(_KEYFRAME_S, _KEYFRAME_RAD / max(turning, 1e-9))
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
+        self._knots: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(0, _KEPT_KNOTS)
         self.limits = tuple(self._limits(speeds)) if path.order == 0 else ()
         # What slabs add is the same all the time: what is left is in the factors.
         self._longer_m = self._legs.longer_m(self._pose(np.zeros(1))[1][0])
@@ -221,10 +222,9 @@ class RigidEchoes:
         knots = Knots(times, self._knot_s)
         count = len(knots.numbers)
         if count * radar.n_tx < len(chirps):
-            every = np.repeat(knots.numbers * self._knot_s, radar.n_tx)
-            field = self._field(every, np.tile(np.arange(radar.n_tx), count))
-            used = field.any(axis=(0, 1, 2))
-            field = field[..., used].reshape(count, radar.n_tx, *field.shape[1:3], -1)
+            field = self._at_knots(knots.numbers.tolist())
+            used = field.any(axis=(0, 1, 2, 3))
+            field = field[..., used]
             amplitude = knots.between(field, tx)
         else:
             field = self._field(times, tx)
@@ -244,6 +244,19 @@ class RigidEchoes:
             part=np.zeros(len(steps), dtype=np.int64),
             bounces=bounces + self.path.order,
         )
+
+    def _at_knots(self, numbers: list[int]) -> NDArray[np.complex128]:
+        """Amplitudes (knot, tx, rx, node, echo); those about the end of a pass serve the next."""
+        found = {number: self._knots[number] for number in numbers if number in self._knots}
+        missing = [number for number in numbers if number not in found]
+        if missing:
+            n_tx = self._radar.n_tx
+            every = np.repeat(np.array(missing) * self._knot_s, n_tx)
+            field = self._field(every, np.tile(np.arange(n_tx), len(missing)))
+            for number, own in zip(missing, np.split(field, len(missing)), strict=True):
+                found[number] = own.copy()
+                self._knots.keep(number, found[number])
+        return np.stack([found[number] for number in numbers])
 
     def _pose(self, times: Array) -> tuple[Array, Array]:
         """Rotations (time, 3, 3), and the point of reference (time, 3), world [m]."""

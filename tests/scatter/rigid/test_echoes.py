@@ -78,6 +78,10 @@ def test_knots_in_time_give_what_every_chirp_gives() -> None:
     chirps = np.arange(1200)
     assert model._knot_s > 3 * RADAR.cycle_duration_s
     found = field(model.echoes(chirps))[:, 700:712]
+    # What is kept of one pass gives the next what it would find itself.
+    after = np.arange(1200, 2400)
+    again = RigidEchoes(RADAR, turning, 0.5, None).echoes(after)
+    np.testing.assert_array_equal(model.echoes(after).amplitude, again.amplitude)
     expected = field(model.echoes(chirps[700:712]))
     np.testing.assert_allclose(found, expected, atol=0.003 * np.abs(expected).max())
 
