@@ -181,13 +181,13 @@ class Browser:
                 if kind != "mouseMoved"
                 else {"button": "left" if buttons else "none"}
             )
-            # Chromium answers after the next picture: ten of them may take a minute.
+            # Chromium answers after the next picture, which may take seconds.
             self.send("Input.dispatchMouseEvent", type=kind, x=at, y=y, buttons=buttons, **press)
 
         mouse("mouseMoved", x, 0)
         mouse("mousePressed", x, 1)
-        for step in range(1, 11):
-            mouse("mouseMoved", x + by * step / 10, 1)
+        for step in range(1, 4):
+            mouse("mouseMoved", x + by * step / 3, 1)
             time.sleep(0.03)
         mouse("mouseReleased", x + by, 0)
 
