@@ -94,7 +94,7 @@ def add(commands: Subcommands) -> None:
 
 def _add_run(run: OneLineParser) -> None:
     _add_capture(run)
-    _add_settings(run, _ONLY_RUN)
+    add_settings(run, _ONLY_RUN)
     run.option(
         "--tolerance-db",
         "X",
@@ -175,7 +175,7 @@ def _add_capture(command: OneLineParser) -> None:
         f"scene: {', '.join(scene_files())}, or a TOML file (default: %(default)s)",
         default="free-space",
     )
-    _add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
+    add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
     command.add_argument(
         "--no-spreading",
         dest="spreading",
@@ -184,6 +184,11 @@ def _add_capture(command: OneLineParser) -> None:
     )
     add_files(command, out="folder for the results", json="write the summary there too")
     command.flag("--open", "open the page of the results in the browser")
+    add_amount(command)
+
+
+def add_amount(command: OneLineParser) -> None:
+    """Add the options that say how much is printed."""
     amount = command.add_mutually_exclusive_group()
     amount.add_argument("--quiet", action="store_true", help=QUIET_HELP)
     amount.add_argument(
@@ -193,7 +198,7 @@ def _add_capture(command: OneLineParser) -> None:
     )
 
 
-def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
+def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
     """Add the options of some settings."""
     from rtradar.settings import RunSettings, setting_texts
     from rtradar.system.registries import DETECTORS, MODELS
@@ -230,10 +235,16 @@ def _run(options: argparse.Namespace) -> int:
             model_options[name] = getattr(options, name)
     with lines_shown():
         summary = run(**capture, model_options=model_options, pictures=options.pictures).summary
+    tell(options, summary)
+    return 0
+
+
+def tell(options: argparse.Namespace, summary: Mapping[str, Any]) -> None:
+    """Print what a run found and how long it took, and name its page."""
     if options.json is not None:
         write_json(options.json, summary)
     if options.verbose:
-        say(options, _details(summary["stages"], summary["versions"], summary["variant"]))
+        say(options, _details(summary["stages"], summary["versions"], summary.get("variant")))
     say(
         options,
         f"{summary['rdt_points']} points from {summary['detections']} detections "
@@ -241,7 +252,6 @@ def _run(options: argparse.Namespace) -> int:
         f"for {summary['capture_s']:.2f} s of radar, and {summary['warmup_s']:.1f} s to warm up",
     )
     _show(options, "report.html")
-    return 0
 
 
 def _details(stages: Mapping[str, float], versions: Mapping[str, str], backend: str | None) -> str:

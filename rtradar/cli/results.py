@@ -1,4 +1,4 @@
-"""``rtradar view`` and ``rtradar export``: the results of a run, to look at and for other tools."""
+"""``rtradar view``: the results of a run, to look at."""
 
 from __future__ import annotations
 
@@ -16,23 +16,13 @@ if TYPE_CHECKING:
 
 
 def add(commands: Subcommands) -> None:
-    """Add both commands."""
+    """Add the command."""
     add_command(
         commands,
         "view",
         "show body, room, paths, echoes, maps and cloud of a run over time, in the browser",
         _add_view,
         ("rtradar view out/walk", "rtradar view out/walk --still picture.png --time 1.2"),
-    )
-    add_command(
-        commands,
-        "export",
-        "write IF samples for MATLAB, xarray or as int16, and clouds as PLY or PCD",
-        _add_export,
-        (
-            "rtradar export out/walk --out samples.mat       # of a run with --save-if",
-            "rtradar export out/walk/cloud_xyz.npz --out cloud.pcd",
-        ),
     )
 
 
@@ -57,25 +47,6 @@ def _add_view(view: OneLineParser) -> None:
     view.option("--time", "S", "time of the still [s] (default: the middle)", type=seconds)
     add_files(view, json="write what was shown and written there")
     view.set_defaults(command=_view)
-
-
-def _add_export(export: OneLineParser) -> None:
-    export.option(
-        "source",
-        "SOURCE",
-        "folder that rtradar run --save-if made, or a cloud: .npz, .ply or .pcd",
-        type=there,
-    )
-    export.option(
-        "--out",
-        "FILE",
-        "its suffix gives the format: .mat, .nc or .bin of IF samples; "
-        ".ply, .pcd or .npz of a cloud",
-        type=path,
-        required=True,
-    )
-    add_files(export, json="write there as JSON what was written")
-    export.set_defaults(command=_export)
 
 
 def _view(options: argparse.Namespace) -> int:
@@ -109,19 +80,3 @@ def _own_page(folder: Path) -> Path:
             f"'{page}' is there, and no page of rtradar view; name another file (--out)"
         )
     return page
-
-
-def _export(options: argparse.Namespace) -> int:
-    check_place(options.json)
-    from rtradar.exchange import export
-
-    written = export(options.source, options.out)
-    if options.json is not None:
-        write_json(options.json, written)
-    axes, shape = written["axes"], written["shape"]
-    if len(axes) == len(shape):
-        size = ", ".join(f"{axis} {length}" for axis, length in zip(axes, shape, strict=True))
-    else:
-        size = f"{shape[0]} points: {', '.join(axes)}"
-    print(f"{size}; {written['type']}; see {options.out}")
-    return 0

@@ -3,30 +3,44 @@
 from __future__ import annotations
 
 import os
-import struct
 import zipfile
-import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
+
+import numpy as np
 
 from rtradar.clouds import files as cloud_files
 from rtradar.clouds.files import CloudTable
 from rtradar.errors import InputError
-from rtradar.exchange import if_formats
-from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, in_short, open_recording
+from rtradar.exchange import if_formats, int16_files
+from rtradar.exchange.dca1000 import Dca1000Layout
+from rtradar.exchange.recording import (
+    DAMAGE,
+    IF_AXES,
+    IfCube,
+    IfRecording,
+    SampleFile,
+    open_recording,
+    unreadable,
+)
+from rtradar.radar import Radar
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.output_folder import check_whole
 
-_T = TypeVar("_T")
-
 IF_FORMATS: Mapping[
-    str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], IfCube]]
+    str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], SampleFile]]
 ] = {
-    ".mat": (if_formats.write_mat, if_formats.read_mat),
-    ".nc": (if_formats.write_netcdf, if_formats.read_netcdf),
-    ".bin": (if_formats.write_int16, if_formats.read_int16),
+    ".mat": (if_formats.write_mat, if_formats.open_mat),
+    ".nc": (if_formats.write_netcdf, if_formats.open_netcdf),
+    ".bin": (int16_files.write_int16, int16_files.open_int16),
+    ".npy": (if_formats.write_npy, if_formats.open_npy),
+    ".zarr": (if_formats.write_zarr, if_formats.open_zarr),
 }
-"""Writer and reader of IF samples, by the suffix of the file."""
+"""Writer and opener of IF samples, by the suffix of the file."""
+
+_BY_TX = (".mat", ".nc", ".bin")
 
 CLOUD_FORMATS: Mapping[
     str, tuple[Callable[[Path, CloudTable], dict[str, Any]], Callable[[Path], CloudTable]]
@@ -37,14 +51,10 @@ CLOUD_FORMATS: Mapping[
 }
 """Writer and reader of point clouds, by the suffix of the file."""
 
-_DAMAGE = (
-    OSError, ValueError, KeyError, IndexError, TypeError, EOFError, OverflowError, RuntimeError,
-    zipfile.BadZipFile, zlib.error, struct.error,
-)  # fmt: skip
-"""Errors of readers of files that are damaged or of another kind."""
 
-
-def export(source: str | Path, out: str | Path) -> dict[str, Any]:
+def export(
+    source: str | Path, out: str | Path, *, dca1000: Dca1000Layout | None = None
+) -> dict[str, Any]:
     """Write IF samples or a cloud of a run for other tools; the suffix of ``out`` is the format.
 
     Parameters
@@ -52,8 +62,11 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     source : path
         Folder of a run that kept its IF samples, or a cloud: .npz, .ply or .pcd.
     out : path
-        Output file, which is replaced if it exists: .mat, .nc or .bin for IF samples, .npz, .ply or
-        .pcd for a cloud.
+        Output file, which is replaced if it exists: .mat, .nc, .bin, .npy or .zarr for IF samples,
+        .npz, .ply or .pcd for a cloud. A Zarr store that exists is not replaced.
+    dca1000 : Dca1000Layout, optional
+        Order of the words of a .bin file, in which a DCA1000 would record the samples; by default
+        they are (chirp, tx, rx, sample, IQ).
 
     Returns
     -------
@@ -78,9 +91,7 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
             raise InputError(
                 f"'{origin}' is a folder; name the cloud in it, such as {origin / 'cloud_xyz.npz'}"
             )
-        recording = open_recording(origin)
-        about = {"axes": list(IF_AXES), "shape": list(recording.shape)}
-        about |= IF_FORMATS[suffix][0](target, recording)
+        about = _export_samples(open_recording(origin), target, dca1000)
     elif suffix in IF_FORMATS:
         raise InputError(
             f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made"
@@ -94,13 +105,73 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     return {"file": str(target)} | about
 
 
+def _export_samples(
+    recording: IfRecording, target: Path, dca1000: Dca1000Layout | None
+) -> dict[str, Any]:
+    suffix = target.suffix.lower()
+    about: dict[str, Any] = {"axes": list(IF_AXES), "shape": list(recording.shape)}
+    if dca1000 is not None:
+        if suffix != ".bin":
+            raise InputError(f"'{target}': a file of a DCA1000 is named .bin; give such a name")
+        return about | int16_files.write_int16(target, recording, dca1000)
+    if recording.radar.multiplexing == "ddm" and suffix in _BY_TX:
+        raise InputError(
+            f"'{recording.name}' holds the sum of all Tx, as Doppler division receives it, "
+            "which has no tx axis; export it as .npy, .zarr or for a DCA1000"
+        )
+    return about | IF_FORMATS[suffix][0](target, recording)
+
+
+def open_samples(
+    path: str | Path, radar: Radar | None = None, dca1000: Dca1000Layout | None = None
+) -> SampleFile:
+    """Open IF samples, simulated or measured; they are read when rows of them are asked for.
+
+    Parameters
+    ----------
+    path : path
+        File ``.bin``, ``.npy``, ``.zarr``, ``.nc`` or ``.mat``, or the folder of a run that kept
+        its IF samples.
+    radar : Radar, optional
+        Radar that received them, in place of the one that the file names.
+    dca1000 : Dca1000Layout, optional
+        Order of the words of a .bin file, in place of that of the JSON file beside it; where there
+        is none, that of the radar's chip.
+
+    Returns
+    -------
+    SampleFile
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or does not fit the radar.
+    """
+    place = Path(path)
+    suffix = place.suffix.lower()
+    if os.path.isdir(place) and suffix != ".zarr":
+        recording = open_recording(place)
+        return SampleFile(place, radar or recording.radar, recording.row_shape, recording.read)
+    if suffix not in IF_FORMATS:
+        raise InputError(
+            f"'{path}': IF samples are read from {', '.join(IF_FORMATS)}; give such a file"
+        )
+    try:
+        if suffix == ".bin":
+            return int16_files.open_int16(place, radar, dca1000)
+        found = IF_FORMATS[suffix][1](place)
+    except DAMAGE as error:
+        raise unreadable(place, "IF samples", error) from None
+    return replace(found, radar=radar or found.radar)
+
+
 def read_if(path: str | Path) -> IfCube:
     """Read IF samples, all at once, from a file that `export` wrote or from the folder of a run.
 
     Parameters
     ----------
     path : path
-        File ``.mat``, ``.nc`` or ``.bin``, or the folder of a run that kept its IF samples.
+        File of a suffix in `IF_FORMATS`, or the folder of a run that kept its IF samples.
 
     Returns
     -------
@@ -109,14 +180,17 @@ def read_if(path: str | Path) -> IfCube:
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or does not tell of its radar.
     """
-    place = Path(path)
-    if os.path.isdir(place):
-        recording = open_recording(place)
-        tx, (chirps, *rest) = recording.radar.n_tx, recording.shape
-        return IfCube(recording.read(0, chirps * tx).reshape(chirps, *rest), recording.radar)
-    return _read(place, IF_FORMATS, "IF samples")
+    found = open_samples(path)
+    if found.radar is None:
+        raise InputError(
+            f"'{path}' does not tell of its radar; read it with rtradar.exchange.open_samples"
+        )
+    rows = found.radar.n_tx // chirps_together(found.radar)
+    cycles = len(found) // rows
+    samples = found[: cycles * rows].reshape(cycles, rows, *found.shape[1:])
+    return IfCube(np.ascontiguousarray(samples), found.radar)
 
 
 def read_cloud(path: str | Path) -> CloudTable:
@@ -137,16 +211,12 @@ def read_cloud(path: str | Path) -> CloudTable:
         If the file cannot be read.
     """
     place = Path(path)
-    return cloud_files.checked(_read(place, CLOUD_FORMATS, "a cloud"), place)
-
-
-def _read(path: Path, formats: Mapping[str, tuple[Any, Callable[[Path], _T]]], what: str) -> _T:
-    if path.suffix.lower() not in formats:
-        raise InputError(f"'{path}': {what} is read from {', '.join(formats)}; give such a file")
-    try:
-        return formats[path.suffix.lower()][1](path)
-    except _DAMAGE as error:
-        why = getattr(error, "strerror", None) or in_short(error)
+    if place.suffix.lower() not in CLOUD_FORMATS:
         raise InputError(
-            f"cannot read {what} from '{path}': {why}; give a file that rtradar wrote"
-        ) from None
+            f"'{path}': a cloud is read from {', '.join(CLOUD_FORMATS)}; give such a file"
+        )
+    try:
+        cloud = CLOUD_FORMATS[place.suffix.lower()][1](place)
+    except (*DAMAGE, zipfile.BadZipFile) as error:
+        raise unreadable(place, "a cloud", error) from None
+    return cloud_files.checked(cloud, place)

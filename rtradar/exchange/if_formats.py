@@ -1,27 +1,36 @@
-"""Files of IF samples: MATLAB version 7.3, netCDF-4, and the 16-bit integers of radar boards.
+"""Files of IF samples in single precision: MATLAB version 7.3, netCDF-4, NumPy and Zarr.
 
 MATLAB 7.3 and netCDF-4 are HDF5, of any size. Readers raise errors of many types if a file is none
-of theirs; `rtradar.exchange.read_if` makes one line of them.
+of theirs; `rtradar.exchange.open_samples` makes one line of them.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, radar_of
-from rtradar.system.files import LastingFile, atomic_file, open_regular, read_json, stored
+from rtradar.exchange.recording import (
+    IF_AXES,
+    IF_UNIT,
+    ROW_AXES,
+    IfRecording,
+    SampleFile,
+    check_store,
+    in_short,
+    radar_of,
+)
+from rtradar.signal.real_samples import complex_of_real
+from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
+from rtradar.system.output_folder import new_folder
 
-_LARGEST = 32767
-_WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"
 _MAT_HEADER = (
     b"MATLAB 7.3 MAT-file, Platform: rtradar, "
     b"Created on: Thu Jan  1 00:00:00 1970 HDF5 schema 1.00 ."
@@ -62,12 +71,48 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
     return {"variable": "if_samples", "type": "complex single"}
 
 
-def read_mat(path: Path) -> IfCube:
-    """Read what `write_mat` wrote, without any loss."""
+def open_mat(path: Path) -> SampleFile:
+    """Open what `write_mat` wrote, or a variable ``if_samples`` of that kind without a radar."""
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
-        samples = np.ascontiguousarray(stored(file, "if_samples")[:].view(np.complex64).T)
-        text = "".join(map(chr, stored(file, "radar/all")[:].ravel()))
-    return IfCube(samples, radar_of(text))
+        shape = stored(file, "if_samples").shape[::-1]
+        text = "".join(map(chr, stored(file, "radar/all")[:].ravel())) if "radar" in file else ""
+
+    def read(first: int, last: int) -> NDArray[np.complex64]:
+        with open_regular(path) as raw, h5py.File(raw, "r") as file:
+            parts = stored(file, "if_samples")[..., first:last]
+            return np.asarray(parts["real"] + 1j * parts["imag"]).T
+
+    return _rows(path, shape, read, text)
+
+
+def _rows(
+    path: Path,
+    shape: tuple[int, ...],
+    read: Callable[[int, int], NDArray[Any]],
+    text: str,
+    kind: Any = np.complex64,
+) -> SampleFile:
+    """Give rows (chirp, rx, sample) of arrays (chirp, tx, rx, sample), or (chirp, rx, sample).
+
+    ``read`` takes the first and the last number along the first axis, ``text`` is that of a radar.
+    Real samples, of a ``kind`` of numbers, become half as many complex ones.
+    """
+    tx, real = shape[1] if len(shape) == 4 else 1, np.dtype(kind).kind in "iuf"
+    if len(shape) not in (3, 4) or min(shape) < 1 or (real and shape[-1] % 2):
+        whole = ", an even number of real samples" if real else ""
+        raise ValueError(
+            f"the samples have shape {shape}, not (chirp, rx, sample) or (chirp, tx, rx, "
+            f"sample){whole}"
+        )
+
+    def rows(first: int, last: int) -> NDArray[np.complex64]:
+        begin = first // tx
+        block = read(begin, -(-last // tx)).reshape(-1, *shape[-2:])
+        block = block[first - begin * tx : last - begin * tx]
+        return complex_of_real(block) if real else block.astype(np.complex64)
+
+    size = (shape[0] * tx, shape[-2], shape[-1] // 2 if real else shape[-1])
+    return SampleFile(path, radar_of(text) if text else None, size, rows)
 
 
 def _put(place: Any, name: str, values: ArrayLike) -> None:
@@ -122,82 +167,85 @@ def _describe(file: Any, data: Any, axes: tuple[str, ...], unit: str, meaning: s
         data.dims[number].attach_scale(file[axis])
 
 
-def read_netcdf(path: Path) -> IfCube:
-    """Read what `write_netcdf` wrote, without any loss."""
+def open_netcdf(path: Path) -> SampleFile:
+    """Open what `write_netcdf` wrote."""
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
-        samples = np.empty(stored(file, "if_real").shape, dtype=np.complex64)
-        samples.real, samples.imag = (stored(file, name)[:] for name in _PARTS)
-        return IfCube(samples, radar_of(str(file.attrs["radar"])))
+        shape, text = stored(file, "if_real").shape, str(file.attrs.get("radar", ""))
+
+    def read(first: int, last: int) -> NDArray[np.complex64]:
+        with open_regular(path) as raw, h5py.File(raw, "r") as file:
+            real, imaginary = (stored(file, name)[first:last] for name in _PARTS)
+        samples = np.empty(real.shape, dtype=np.complex64)
+        samples.real, samples.imag = real, imaginary
+        return samples
+
+    return _rows(path, shape, read, text)
 
 
-def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
-    """Write (chirp, tx, rx, sample, IQ) as little-endian int16 with a JSON file beside it.
-
-    The largest real or imaginary part becomes 32767, and rounding errors are at most half of
-    ``scale``. InputError if a file cannot be written, a foreign file has the name of the JSON file,
-    or a sample is not finite.
-    """
-    beside = path.with_suffix(".json")
-    for file in (path, beside):
-        if file.is_dir():
-            raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
-    if os.path.lexists(beside) and not _is_ours(beside):
-        raise InputError(
-            f"'{beside}' is there, and something else; it would be replaced: "
-            "give another file (--out)"
-        )
-    peak = 0.0
-    for _, block in recording.blocks("finding the peak"):
-        largest = float(np.abs(block.view(np.float32)).max())
-        if not np.isfinite(largest):
-            raise InputError(
-                f"{recording.name}: a sample is not finite, and has no place in 16 bits; "
-                "run it again"
-            )
-        peak = max(peak, largest)
-    scale = peak / _LARGEST if peak else 1.0
-    about = {
-        "what": _WHAT,
-        "data": path.name,
-        "type": "int16, little-endian",
-        "axes": [*IF_AXES, "iq"],
-        "shape": [*recording.shape, 2],
-        "scale": scale,
-        "unit": IF_UNIT,
-        "quantisation": scale / 2,
-        **recording.waveform(),
-        "tx_position_m": recording.radar.tx.tolist(),
-        "rx_position_m": recording.quantities()["rx_position"].values.tolist(),
-        "radar": json.loads(recording.radar_text),
-    }
-    with atomic_file(beside) as text, atomic_file(path) as raw:
-        text.write((json.dumps(about, indent=1) + "\n").encode("utf-8"))
+def write_npy(path: Path, recording: IfRecording) -> dict[str, Any]:
+    """Write (chirp, rx, sample), the chirps of all Tx in turn, complex64; without the radar."""
+    shape = recording.row_shape
+    header = {"descr": "<c8", "fortran_order": False, "shape": shape}
+    with atomic_file(path) as file:
+        np.lib.format.write_array_header_1_0(file, header)
         for _, block in recording.blocks("writing"):
-            # In float64: the quotient of two float32 could round to the wrong side of a half.
-            parts = np.rint(block.view(np.float32).astype(np.float64) / scale)
-            raw.write(parts.astype("<i2").tobytes())
-        # The text of an older cube must not lie beside this one, wherever the next steps end.
-        beside.unlink(missing_ok=True)
-    return {"beside": str(beside), "scale": scale, "quantisation": scale / 2, "type": "int16"}
+            file.write(block.astype("<c8", copy=False).tobytes())
+    return {"axes": list(ROW_AXES), "shape": list(shape), "type": "complex64"}
 
 
-def read_int16(path: Path) -> IfCube:
-    """Read what `write_int16` wrote, to half of ``scale`` and the rounding of float32."""
-    about = read_json(path.with_suffix(".json"))
-    shape = tuple(map(int, about["shape"]))
+def open_npy(path: Path) -> SampleFile:
+    """Open an array (chirp, rx, sample) or (chirp, tx, rx, sample) of numbers."""
     with open_regular(path) as file:
-        whole = np.fromfile(file, dtype="<i2")
-    if len(shape) != 5 or min(shape) < 0 or shape[4] != 2 or whole.size != math.prod(shape):
-        raise ValueError(f"{whole.size} numbers where the JSON file tells of {shape}")
-    scale = float(about["scale"])
-    if not 0 < scale * (_LARGEST + 1) <= np.finfo(np.float32).max:
-        raise ValueError(f"scale is {scale:g}")
-    parts = (whole.astype(np.float64) * scale).astype(np.float32)
-    return IfCube(parts.view(np.complex64).reshape(shape[:4]), radar_of(json.dumps(about["radar"])))
+        try:
+            version = np.lib.format.read_magic(file)
+            header = f"read_array_header_{version[0]}_0"
+            shape, fortran, kind = getattr(np.lib.format, header)(file)
+        except Exception as error:  # it parses the header as Python, which fails in many ways
+            raise ValueError(in_short(error)) from None
+        offset, size = file.tell(), path.stat().st_size
+    if fortran or kind.kind not in "ciuf":
+        raise ValueError(f"it holds {kind}{' in the order of Fortran' if fortran else ''}")
+    if offset + math.prod(shape) * kind.itemsize != size:
+        raise ValueError(f"it has {size} bytes, and its header tells of {shape} {kind}")
+    step = math.prod(shape[1:])
+
+    def read(first: int, last: int) -> NDArray[Any]:
+        with open_regular(path) as file:
+            place = offset + first * step * kind.itemsize
+            values = np.fromfile(file, dtype=kind, count=(last - first) * step, offset=place)
+        return values.reshape(last - first, *shape[1:])
+
+    return _rows(path, shape, read, "", kind)
 
 
-def _is_ours(path: Path) -> bool:
-    try:
-        return bool(read_json(path)["what"] == _WHAT)
-    except (OSError, ValueError, KeyError, TypeError):
-        return False
+def write_zarr(path: Path, recording: IfRecording) -> dict[str, Any]:
+    """Write a Zarr array (chirp, rx, sample) complex64, with the radar as an attribute."""
+    import zarr  # slow to import
+
+    shape = recording.row_shape
+    if os.path.lexists(path):
+        raise InputError(f"'{path}' is there; remove it, or give another name (--out)")
+    with new_folder(path) as folder:
+        array = zarr.create_array(
+            folder,
+            shape=shape,
+            chunks=(min(recording.stored.chunks[0], shape[0]), *shape[1:]),
+            dtype="complex64",
+            dimension_names=ROW_AXES,
+            attributes={"units": IF_UNIT, "radar": recording.radar_text},
+        )
+        for first, block in recording.blocks("writing"):
+            rows = block.reshape(-1, *shape[1:])
+            begin = first * block.shape[1]
+            array[begin : begin + len(rows)] = rows
+    return {"axes": list(ROW_AXES), "shape": list(shape), "type": "complex64"}
+
+
+def open_zarr(path: Path) -> SampleFile:
+    """Open what `write_zarr` wrote, or another array of numbers of that shape."""
+    array = check_store(path)
+
+    def read(first: int, last: int) -> NDArray[Any]:
+        return np.asarray(array[first:last])
+
+    return _rows(path, array.shape, read, str(array.attrs.get("radar", "")), array.dtype)

@@ -7,7 +7,9 @@ import json
 import math
 import os
 import stat
-from collections.abc import Iterator
+import struct
+import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,6 +20,7 @@ from tqdm import tqdm
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import printable
 from rtradar.system.files import read_json
 from rtradar.system.output_folder import check_whole
@@ -25,11 +28,20 @@ from rtradar.system.output_folder import check_whole
 IF_AXES = ("chirp", "tx", "rx", "sample")
 """Axes of a cube: chirps of each Tx (one in each TDM cycle), Tx, Rx and fast time."""
 
+ROW_AXES = ("chirp", "rx", "sample")
+"""Axes of samples as they are received: the chirps of all Tx in turn."""
+
 IF_UNIT = "m"
 """Unit of the samples, whose square is a cross-section with spreading loss."""
 
 _MOST_BYTES, _MOST_CHUNK_BYTES = 2**42, 2**34
 """Limits of an array (hours at the paper's rate) and of a chunk; a file may claim any size."""
+
+DAMAGE = (
+    OSError, ValueError, KeyError, IndexError, TypeError, EOFError, OverflowError, RuntimeError,
+    zlib.error, struct.error,
+)  # fmt: skip
+"""Errors of readers of files that are damaged or of another kind."""
 
 _MOST_TEXT_BYTES = 1_000_000
 _WAVEFORM = (
@@ -52,6 +64,55 @@ class IfCube:
 
     samples: NDArray[np.complex64]
     radar: Radar
+
+
+@dataclass(frozen=True)
+class SampleFile:
+    """IF samples of a file, which are read when rows of them are asked for: ``samples[2:5]``.
+
+    Parameters
+    ----------
+    path : path
+        File or folder.
+    radar : Radar, optional
+        Radar that received them, None if the file does not tell.
+    shape : tuple of int
+        Length of the axes (chirp, rx, sample).
+    read : callable
+        Reads the chirps from a first one until before a last one, (chirp, rx, sample) complex64.
+
+    Raises
+    ------
+    InputError
+        When rows are read from a file that is damaged.
+    """
+
+    path: Path
+    radar: Radar | None
+    shape: tuple[int, int, int]
+    read: Callable[[int, int], NDArray[np.complex64]]
+    dtype = np.dtype(np.complex64)
+    ndim = 3
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: slice) -> NDArray[np.complex64]:
+        first, last, _ = rows.indices(len(self))
+        try:
+            return np.asarray(self.read(first, max(first, last)), dtype=np.complex64)
+        except DAMAGE as error:
+            raise unreadable(self.path, "IF samples", error) from None
+
+
+def unreadable(path: Path, what: str, error: Exception) -> InputError:
+    """Return one line for an error of `DAMAGE`, itself if it is such a line already."""
+    if isinstance(error, InputError):
+        return error
+    why = getattr(error, "strerror", None) or in_short(error)
+    return InputError(
+        f"cannot read {what} from '{path}': {why}; give a file of the format that its suffix says"
+    )
 
 
 class Quantity(NamedTuple):
@@ -77,14 +138,28 @@ class IfRecording:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """Length of the chirp, tx, rx and sample axes, without an incomplete TDM cycle."""
-        tx = self.radar.n_tx
+        """Length of the chirp, tx, rx and sample axes, without an incomplete TDM cycle.
+
+        Under Doppler division the tx axis is 1, for all Tx are received as one sum.
+        """
+        tx = self._rows
         return (self.stored.shape[0] // tx, tx, *self.stored.shape[1:])
+
+    @property
+    def row_shape(self) -> tuple[int, int, int]:
+        """Length of the axes (chirp, rx, sample) of the same samples, all Tx in turn."""
+        chirps, tx, rx, samples = self.shape
+        return chirps * tx, rx, samples
 
     @property
     def step(self) -> int:
         """Number of chirps of each Tx in a block that is stored together."""
-        return min(max(1, self.stored.chunks[0] // self.radar.n_tx), self.shape[0])
+        return min(max(1, self.stored.chunks[0] // self._rows), self.shape[0])
+
+    @property
+    def _rows(self) -> int:
+        """Number of stored rows in a cycle."""
+        return self.radar.n_tx // chirps_together(self.radar)
 
     @property
     def radar_text(self) -> str:
@@ -138,8 +213,6 @@ class IfRecording:
 
 def open_recording(folder: Path) -> IfRecording:
     """Open the samples of a run's folder; InputError if there are none that fit its summary."""
-    import zarr  # slow to import
-
     check_whole(folder)
     if not os.path.isdir(folder / "if.zarr"):
         raise InputError(
@@ -157,38 +230,44 @@ def open_recording(folder: Path) -> IfRecording:
             f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, "
             "which kept none; run it again with --save-if, into another folder to keep both"
         )
-    if radar.multiplexing == "ddm":
-        raise InputError(
-            f"'{folder}' holds the sum of all Tx, as Doppler division receives it, "
-            "which has no tx axis; export a run under tdm or fdm"
-        )
     try:
-        largest = _largest_file(folder / "if.zarr")
-        stored = zarr.open_array(folder / "if.zarr", mode="r")
-        shape, kind = stored.shape, np.dtype(stored.dtype)
-    except Exception as error:  # zarr fails in many ways on a damaged folder
+        stored = check_store(folder / "if.zarr")
+    except DAMAGE as error:
         raise InputError(
             f"'{folder / 'if.zarr'}' cannot be read ({in_short(error)}); run it again"
         ) from None
+    shape, kind = stored.shape, np.dtype(stored.dtype)
     expected = (radar.n_rx, radar.samples_per_chirp)
-    fits = len(shape) == 3 and shape[1:] == expected and shape[0] >= radar.n_tx
+    least = radar.n_tx // chirps_together(radar)
+    fits = len(shape) == 3 and shape[1:] == expected and shape[0] >= least
     if not fits or kind != np.complex64:
         raise InputError(
             f"'{folder / 'if.zarr'}' holds {kind} {shape}; "
             f"the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
-            f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
+            f"{radar.samples_per_chirp}), at least {least} chirps; run it again"
         )
-    chunk_bytes = math.prod(stored.chunks) * kind.itemsize
+    return IfRecording(radar, stored, printable(folder.resolve().name))
+
+
+def check_store(store: Path) -> Any:
+    """Open a Zarr array that may be anybody's; OSError or ValueError if it is none or too large."""
+    import zarr  # slow to import
+
+    largest = _largest_file(store)
+    try:
+        array = zarr.open_array(store, mode="r")
+        chunk_bytes = math.prod(array.chunks) * np.dtype(array.dtype).itemsize
+    except Exception as error:  # zarr fails in many ways on a damaged folder
+        raise ValueError(in_short(error)) from None
     if (
-        stored.nbytes > _MOST_BYTES
+        array.nbytes > _MOST_BYTES
         or chunk_bytes > _MOST_CHUNK_BYTES
         or largest > 2 * chunk_bytes + _MOST_TEXT_BYTES
     ):
-        raise InputError(
-            f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, "
-            "as no run writes; run it again"
+        raise ValueError(
+            f"it claims {array.nbytes:.2g} bytes in chunks {array.chunks}, as no run writes"
         )
-    return IfRecording(radar, stored, printable(folder.resolve().name))
+    return array
 
 
 def _largest_file(store: Path) -> int:

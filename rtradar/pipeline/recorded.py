@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable, Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +32,28 @@ if TYPE_CHECKING:
 
     Block: TypeAlias = NDArray[np.complexfloating[Any, Any]] | xr.DataArray
 
+
+class Rows(Protocol):
+    """Array whose rows are read when they are asked for, such as a file or one of Zarr."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Length of the axes."""
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the samples."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, rows: slice, /) -> Any: ...
+
+
 _NAME = "IF samples"
 _DIMENSIONS = ("chirp", "rx", "sample"), ("cycle", "tx", "rx", "sample")
 
 
 def process_samples(
-    samples: Block | Iterable[Block],
+    samples: Block | Rows | Iterable[Block],
     radar: Radar,
     out: str | Path | None = None,
     *,
@@ -50,8 +66,9 @@ def process_samples(
     ----------
     samples : (chirp, rx, sample) complex, or iterable of such blocks
         IF samples from the first Tx of a cycle on, as an array of NumPy, or as a DataArray whose
-        dimensions have these names, in any order. Frames of whole cycles, (cycle, tx, rx, sample),
-        will do as well, and so will blocks of any length, one after another. Precision is single
+        dimensions have these names, in any order, or as another array whose rows are read when they
+        are needed, such as one of Zarr. Frames of whole cycles, (cycle, tx, rx, sample), will do as
+        well, and so will blocks of any length, one after another. Precision is single
         inside. Chirps after the last whole cycle are left out. Under Doppler division a chirp is a
         whole cycle. Powers of the maps are in the square of the samples' unit, which is m where
         pictures are to show cross-sections.
@@ -160,7 +177,9 @@ class _Blocks:
     ``n_chirps`` is how many chirps there were so far.
     """
 
-    def __init__(self, samples: Block | Iterable[Block], radar: Radar, *, in_memory: bool) -> None:
+    def __init__(
+        self, samples: Block | Rows | Iterable[Block], radar: Radar, *, in_memory: bool
+    ) -> None:
         self._radar, self._in_memory = radar, in_memory
         self._cycle_rows = radar.n_tx // chirps_together(radar)
         self.n_chirps, self.frame_starts = 0, radar.window_starts(0)
@@ -169,7 +188,7 @@ class _Blocks:
             self.frame_starts = self._checked(len(rows) // self._cycle_rows * radar.n_tx)
             self._pieces: Iterator[NDArray[Any]] = iter([rows])
         elif isinstance(samples, Iterable):
-            self._pieces = (_rows(block, radar) for block in samples)
+            self._pieces = (_rows(np.asarray(block), radar) for block in samples)
         else:
             raise InputError(
                 f"samples are of type {type(samples).__name__}; give an array (chirp, rx, sample) "
@@ -226,7 +245,7 @@ class _Blocks:
             refuse_large(what, bytes_of_maps(self._radar, n_chirps), IN_A_FOLDER)
 
 
-def _rows(samples: Any, radar: Radar) -> NDArray[Any]:
+def _rows(samples: Any, radar: Radar) -> Any:
     """Return samples as rows (chirp, rx, sample), one for each cycle under DDM."""
     ddm = radar.multiplexing == "ddm"
     allowed = _DIMENSIONS[:1] if ddm else _DIMENSIONS
@@ -239,19 +258,19 @@ def _rows(samples: Any, radar: Radar) -> NDArray[Any]:
                 f"allowed: {' or '.join(texts)}"
             )
         samples = samples.transpose(*order)
-    values = np.asarray(samples)
-    if values.dtype.kind != "c":
-        raise InputError(f"IF samples are of type {values.dtype}; they must be complex numbers")
+    kind, shape = np.dtype(samples.dtype), tuple(samples.shape)
+    if kind.kind != "c":
+        raise InputError(f"IF samples are of type {kind}; they must be complex numbers")
     end = radar.n_rx, radar.samples_per_chirp
-    if values.ndim == 4 and not ddm and values.shape[1:] == (radar.n_tx, *end):
-        return values.reshape(-1, *end)
-    if values.ndim != 3 or values.shape[1:] != end:
+    if len(shape) == 4 and not ddm and shape[1:] == (radar.n_tx, *end):
+        return np.asarray(samples).reshape(-1, *end)
+    if len(shape) != 3 or shape[1:] != end:
         whole = f" or (cycle, tx, rx, sample) = (any, {radar.n_tx}, {end[0]}, {end[1]})"
         raise InputError(
-            f"IF samples have shape {values.shape}; radar '{radar.name}' needs "
+            f"IF samples have shape {shape}; radar '{radar.name}' needs "
             f"(chirp, rx, sample) = (any, {end[0]}, {end[1]}){'' if ddm else whole}"
         )
-    return values
+    return samples
 
 
 def _single(values: NDArray[Any]) -> NDArray[np.complex64]:

@@ -191,7 +191,8 @@ def test_a_mat_file_whose_text_is_none(tmp_path: Path, text: Mapping[str, Any], 
     ],
 )
 def test_the_text_beside_int16_samples(tmp_path: Path, changes: dict[str, Any]) -> None:
-    about = {"shape": [*SHAPE, 2], "scale": 1e-3, "radar": TOLD}
+    what = "IF samples of rtradar: sample = scale * (I + 1j Q)"
+    about = {"what": what, "shape": [*SHAPE, 2], "scale": 1e-3, "radar": TOLD}
     (tmp_path / "x.bin").write_bytes(bytes(64))
     (tmp_path / "x.json").write_text(json.dumps(about))
     assert read_if(tmp_path / "x.bin").samples.shape == SHAPE
