@@ -92,6 +92,7 @@ class ProcessingOptions(_Seed, total=False):
     pfa: float
     clutter_removal: str
     detector: str
+    detector_options: Mapping[str, Any] | None
     range_window: str | tuple[str, float]
     doppler_window: str | tuple[str, float]
 
@@ -155,6 +156,9 @@ class RunSettings:
         Whether the IF samples are kept, in ``if.zarr``.
     detector : str
         Name of the detector that marks the cells of a map. `rtradar.process.DETECTORS` has all.
+    detector_options : mapping, optional
+        Options of the detector, such as ``{"max_points": 64}`` of ``ti-oob``. Its docstring has
+        them.
     range_window, doppler_window : str or (str, float)
         Window function, such as ``blackman``, or its name and parameter. See
         `rtradar.process.WindowFunctions`.
@@ -186,6 +190,7 @@ class RunSettings:
     path_tolerance_db: float | None = -35.0
     save_if: bool = False
     detector: str = "os-cfar"
+    detector_options: Mapping[str, Any] | None = field(default_factory=dict)
     range_window: str | tuple[str, float] = "hann"
     doppler_window: str | tuple[str, float] = "hann"
     noise_power_m2: float | None = None
@@ -215,6 +220,7 @@ class RunSettings:
             )
         # A copy, which no one else can change.
         object.__setattr__(self, "model_options", dict(self.model_options or {}))
+        object.__setattr__(self, "detector_options", dict(self.detector_options or {}))
 
     def parameters(self) -> dict[str, Any]:
         """Return the settings as ``summary.json`` lists them under ``parameters``.

@@ -61,8 +61,8 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
 """Option of each setting; `RunSettings` has the texts, choices and defaults."""
 
 _ONLY_RUN = (
-    "fidelity", "clutter_removal", "body_material", "detector", "order", "keep_all",
-    "path_tolerance_db", "save_if",
+    "fidelity", "clutter_removal", "body_material", "detector", "detector_options", "order",
+    "keep_all", "path_tolerance_db", "save_if",
 )  # fmt: skip
 
 
@@ -206,6 +206,17 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
     defaults, texts = RunSettings(), setting_texts()
     named = {"fidelity": ("echo model", MODELS), "detector": ("detector", DETECTORS)}
     for name in names:
+        if name == "detector_options":
+            command.option(
+                "--detector-option",
+                "NAME=VALUE",
+                "option of the detector, such as max_points=64 of ti-oob; may be given again",
+                dest=name,
+                type=setting,
+                action="append",
+                default=[],
+            )
+            continue
         default = getattr(defaults, name)
         flag, how = _FLAGS[name]
         kind, text = texts.get(name, ("", ""))  # Python may have left docstrings out

@@ -4,7 +4,7 @@ from rtradar.clouds.collection import Collection
 from rtradar.clouds.files import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.clouds.rdt import RdtCloud, RdtCloudResult
 from rtradar.clouds.sample_files import Sample
-from rtradar.clouds.spatial import SpatialCloud, spatial_points
+from rtradar.clouds.spatial import SpatialCloud, points_of_sines, spatial_points
 
 __all__ = [
     "Collection",
@@ -12,6 +12,7 @@ __all__ = [
     "RdtCloudResult",
     "Sample",
     "SpatialCloud",
+    "points_of_sines",
     "save_cloud_npz",
     "save_ply",
     "save_spatial_npz",

@@ -152,6 +152,48 @@ def spatial_points(
     )
 
 
+def points_of_sines(
+    sines: NDArray[np.float64],
+    mask: NDArray[np.bool_],
+    power: NDArray[np.floating],
+    radar: Radar,
+    time_s: float,
+    source: NDArray[np.int64] | None = None,
+) -> SpatialCloud:
+    """Make the points of one frame from the direction of each detected cell.
+
+    Parameters
+    ----------
+    sines : (cell, 2) float64
+        Sines of the direction along y and z of each cell of ``mask``, in the order of
+        ``np.argwhere``; NaN where one is not measured. A pair with u^2 + w^2 > 1 is no direction
+        and dropped.
+    mask : (range, velocity) bool
+        Detected cells.
+    power : (range, velocity) float
+        Power summed over all channels.
+    radar, time_s, source
+        The same as for `spatial_points`.
+
+    Returns
+    -------
+    SpatialCloud
+        Points cell by cell. The power is the mean over the channels.
+    """
+    row, column = np.nonzero(mask)
+    forward = 1 - np.nansum(sines**2, axis=1)
+    kept = forward >= 0
+    direction = np.column_stack([np.sqrt(forward[kept]), sines[kept]])
+    velocity = radar.velocity_mps(mask.shape[1])
+    return SpatialCloud(
+        np.asarray(radar.position_m) + radar.range_m[row[kept], None] * direction,
+        velocity[column[kept]],
+        power[row[kept], column[kept]] / radar.n_channels,
+        np.full(int(kept.sum()), time_s),
+        None if source is None else source[kept],
+    )
+
+
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:
     """Peaks of both arrays; an array that is absent has sine 0 and the power of the other."""
     powers = spectra.y, spectra.z

@@ -10,22 +10,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, spatial_points
+from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, points_of_sines, spatial_points
 from rtradar.clouds.rdt import UniformSample
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,
     ClutterRemoval,
-    Detector,
     SlidingWindows,
     WindowFunctions,
     angle_spectra,
     build_detector,
+    build_point_detector,
     cell_spectra,
     clutter_removal,
     measured_angles,
     power_map,
     range_spectrum,
+    takes_channels,
 )
 from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
@@ -46,16 +47,36 @@ _CELLS_AT_ONCE = 1024  # 7 kB each, in all channels; a frame with a person has s
 _MAX_BYTES = 8e6  # of IF samples: part of them stays in the cache, and all threads have work
 
 
+Detect = Callable[
+    [NDArray[np.floating], NDArray[np.complexfloating]],
+    tuple[NDArray[np.bool_], NDArray[np.float64] | None],
+]
+"""Map (range, velocity) and cube (cycle, tx, rx, range) of a frame in; the mask of its detections
+out, and the sines (cell, 2) of their directions where the detector finds them."""
+
+
+def _detect_of(settings: RunSettings, radar: Radar, window_functions: WindowFunctions) -> Detect:
+    """Return the detector of the settings, of power alone or of all channels."""
+    name, options = settings.detector, settings.detector_options
+    if takes_channels(name):
+        of_cube = build_point_detector(
+            name, radar, window_functions=window_functions, options=options
+        )
+        return lambda _, cube: of_cube(cube)
+    of_power = build_detector(name, pfa=settings.pfa, looks=radar.n_channels, options=options)
+    return lambda power, _: (of_power(power), None)
+
+
 @dataclass(frozen=True)
 class Processing:
     """How range spectra of one capture are processed, with the radar at its position in the scene.
 
-    ``detect`` marks the cells of a range-Doppler map, ``removal`` removes static clutter before
-    Doppler, ``seed`` is that of the sampling of clouds, and ``stages`` record the time.
+    ``detect`` marks the cells of a frame, ``removal`` removes static clutter before Doppler,
+    ``seed`` is that of the sampling of clouds, and ``stages`` record the time.
     """
 
     radar: Radar
-    detect: Detector
+    detect: Detect
     removal: ClutterRemoval
     window_functions: WindowFunctions = DEFAULT_WINDOWS
     seed: int = 0
@@ -64,11 +85,12 @@ class Processing:
     @classmethod
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
         """Build the processing that these settings name; InputError if a name is unknown."""
+        window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
         return cls(
             radar,
-            build_detector(settings.detector, pfa=settings.pfa, looks=radar.n_channels),
+            _detect_of(settings, radar, window_functions),
             clutter_removal(settings.clutter_removal, radar),
-            WindowFunctions(settings.range_window, settings.doppler_window),
+            window_functions,
             settings.seed,
         )
 
@@ -163,7 +185,7 @@ class CloudMaker:
             with stages.time("doppler"):
                 power = power_map(cube, radar, window_functions=window_functions)
             with stages.time("cfar"):
-                mask = self._processing.detect(power)
+                mask, sines = self._processing.detect(power, cube)
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
@@ -174,7 +196,11 @@ class CloudMaker:
             if measured_angles(radar):
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
-                    found = spatial_points(angles, radar, middle, source)
+                    found = (
+                        spatial_points(angles, radar, middle, source)
+                        if sines is None
+                        else points_of_sines(sines, mask, power, radar, middle, source)
+                    )
                     who = np.full(len(found.time), -1) if found.source is None else found.source
                     columns = found.points, found.velocity, found.power, found.time, who
                     self._spatial.add(np.column_stack(columns))

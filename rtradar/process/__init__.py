@@ -8,22 +8,23 @@ from rtradar.process.angles import (
     range_azimuth,
     range_elevation,
 )
-from rtradar.process.cfar import (
-    Detector,
-    build_detector,
-    ca_cfar,
-    ca_scale,
-    os_cfar,
-    os_scale,
-    register_detector,
-)
+from rtradar.process.cfar import ca_cfar, ca_scale, os_cfar, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
+from rtradar.process.detectors import (
+    Detector,
+    PointDetector,
+    build_detector,
+    build_point_detector,
+    register_detector,
+    takes_channels,
+)
 from rtradar.process.frames import SlidingWindows
 from rtradar.process.power_maps import power_map
 from rtradar.process.range_time import SlidingRangeTime, range_time
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
+from rtradar.process.ti_oob import ti_oob
 from rtradar.process.window_functions import WindowFunctions
 from rtradar.radar.display import measured_angles
 from rtradar.system.registries import DETECTORS
@@ -35,6 +36,7 @@ __all__ = [
     "ClutterMap",
     "ClutterRemoval",
     "Detector",
+    "PointDetector",
     "RangeDoppler",
     "SlidingRangeTime",
     "SlidingSpectrogram",
@@ -45,6 +47,7 @@ __all__ = [
     "angle_grid",
     "angle_spectra",
     "build_detector",
+    "build_point_detector",
     "ca_cfar",
     "ca_scale",
     "cell_spectra",
@@ -61,5 +64,7 @@ __all__ = [
     "range_time",
     "register_detector",
     "spectrogram",
+    "takes_channels",
+    "ti_oob",
     "window_cycles",
 ]

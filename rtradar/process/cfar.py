@@ -1,4 +1,4 @@
-"""CFAR detectors on a range-Doppler power map: order statistic and cell averaging; their registry.
+"""CFAR detectors on a range-Doppler power map: order statistic and cell averaging.
 
 The training cells of a cell are the square ring of half-width ``guard + train`` without the square
 of half-width ``guard`` around it. At the edges of the map only those that exist count, with the
@@ -24,53 +24,9 @@ from scipy.special import betainccinv, betaincinv, gammainc, gammaincc, gammaln
 
 from rtradar.errors import InputError
 from rtradar.kernels.cfar import os_cfar_rows
-from rtradar.system.registries import DETECTORS
 from rtradar.system.threads import thread_map
 
 _ROWS_A_THREAD = 64
-
-Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
-"""Power (range, velocity) in, mask of the same shape out."""
-
-register_detector = DETECTORS.register
-
-
-def build_detector(name: str, *, pfa: float, looks: int) -> Detector:
-    """Detector of a name, for a false-alarm rate and a number of looks.
-
-    Parameters
-    ----------
-    name : str
-        Name in `DETECTORS`.
-    pfa : float
-        Asked false-alarm rate of each cell.
-    looks : int
-        Channels summed in the power.
-
-    Returns
-    -------
-    callable
-        From power (range, velocity) to a bool mask of the same shape.
-
-    Raises
-    ------
-    InputError
-        Where there is no such detector.
-    ExtensionError
-        Where it comes from another package, and fails; also when it is called.
-    """
-    find = DETECTORS.find(name)
-
-    def detect(power: NDArray[np.floating]) -> NDArray[np.bool_]:
-        with DETECTORS.guarded(name):
-            mask = np.asarray(find(power, pfa=pfa, looks=looks))
-        if mask.dtype != np.bool_ or mask.shape != power.shape:
-            raise DETECTORS.refuse(
-                name, f"gave {mask.dtype} of shape {mask.shape}, not bool of shape {power.shape}"
-            )
-        return mask
-
-    return detect
 
 
 def os_cfar(

@@ -50,9 +50,14 @@ MODELS = Registry(
 DETECTORS = Registry(
     "rtradar.detectors",
     "detector",
-    {"os-cfar": "rtradar.process.cfar:os_cfar", "ca-cfar": "rtradar.process.cfar:ca_cfar"},
+    {
+        "os-cfar": "rtradar.process.cfar:os_cfar",
+        "ca-cfar": "rtradar.process.cfar:ca_cfar",
+        "ti-oob": "rtradar.process.ti_oob:ti_oob",
+    },
 )
-"""Functions of power (range, velocity), ``pfa`` and ``looks``, the channels summed in the power."""
+"""Functions of power (range, velocity), ``pfa`` and ``looks``, the channels summed in the power; or
+of range spectra ``cube``, ``radar`` and ``window_functions``."""
 
 
 def scene_files() -> dict[str, Path]:

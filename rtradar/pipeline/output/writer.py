@@ -145,7 +145,7 @@ class RunWriter:
         radar, windows = self._processing.radar, self._processing.window_functions
         with self._processing.stages.time("received"):
             power = power_map(cube, radar, window_functions=windows)
-            mask = self._processing.detect(power)
+            mask, _ = self._processing.detect(power, cube)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:
                 angles = frame_angles(cube, mask, radar, windows)

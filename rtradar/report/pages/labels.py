@@ -39,6 +39,7 @@ _LABELS = {
     "keep_all": "Echoes below the noise kept",
     "save_if": "IF samples saved",
     "detector": "Detector",
+    "detector_options": "Options of the detector",
     "range_window": "Window function over range",
     "doppler_window": "Window function over velocity",
     "noise_power_given_m2": "Noise power given",
