@@ -37,9 +37,8 @@ def _add_view(view: OneLineParser) -> None:
     view.flag("--no-browser", "write the page, but do not open it")
     view.add_argument(
         "--colour",
-        choices=("part", "power", "velocity"),
-        default="part",
-        help="quantity that colours show at first (default: %(default)s)",
+        choices=("person", "part", "power", "velocity"),
+        help="quantity that colours show at first (default: person of several, part of one)",
     )
     view.option(
         "--still", "FILE.png", "draw one snapshot; without --out there is no page then", type=path

@@ -55,17 +55,18 @@ def view(
     page: str | Path | None = None,
     still: str | Path | None = None,
     time_s: float | None = None,
-    colour: str = "part",
+    colour: str | None = None,
 ) -> dict[str, Any]:
     """Show what `run` left in a folder: a page that moves (HTML), a still (PNG), or both.
 
     The still is of the frame nearest to ``time_s`` [s], by default the middle of the capture.
-    Colours show ``colour``, one of `COLOURS`, on the page until the reader chooses another. Returns
+    Colours show ``colour``, one of `COLOURS`, on the page until the reader chooses another; by
+    default the person where several people or objects are, else the body part. Returns
     the numbers of ``windows`` and ``echoes`` shown, times ``first_s`` and ``last_s`` of the
     windows, and path and bytes of each file. InputError if a file of the folder is missing or
     damaged, the time lies outside of the capture, or a file cannot be written.
     """
-    if colour not in COLOURS:
+    if colour not in (None, *COLOURS):
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
     if not os.path.isdir(folder):
         raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
@@ -117,7 +118,7 @@ def run_view_of(
     snapshots = load_snapshots(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
     columns = ("points", "velocity", "power", "time")
-    spatial = _archive(folder / "cloud_xyz.npz", columns, may_be_nan=("points",))
+    spatial = _archive(folder / "cloud_xyz.npz", columns, ("points",), ("source",))
     try:
         cloud = SpatialCloud(**spatial)
     except (InputError, TypeError) as error:
@@ -164,6 +165,7 @@ def assembled(
         spectrogram=_spectrogram(maps, radar, spreading, windows),
         rdt_points=points,
         rdt_power_db=_at_points(maps, points, radar, spreading),
+        rdt_source=_source_of_points(maps, points, len(snapshots.sources)),
         spatial=spatial,
         spreading=spreading,
     )
@@ -188,13 +190,17 @@ def _line(value: Any) -> str:
 
 
 def _archive(
-    path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()
+    path: Path,
+    names: tuple[str, ...],
+    may_be_nan: tuple[str, ...] = (),
+    may_lack: tuple[str, ...] = (),
 ) -> dict[str, NDArray[Any]]:
     try:
         arrays = read_arrays(path)
         for name in names:
             _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
-        return {name: arrays[name].astype(np.float64) for name in names}
+        found = {name: arrays[name].astype(np.float64) for name in names}
+        return found | {name: _whole(arrays[name]) for name in may_lack if name in arrays}
     except _DAMAGE as error:
         why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
         raise InputError(f"'{path}' {why}; {_MEND}") from None
@@ -206,12 +212,20 @@ def _finite(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
+def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
+    if values.dtype.kind != "i":
+        raise ValueError("who returned a point is no whole number")
+    return values.astype(np.int64)
+
+
 # -- maps ----------------------------------------------------------------------------------------
 
 
 def _maps(file: h5py.File) -> dict[str, Any]:
     """Datasets of `_MAPS` and their axes, checked but for the maps' values."""
     maps = {name: stored(file, name) for names in _MAPS.items() for name in (names[0], *names[1])}
+    if "source" in file:
+        maps["source"] = stored(file, "source")
     for name, axes in _MAPS.items():
         if maps[name].dtype not in (np.float32, np.float64) or maps[name].shape != tuple(
             len(_finite(maps[axis][:])) for axis in axes
@@ -288,13 +302,44 @@ def _at_points(
     """Return the power of the range-Doppler map nearest to each point, mean of channels [dB]."""
     if not len(points):
         return np.zeros(0)
-    nearest = []
-    for axis, column in zip(_MAPS["range_doppler"], points.T, strict=True):
-        values = maps[axis][:]
-        nearest.append(np.searchsorted((values[1:] + values[:-1]) / 2, column))
+    nearest = _cells(maps, points)
     found = np.zeros(len(points))
     for window in np.unique(nearest[0]).tolist():
         own = nearest[0] == window
         found[own] = maps["range_doppler"][window][nearest[1][own], nearest[2][own]]
     unit = field_unit(radar, spreading=spreading, range_m=maps["range"][:][nearest[1]])
     return unit.level(_powers(found) / radar.n_channels)
+
+
+def _cells(maps: Any, points: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Return the indices of the cells nearest to points, along each axis of the maps."""
+    axes = (maps[axis][:] for axis in _MAPS["range_doppler"])
+    return [
+        np.searchsorted((values[1:] + values[:-1]) / 2, column)
+        for values, column in zip(axes, points.T, strict=True)
+    ]
+
+
+def _source_of_points(maps: Any, points: NDArray[np.float64], n_sources: int) -> NDArray[np.int64]:
+    """Return who returned the detected cell nearest to each point, -1 where nobody is known.
+
+    Points lie on the surface about detected cells, half a cell away from one.
+    """
+    found = np.full(len(points), -1)
+    if not len(points) or "source" not in maps:
+        return found
+    cells = _cells(maps, points)
+    for window in np.unique(cells[0]).tolist():
+        own = np.flatnonzero(cells[0] == window)
+        first = max(window - 1, 0)
+        sources = _whole(np.asarray(maps["source"][first : window + 2]))
+        order = sorted(np.ndindex(3, 3, 3), key=lambda step: sum(abs(one - 1) for one in step))
+        for step in order:
+            lacking = own[found[own] < 0]
+            at = [cells[axis][lacking] + step[axis] - 1 for axis in range(3)]
+            at[0] -= first
+            inside = np.all(
+                [(i >= 0) & (i < n) for i, n in zip(at, sources.shape, strict=True)], axis=0
+            )
+            found[lacking[inside]] = sources[tuple(index[inside] for index in at)]
+    return np.where(found < n_sources, found, -1)

@@ -27,6 +27,7 @@ function posed(frame) {
 function allFaces() {
   const [i, j, k] = [[], [], []];
   for (let part = 0; part < nParts; part++) {
+    if (figure.drawn && !figure.drawn[part]) continue; // a mesh is drawn in its place
     for (let face = 0; face < figure.faces.length; face += 3) {
       i.push(figure.faces[face] + part * nVertices);
       j.push(figure.faces[face + 1] + part * nVertices);
@@ -58,6 +59,13 @@ function pointsAt(time) {
   return [0, 1, 2].map((k) => chosen.map((index) => spatial.points[3 * index + k]));
 }
 
+/** Colours of these points: of who returned them, where there are several who may have. */
+function pointColours(time) {
+  if (!data.spatial.source || !data.people || data.people.names.length < 3) return "#e0389a";
+  const chosen = data.spatial.source.filter((_, index) => Math.abs(spatial.time[index] - time) <= figure.window_s / 2);
+  return chosen.map(sourceColour);
+}
+
 /** Body, bones, floor, Tx and Rx: traces 0 to 4 of a 3D view. `paint` colours the body. */
 function figureTraces(paint) {
   const { mesh: [x, y, z], bones } = posed(0);
@@ -82,7 +90,7 @@ function pointsTraces() {
   if (!spatial) return [];
   const [x, y, z] = pointsAt(figure.times[0]);
   return [{
-    type: "scatter3d", mode: "markers", name: "spatial cloud", x, y, z, marker: { size: 2.2, color: "#e0389a" }, hoverinfo: "skip",
+    type: "scatter3d", mode: "markers", name: "spatial cloud", x, y, z, marker: { size: 2.2, color: pointColours(figure.times[0]) }, hoverinfo: "skip",
   }];
 }
 
@@ -92,11 +100,49 @@ function themeFigure(node) {
   }, [1, 2]).then(() => Plotly.restyle(node, { "marker.color": [colour("--tx"), colour("--rx")] }, [3, 4]));
 }
 
+// -- meshes that move ------------------------------------------------------------------------------------------------------
+
+/** Meshes of people, which take their colours from their parts, and of objects: each a trace after `first`, and its places at a step. */
+function movingMeshes(first) {
+  if (!data.meshes || !data.meshes.source.length) return [];
+  const { meshes, people } = data;
+  const [faces, owner, part, vertex, row] = ["mesh_faces", "mesh_of_vertex", "mesh_part", "blend_vertex", "blend_row"].map((name) => integers(meshes[name]));
+  const [weight, rows] = [floats(meshes.blend_weight), floats(meshes.mesh_rows)];
+  const nRows = rows.length / (3 * figure.times.length);
+  return meshes.source.map((source, number) => {
+    const begin = owner.indexOf(number);
+    const count = owner.lastIndexOf(number) + 1 - begin;
+    const parts = Array.from(part.slice(begin, begin + count));
+    const own = (k) => Array.from({ length: faces.length / 3 }, (_, face) => faces[3 * face + k] - begin);
+    const mine = Array.from({ length: faces.length / 3 }, (_, face) => owner[faces[3 * face]] === number);
+    const [i, j, k] = [0, 1, 2].map((corner) => own(corner).filter((_, face) => mine[face]));
+    const entries = Array.from(vertex.keys()).filter((entry) => owner[vertex[entry]] === number);
+    const places = (step) => {
+      const out = [0, 1, 2].map(() => new Float32Array(count));
+      for (const entry of entries) {
+        const at = 3 * (step * nRows + row[entry]);
+        for (let axis = 0; axis < 3; axis++) out[axis][vertex[entry] - begin] += weight[entry] * rows[at + axis];
+      }
+      return { x: out[0], y: out[1], z: out[2] };
+    };
+    return {
+      trace: first + number, parts, isPerson: parts[0] >= 0, places,
+      shape: {
+        type: "mesh3d", name: people.names[source], ...places(0), i, j, k, showlegend: parts[0] < 0, flatshading: parts[0] < 0,
+        color: sourceColour(source), opacity: 0.85, hovertemplate: "%{fullData.name}<extra></extra>",
+        lighting: { ambient: 0.62, diffuse: 0.6, specular: 0.15, roughness: 0.6, fresnel: 0.1 }, lightposition: { x: -20, y: -20, z: 40 },
+      },
+    };
+  });
+}
+
 /** For `move`: the body, its bones and, where there is a spatial cloud, its points of this frame, which are `pointsTrace`. */
 function placesAt(frame, pointsTrace) {
   const { mesh, bones } = posed(frame);
-  const sets = spatial ? [[0, mesh], [1, bones], [pointsTrace, pointsAt(figure.times[frame])]] : [[0, mesh], [1, bones]];
-  return sets.map(([trace, [x, y, z]]) => ({ trace, x, y, z }));
+  const sets = [[0, mesh], [1, bones]].map(([trace, [x, y, z]]) => ({ trace, x, y, z }));
+  if (!spatial) return sets;
+  const [x, y, z] = pointsAt(figure.times[frame]);
+  return [...sets, { trace: pointsTrace, x, y, z, "marker.color": pointColours(figure.times[frame]) }];
 }
 
 /** Other values of some attributes, each set for its `trace`, drawn once. */

@@ -1,5 +1,5 @@
 // The linked views of a run, on its report and in `rtradar view`: body, room, paths and echoes, the range-Doppler map, the spectrogram and the range-Doppler-time
-// cloud, all at the moment that the slider chooses, and in the colours of part, power or velocity.
+// cloud, all at the moment that the slider chooses, and in the colours of person, part, power or velocity.
 
 const { echoes, room } = data;
 const now = "#e0389a"; // what marks the moment, on every view
@@ -19,17 +19,22 @@ const chosen = (id) => document.getElementById(id).value;
 const hiddenColour = "#8c8c94";
 const viridis = ["#440154", "#443983", "#31688e", "#21918c", "#35b779", "#90d743", "#fde725"];
 const groups = data.groups; // { names, colours, of_part }; the last is of what belongs to no part
-const stepped = groups.colours.flatMap((tint, k) => [[k / groups.colours.length, tint], [(k + 1) / groups.colours.length, tint]]);
+const { people } = data; // the same of people and objects; the last is of nobody
+const steps = (tints) => tints.flatMap((tint, k) => [[k / tints.length, tint], [(k + 1) / tints.length, tint]]);
 const fromGrey = [[0, hiddenColour], [0.02, hiddenColour], ...viridis.map((tint, k) => [0.021 + 0.979 * k / (viridis.length - 1), tint])];
 const modes = {
-  part: { colorscale: stepped, cmin: 0, cmax: groups.names.length, title: "" },
+  person: { colorscale: steps(people.colours), cmin: 0, cmax: people.names.length, title: "" },
+  part: { colorscale: steps(groups.colours), cmin: 0, cmax: groups.names.length, title: "" },
   power: { colorscale: fromGrey, cmin: data.power_range_db[0], cmax: data.power_range_db[1], title: data.power_label },
   velocity: { colorscale: data.velocity_colours, cmin: -data.fastest_mps, cmax: data.fastest_mps, title: velocityLabel },
 };
 
+const isNamed = (mode) => mode === "part" || mode === "person"; // whose colours a legend names, not a colour bar
+const named = (mode, part) => (mode === "part" ? groups : people).of_part[part] + 0.5;
+
 /** A number for the colour of an echo at a step. */
 function echoValue(mode, step, echo) {
-  if (mode === "part") return groups.of_part[echoes.part[echo]] + 0.5;
+  if (isNamed(mode)) return named(mode, echoes.part[echo]);
   const level = power[step * nEchoes + echo];
   if (mode === "power") return Number.isNaN(level) ? modes.power.cmin : level;
   return velocity[step * nEchoes + echo];
@@ -47,7 +52,7 @@ function partValues(mode, step) {
       values[part] = echoValue(mode, step, echo);
     }
   }
-  return mode === "part" ? groups.of_part.map((group) => group + 0.5) : values;
+  return isNamed(mode) ? figure.parts.map((_, part) => named(mode, part)) : values;
 }
 
 const scaleBar = (mode) => ({ ...bar(modes[mode].title), tickfont: { size: 11 } });
@@ -126,11 +131,12 @@ function echoMarks(mode, step, direct) {
 // -- the cloud -----------------------------------------------------------------------------------------------------------
 
 const cloud = data.rdt.count ? {
-  points: floats(data.rdt.points), power: floats(data.rdt.power_db), group: data.rdt.group,
+  points: floats(data.rdt.points), power: floats(data.rdt.power_db), group: data.rdt.group, source: data.rdt.source,
 } : null;
 
 function cloudValues(mode, index) {
   if (mode === "part") return cloud.group[index] + 0.5;
+  if (mode === "person") return (cloud.source[index] < 0 ? people.names.length - 1 : cloud.source[index]) + 0.5;
   return mode === "power" ? cloud.power[index] : cloud.points[3 * index + 2];
 }
 
@@ -168,12 +174,13 @@ async function save(title) {
   pen.fillStyle = colour("--page");
   pen.fillRect(0, 0, frame.width, frame.height + top);
   write(title, 16, 12, 26);
-  if (chosen("colour") === "part") {
-    groups.names.reduceRight((right, name, k) => {
+  if (isNamed(chosen("colour"))) {
+    const { names, colours } = chosen("colour") === "part" ? groups : people;
+    names.reduceRight((right, name, k) => {
       pen.font = `13px ${family}`;
       const left = right - pen.measureText(name).width;
       write(name, 13, left, 26);
-      pen.fillStyle = groups.colours[k];
+      pen.fillStyle = colours[k];
       pen.fillRect(left - 16, 15, 12, 12);
       return left - 30;
     }, frame.width - 12);
@@ -199,6 +206,16 @@ async function save(title) {
   URL.revokeObjectURL(link.href);
 }
 
+const nPeople = people.names.length - 1 - data.n_objects;
+const saidOfPeople = [...document.querySelectorAll("#people b")].slice(0, nPeople);
+const [position, speed] = [floats(people.position_m), floats(people.speed_mps)];
+
+/** Where a person really is, and how fast. */
+function truth(step, person) {
+  const at = step * nPeople + person;
+  return ` at x ${position[3 * at].toFixed(2)}, y ${position[3 * at + 1].toFixed(2)} m, ${speed[at].toFixed(2)} m/s`;
+}
+
 /** Draws all views and ties them to the player. */
 async function drawLinked() {
   const [mapLevels, spectrogramLevels] = await Promise.all([unpacked(data.map.levels), unpacked(data.spectrogram.levels)]);
@@ -213,11 +230,13 @@ async function drawLinked() {
       hovertemplate: "%{text}<extra></extra>",
     };
   };
-  const paint = { intensity: each(() => 0), ...marking(first), showscale: first !== "part", colorbar: scaleBar(first) };
+  const paint = { intensity: each(() => 0), ...marking(first), showscale: !isNamed(first), colorbar: scaleBar(first) };
+  const meshes = movingMeshes(7 + pointsTraces().length + roomTraces().length);
   const traces = [
     // Bones stand out too much beside colours that are to be told apart; the legend brings them back.
     ...figureTraces(paint).map((trace, k) => (k === 1 ? { ...trace, visible: "legendonly" } : trace)), lines("direct paths", true, 3, 0.8), lines("paths over walls", false, 1.5, 0.4),
     ...pointsTraces().map((trace) => ({ ...trace, visible: "legendonly" })), ...roomTraces(),
+    ...meshes.map(({ shape, parts, isPerson }) => (isPerson ? { ...shape, intensity: parts.map(() => 0), ...marking(first) } : shape)),
   ];
   const pointsTrace = spatial ? 7 : -1;
   const wallTrace = room.walls.length || room.faces.length ? 7 + pointsTraces().length : -1;
@@ -281,7 +300,7 @@ async function drawLinked() {
     const time = figure.times[step];
     const recoloured = document.documentElement.dataset.colour !== mode;
     const { colorscale, cmin, cmax, title } = modes[mode];
-    const scale = recoloured ? { colorscale, cmin, cmax, showscale: mode !== "part", "colorbar.title.text": title } : {};
+    const scale = recoloured ? { colorscale, cmin, cmax, showscale: !isNamed(mode), "colorbar.title.text": title } : {};
     const lineScale = recoloured ? { "line.colorscale": colorscale, "line.cmin": cmin, "line.cmax": cmax } : {};
     const markScale = recoloured ? { "marker.colorscale": colorscale, "marker.cmin": cmin, "marker.cmax": cmax } : {};
 
@@ -293,6 +312,9 @@ async function drawLinked() {
     await move(body, [
       { ...figurePart, ...scale, intensity: each((_, part) => values[part]), text: each((_, part) => said[part]) },
       ...others,
+      ...meshes.map(({ trace, parts, isPerson, places }) => ({
+        trace, ...places(step), ...(isPerson ? { ...scale, showscale: false, intensity: parts.map((part) => values[part]) } : {}),
+      })),
       ...[true, false].map((direct) => {
         const { color, ...places } = pathLines(mode, step, direct);
         return { trace: direct ? 5 : 6, ...places, ...lineScale, "line.color": color };
@@ -314,6 +336,7 @@ async function drawLinked() {
       ]);
     }
     document.getElementById("groups").hidden = mode !== "part";
+    saidOfPeople.forEach((node, person) => { node.textContent = truth(step, person); });
     document.documentElement.dataset.colour = mode;
   }
 

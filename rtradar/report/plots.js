@@ -17,6 +17,11 @@ function floats(text) {
   return new Float32Array(bytes.buffer);
 }
 
+const integers = (text) => new Int32Array(floats(text).buffer);
+
+/** Colour of a person or object by index; that of nobody for -1, and for what is out of range. */
+const sourceColour = (source) => data.people.colours[source] ?? data.people.colours[data.people.colours.length - 1];
+
 /** Every third number from the k-th on. */
 const component = (triples, k) => Float32Array.from({ length: triples.length / 3 }, (_, i) => triples[3 * i + k]);
 

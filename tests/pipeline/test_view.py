@@ -95,6 +95,25 @@ def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
             assert abs(np.array(levels) - linked.rdt_power_db[point]).min() < 1e-4
 
 
+def test_points_are_of_who_returned_them(made: Path, tmp_path: Path) -> None:
+    linked = load_run_view(made)
+    # One person alone: the surface about detected cells is half a cell away from one of theirs.
+    with h5py.File(made / "maps.h5") as maps:
+        sources = maps["source"][:]
+        nobodys = (sources[maps["detections"][:] > 0] < 0).mean()
+    assert (linked.rdt_source == 0).mean() > 0.9 - nobodys
+    # A folder whose map of sources is damaged, or who points at somebody who is not there.
+    shutil.copytree(made, tmp_path / "run")
+    with h5py.File(tmp_path / "run" / "maps.h5", "r+") as maps:
+        maps["source"][...] = np.where(sources >= 0, 7, -1)
+    assert (load_run_view(tmp_path / "run").rdt_source == -1).all()
+    with h5py.File(tmp_path / "run" / "maps.h5", "r+") as maps:
+        del maps["source"]
+        maps["source"] = np.full(sources.shape, np.nan)
+    with pytest.raises(rt.InputError, match="damaged"):
+        load_run_view(tmp_path / "run")
+
+
 @pytest.mark.parametrize("colour", COLOURS)
 def test_a_still_shows_the_moment_in_those_colours(made: Path, tmp_path: Path, colour: str) -> None:
     told = view(made, still=tmp_path / "a.png", time_s=0.1, colour=colour)

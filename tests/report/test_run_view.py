@@ -12,12 +12,23 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts, view_data
+from rtradar.pipeline.output.moving_meshes import moving_meshes
+from rtradar.report.view.run_view import (
+    GROUPS,
+    Levels,
+    RunView,
+    group_of_parts,
+    linked_views,
+    view_data,
+)
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 
 pytestmark = pytest.mark.drawn
 
+OBJECTS = (
+    rt.Object("fan", "fan", "metal", position_m=(0, 1.6, 3.2), motion=rt.Turning(rate_hz=2)),
+)
 RADAR = rt.Radar.preset("paper-12ghz")
 LOW_DB = -60.0
 
@@ -47,6 +58,11 @@ def linked(
         furniture_vertices=np.zeros((0, 3), dtype=np.float32),
         furniture_faces=np.zeros((0, 3), dtype=np.int64),
         furniture_piece=np.zeros(0, dtype=np.int64),
+        part_person=body.owner,
+        person_names=np.array(["walk <1>"]),
+        person_position=np.zeros((2, 1, 3)),
+        person_speed=np.ones((2, 1)),
+        **moving_meshes(body, OBJECTS, times, 100),
     )
     level = np.arange(2 * 4 * 5, dtype=np.uint8).reshape(2, 4, 5)
     return RunView(
@@ -72,6 +88,7 @@ def linked(
         ),
         rdt_points=np.array(points).reshape(-1, 3),
         rdt_power_db=np.full(len(points), -60.0),
+        rdt_source=np.full(len(points), 1),
         spatial=SpatialCloud(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0)),
     )
 
@@ -159,6 +176,22 @@ def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
     assert (data["rdt"]["count"], data["rdt"]["group"]) == (0, [])
     # Walls lie in the box too: up to 2.2 m, in half metres.
     assert data["figure"]["ranges"][0][1] == 2.5
+
+
+def test_people_and_objects_have_names_colours_and_truth() -> None:
+    view = linked([(0.1, 4.5, 0.5)])
+    assert view.source_names == ["walk <1>", "fan", "nobody"]
+    assert len(set(view.source_colours)) == 3
+    assert view.colour == "person"
+    data = view_data(view)
+    assert data["rdt"]["source"] == [1]
+    assert data["people"]["of_part"] == [0] * 21
+    assert data["meshes"]["source"] == [1]
+    page = linked_views(view)
+    assert "walk &lt;1&gt;" in page
+    assert '<option value="person" selected>' in page
+    # The fan, at 3.2 m, is inside of the axes.
+    assert data["figure"]["ranges"][2][1] >= 3.5
 
 
 def test_a_false_alarm_does_not_set_the_box() -> None:

@@ -36,6 +36,19 @@ def example() -> Snapshots:
         furniture_vertices=np.eye(3, dtype=np.float32),
         furniture_faces=np.array([[0, 1, 2]]),
         furniture_piece=np.array([0, 0, 0]),
+        part_person=np.array([0, 0, 1]),
+        person_names=np.array(["walk", "kick"]),
+        person_position=np.zeros((2, 2, 3)),
+        person_speed=np.ones((2, 2)),
+        object_names=np.array(["fan"]),
+        mesh_source=np.array([2]),
+        mesh_faces=np.array([[0, 1, 2]]),
+        mesh_of_vertex=np.array([0, 0, 0]),
+        mesh_part=np.array([-1, -1, -1]),
+        mesh_rows=np.tile(np.eye(4, 3, dtype=np.float32), (2, 1, 1)),
+        blend_vertex=np.array([0, 1, 2]),
+        blend_row=np.array([0, 1, 2]),
+        blend_weight=np.array([1, 2, 3], dtype=np.float32),
     )
 
 
@@ -46,6 +59,12 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         ours, read = getattr(example(), field.name), getattr(found, field.name)
         assert ours.dtype.kind == read.dtype.kind
         np.testing.assert_array_equal(ours, read)
+
+
+def test_a_vertex_of_a_mesh_is_the_sum_of_its_rows() -> None:
+    np.testing.assert_array_equal(example().mesh_vertices(1), np.diag([1.0, 2.0, 3.0]))
+    assert example().sources == ["walk", "kick", "fan"]
+    assert example().drawn_parts.all()
 
 
 @pytest.mark.parametrize(
@@ -60,6 +79,11 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         ("echo_part", np.array([0, 1, 2, 3]), "echo_part points at a part"),
         ("echo_path", np.array([0, -1, 1, 1]), "echo_path points at a path"),
         ("furniture_faces", np.array([[0, 1, 3]]), "points at a vertex"),
+        ("part_person", np.array([0, 1, 2]), "part_person points at a person"),
+        ("mesh_faces", np.array([[0, 1, 3]]), "mesh_faces points at a mesh vertex"),
+        ("blend_row", np.array([0, 1, 4]), "blend_row points at a row"),
+        ("mesh_source", np.array([3]), "mesh points at"),
+        ("mesh_part", np.array([0, 1, 3]), "mesh points at"),
         ("power_m2", np.full((2, 4), -1.0), "negative"),
         ("walls", np.zeros((1, 4, 3)), "length 0"),
     ],
@@ -90,6 +114,20 @@ def damage(path: Path, how: str) -> None:
         if how == "field":
             del content["corners"]
         np.savez_compressed(path, **content)
+
+
+def test_files_of_the_first_format_have_one_person(tmp_path: Path) -> None:
+    first = replace(example(), part_names=np.array(["head", "left foot", "lower torso"]))
+    later = [field.name for field in fields(Snapshots)][-13:]
+    assert later[0] == "part_person"
+    old = {name: value for name, value in vars(first).items() if name not in later}
+    np.savez_compressed(tmp_path / "view.npz", format=np.array(1), **old)
+    found = load_snapshots(tmp_path / "view.npz")
+    assert found.sources == ["person"]
+    np.testing.assert_array_equal(found.poses, first.poses)
+    np.testing.assert_array_equal(found.person_position[:, 0], first.poses[:, 2, 0])
+    apart = np.linalg.norm(np.diff(first.poses[:, 2, 0].astype(float), axis=0)) / 0.1
+    np.testing.assert_allclose(found.person_speed, apart, rtol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,24 @@ class HumanMesh:
             Where a time lies outside the motion, or ``divisions`` is not from 0 to 4.
         """
         features, _ = self._divided(divisions)
+        rows = self.bones(times)
+        count = len(rows)
+        flat = np.moveaxis(rows, 0, 1).reshape(-1, 3 * count)
+        return np.ascontiguousarray(np.moveaxis((features @ flat).reshape(-1, count, 3), 1, 0))
+
+    def bones(self, times: ArrayLike) -> Array:
+        """Pose the bones, of which the vertices are sums by the weights of `Fit.skinning`.
+
+        Parameters
+        ----------
+        times : (time,) array_like
+            Times since the start of the motion [s].
+
+        Returns
+        -------
+        (time, 4 rows a part, 3) float64
+            Axes of each part, and the joint at which it begins [m], world.
+        """
         positions, quaternions = self.motion.at(times)
         from scipy.spatial.transform import Rotation  # slow to import
 
@@ -114,9 +132,7 @@ class HumanMesh:
         rows = np.concatenate(
             [np.swapaxes(bones, 2, 3), positions[:, list(NODE_PARENTS[1:]), None]], axis=2
         )
-        # (4 rows a part, time and axis)
-        flat = np.moveaxis(rows.reshape(count, -1, 3), 0, 1).reshape(-1, 3 * count)
-        return np.ascontiguousarray(np.moveaxis((features @ flat).reshape(-1, count, 3), 1, 0))
+        return np.asarray(rows.reshape(count, -1, 3))
 
     def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
         """Pose the mesh at one time.

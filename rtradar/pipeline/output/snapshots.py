@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.output.moving_meshes import moving_meshes, thinned_mesh
+from rtradar.pipeline.output.truth import truth_of
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
@@ -19,7 +21,7 @@ from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.world import World
-from rtradar.scene import Scene, Triangles
+from rtradar.scene import Scene
 
 MAX_STEPS = 400
 """Largest number of snapshots, those of 10 s; of longer captures fewer frames are kept."""
@@ -31,7 +33,7 @@ MAX_ECHOES = 400
 """Number of echoes kept, the strongest; a person has 273 over single walls in a room of six."""
 
 MAX_FACES = 2000
-"""Largest number of faces of a piece of furniture; a finer mesh is kept as its box."""
+"""Largest number of faces of a piece of furniture or of what moves; finer ones are thinned."""
 
 _AT_ONCE = 16
 _RATE_CYCLES = 2
@@ -72,6 +74,7 @@ def snapshots(capture: Capture) -> Snapshots:
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
     vertices, faces, piece = _furniture(scene)
+    truth = truth_of(body, times)
     return Snapshots(
         times=times,
         window=window,
@@ -91,6 +94,11 @@ def snapshots(capture: Capture) -> Snapshots:
         furniture_vertices=vertices,
         furniture_faces=faces,
         furniture_piece=piece,
+        part_person=body.owner,
+        person_names=np.array(body.names, dtype=np.str_),
+        person_position=truth["person_position"],
+        person_speed=truth["person_speed"],
+        **moving_meshes(body, scene.objects, times, MAX_FACES),
     )
 
 
@@ -204,17 +212,8 @@ def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], ND
     faces = [np.zeros((0, 3), dtype=np.int64)]
     for number, one in enumerate(scene.furniture):
         triangles = one.triangles()
-        if len(triangles.faces) > MAX_FACES:
-            triangles = _box(triangles)
-        faces.append(triangles.faces + sum(map(len, vertices)))
-        vertices.append(triangles.vertices)
-        piece.append(np.full(len(triangles.vertices), number))
+        kept, own = thinned_mesh(triangles.vertices, triangles.faces, MAX_FACES)
+        faces.append(own + sum(map(len, vertices)))
+        vertices.append(triangles.vertices[kept])
+        piece.append(np.full(len(kept), number))
     return np.concatenate(vertices).astype(np.float32), np.concatenate(faces), np.concatenate(piece)
-
-
-def _box(triangles: Triangles) -> Triangles:
-    low, high = triangles.vertices.min(axis=0), triangles.vertices.max(axis=0)
-    unit = np.array(list(np.ndindex(2, 2, 2)))
-    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
-    return Triangles(low + unit * (high - low), faces, True)

@@ -10,6 +10,8 @@ import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from html import escape
+from itertools import cycle, islice
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -23,9 +25,15 @@ from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.html import Titles, player, write_page
 from rtradar.report.view.snapshots import Snapshots
-from rtradar.report.view.three_d import packed_floats, posed_figure, rdt_data, spatial_data
+from rtradar.report.view.three_d import (
+    packed_floats,
+    packed_integers,
+    posed_figure,
+    rdt_data,
+    spatial_data,
+)
 
-COLOURS = ("part", "power", "velocity")
+COLOURS = ("person", "part", "power", "velocity")
 """Quantities that colours may show."""
 
 VELOCITY_COLOURS = (
@@ -41,10 +49,10 @@ _LINKED = """<div class="linked $style">
 <section><h2>Range-Doppler-time cloud</h2>$cloud</section>
 <section><h2>Spectrogram</h2>$spectrogram</section>
 </div>
-<p class="note">Each ellipsoid is a body part of the echo model. Lines are paths from the middle of
+<p class="note">$bodies Lines are paths from the middle of
 the array to the specular point of the part, and back; dots on the map are the same echoes,
 diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are occluded from
-the radar; grey points of the cloud are far from any echo. A click on the spectrogram goes to its
+the radar; grey points of the cloud belong to nobody.$objects A click on the spectrogram goes to its
 time; the pointer shows range, velocity and level of what is below it. World axes: x from the radar
 to the person, y to the left seen from the radar, z up.</p>
 """
@@ -59,6 +67,11 @@ GROUPS = {
     "no part near": "#8c8c94",
 }
 """Names and colours of the groups of body parts; the last is for what belongs to none."""
+
+SOURCE_COLOURS = (
+    "#3f7fd1", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a5fc7", "#a3742a",
+)  # fmt: skip
+"""Colours of people and, after them, of objects, in turn; nobody has that of no part."""
 
 _ARM = ("clavicle", "upper arm", "forearm", "hand")
 
@@ -76,6 +89,8 @@ def group_of_parts(parts: Sequence[str]) -> list[int]:
         found.append(names.index(group))
     return found
 
+
+_LOOKED_AT = 40  # snapshots at which moving meshes must be inside of the axes
 
 MOST_LEVEL = 250
 """Highest quantised level."""
@@ -127,7 +142,8 @@ class RunView:
     ``range_doppler`` has one map, the mean of the channels, for each snapshot; ``spectrogram`` one
     map, time across and velocity up, without columns if the capture is too short. ``rdt_points``
     (point, 3) are time [s], range [m] and velocity [m/s], and ``rdt_power_db`` (point,) the power
-    of the range-Doppler map there, in its unit [dB].
+    of the range-Doppler map there, in its unit [dB]. ``rdt_source`` (point,) is who returned most
+    of the point, as an index of `Snapshots.sources`, -1 for the room or nobody.
     """
 
     heading: str
@@ -138,8 +154,25 @@ class RunView:
     spectrogram: Levels
     rdt_points: NDArray[np.float64]
     rdt_power_db: NDArray[np.float64]
+    rdt_source: NDArray[np.int64]
     spatial: SpatialCloud
     spreading: bool = True
+
+    @property
+    def colour(self) -> str:
+        """Which of `COLOURS` tells most: the person of several, the body part of one."""
+        return "person" if len(self.snapshots.sources) > 1 else "part"
+
+    @property
+    def source_names(self) -> list[str]:
+        """Names of people, then of objects, and at the end of nobody."""
+        return [*self.snapshots.sources, "nobody"]
+
+    @property
+    def source_colours(self) -> list[str]:
+        """Colours of `source_names`."""
+        count = len(self.snapshots.sources)
+        return [*islice(cycle(SOURCE_COLOURS), count), GROUPS["no part near"]]
 
     @property
     def power_unit(self) -> FieldUnit:
@@ -226,25 +259,33 @@ class RunView:
         return found
 
 
-def _controls(colour: str) -> str:
+def _controls(run_view: RunView, colour: str) -> str:
     chosen = {name: " selected" if name == colour else "" for name in COLOURS}
     options = "".join(f'<option value="{n}"{mark}>{n}</option>' for n, mark in chosen.items())
     style = '<span><i style="background:{}"></i>{}</span>'
     legend = "".join(style.format(tint, name) for name, tint in GROUPS.items())
+    meshes, people = run_view.snapshots.mesh_source, len(run_view.snapshots.person_names)
+    who = "".join(
+        style.format(tint, f"{escape(name)}{mesh}<b></b>")
+        for number, (name, tint) in enumerate(
+            zip(run_view.source_names, run_view.source_colours, strict=True)
+        )
+        for mesh in [", a mesh" if number < people and number in meshes else ""]
+    )
     return player(
         f'<label>Colour by <select id="colour">{options}</select></label>'
         '<label>Paths <select id="paths"><option value="all">all</option>'
         '<option value="direct">direct</option><option value="none">none</option></select></label>'
         '<button type="button" id="save">Save as PNG</button>'
-        f'<div class="groups" id="groups">{legend}</div>'
+        f'<div class="groups" id="groups">{legend}</div><div class="groups" id="people">{who}</div>'
     )
 
 
-def linked_views(run_view: RunView, colour: str = "part", style: str = "") -> str:
+def linked_views(run_view: RunView, colour: str | None = None, style: str = "") -> str:
     """Return the HTML of the linked views with their controls, for a page with ``linked.js``.
 
-    Colours show ``colour``, one of `COLOURS`, until the reader chooses another; ``style`` is
-    another class of the element for the page's style sheet.
+    Colours show ``colour``, one of `COLOURS`, until the reader chooses another, by default that of
+    the view; ``style`` is another class of the element for the page's style sheet.
     """
     cloud, spectrogram = (
         f'<div class="scene" id="scene-{view}"></div>' for view in ("rdt", "spectrogram")
@@ -254,16 +295,21 @@ def linked_views(run_view: RunView, colour: str = "part", style: str = "") -> st
     if not run_view.spectrogram.level.size:
         spectrogram = '<p class="empty">The capture is too short for one.</p>'
     parts = {"cloud": cloud, "spectrogram": spectrogram, "style": style}
-    return _controls(colour) + Template(_LINKED).substitute(parts)
+    drawn, objects = run_view.snapshots.drawn_parts, len(run_view.snapshots.object_names)
+    ellipsoids = "Each ellipsoid is a body part of the echo model." if drawn.any() else ""
+    mesh = "" if drawn.all() else " A body that is a mesh is drawn with fewer triangles."
+    parts["bodies"] = ellipsoids + mesh
+    parts["objects"] = " Echoes of objects have no marks and no lines." if objects else ""
+    return _controls(run_view, colour or run_view.colour) + Template(_LINKED).substitute(parts)
 
 
 def write_view(
-    path: str | Path, run_view: RunView, *, name: str = "view", colour: str = "part"
+    path: str | Path, run_view: RunView, *, name: str = "view", colour: str | None = None
 ) -> None:
     """Write the view page as one file that opens without a network.
 
     Pictures that the page saves are called ``name``. When it opens, colours show ``colour``, one of
-    `COLOURS`. InputError if the file cannot be written.
+    `COLOURS`, by default that of the view. InputError if the file cannot be written.
     """
     write_page(
         path,
@@ -279,12 +325,14 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     """Return the data of the page's script as plain values for JSON."""
     snapshots, radar = run_view.snapshots, run_view.radar
     figure = posed_figure(snapshots.part_names.tolist(), snapshots.times, snapshots.poses, radar)
+    figure["drawn"] = snapshots.drawn_parts.tolist()
     figure["ranges"] = _with_room(figure["ranges"], snapshots)
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
     points = {
         "power_db": packed_floats(run_view.rdt_power_db[::every]),
         "group": run_view.rdt_group()[::every].tolist(),
+        "source": run_view.rdt_source[::every].tolist(),
     }
     return {
         "figure": figure,
@@ -311,6 +359,15 @@ def view_data(run_view: RunView) -> dict[str, Any]:
             "colours": list(GROUPS.values()),
             "of_part": group_of_parts(snapshots.part_names.tolist()),
         },
+        "people": {
+            "names": run_view.source_names,
+            "colours": run_view.source_colours,
+            "of_part": snapshots.part_person.tolist(),
+            "position_m": packed_floats(snapshots.person_position),
+            "speed_mps": packed_floats(snapshots.person_speed),
+        },
+        "n_objects": len(snapshots.object_names),
+        "meshes": _meshes(snapshots),
         "velocity_colours": VELOCITY_COLOURS,
         "power_label": run_view.power_unit.label("of an echo"),
         "power_unit": run_view.power_unit.name,
@@ -324,10 +381,22 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     }
 
 
+def _meshes(snapshots: Snapshots) -> dict[str, Any]:
+    """Return the moving meshes: vertices are sums of rows that change from step to step."""
+    numbers = ("mesh_faces", "mesh_of_vertex", "mesh_part", "blend_vertex", "blend_row")
+    packed = {name: packed_integers(getattr(snapshots, name)) for name in numbers}
+    floats = {
+        name: packed_floats(getattr(snapshots, name)) for name in ("blend_weight", "mesh_rows")
+    }
+    return {"source": snapshots.mesh_source.tolist(), **packed, **floats}
+
+
 def _with_room(ranges: list[list[float]], snapshots: Snapshots) -> list[list[float]]:
     """Extend the limits of the axes to walls and furniture, rounded to half metres."""
     walls, furniture = snapshots.walls.reshape(-1, 3), snapshots.furniture_vertices
-    places = np.concatenate([walls, furniture, np.array(ranges).T])
+    steps = range(0, len(snapshots.times), max(len(snapshots.times) // _LOOKED_AT, 1))
+    moving = np.concatenate([snapshots.mesh_vertices(step) for step in steps])
+    places = np.concatenate([walls, furniture, moving, np.array(ranges).T])
     low = np.floor(2 * places.min(axis=0) - 1e-6) / 2
     high = np.ceil(2 * places.max(axis=0) + 1e-6) / 2
     low[2] = 0.0 if low[2] > -0.6 else low[2]

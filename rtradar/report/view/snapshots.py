@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_arrays
 
-_FORMAT = 1
+_FORMAT = 2
 _MAX_BYTES = 200_000_000  # far more than the 2 MB that a run writes
 
 _LARGEST = 1e9
@@ -22,6 +22,8 @@ _MAY_BE_NAN = ("corners",)
 _POINTS_INTO = {
     "echo_path": "path", "echo_part": "part",
     "furniture_faces": "vertex", "furniture_piece": "piece",
+    "part_person": "person", "mesh_faces": "mesh vertex", "mesh_of_vertex": "mesh",
+    "blend_vertex": "mesh vertex", "blend_row": "row",
 }  # fmt: skip
 
 
@@ -49,6 +51,13 @@ class Snapshots:
 
     ``walls`` are the corners of their front faces, ``furniture_vertices`` those of all pieces,
     ``furniture_faces`` indices into them, and ``furniture_piece`` the piece of each vertex.
+
+    ``part_person`` is the person of each part; ``person_position`` and ``person_speed`` are place
+    and speed of the root of each person [m, m/s]. Meshes that move are those of objects and of
+    people whose body is one: ``mesh_source`` is the person's index, or after all people that of the
+    object, as in clouds. A vertex is a sum of ``mesh_rows``, which are bones of a person or the
+    axes and the place of an object, by the weights ``blend_weight`` of the rows ``blend_row`` of
+    the vertices ``blend_vertex``. ``mesh_part`` is the part of each vertex, -1 of objects.
     InputError if the shapes do not fit each other, a value is not finite, or an index is out of
     range.
     """
@@ -71,6 +80,19 @@ class Snapshots:
     furniture_vertices: NDArray[np.float32] = _array("f4", "vertex", 3)
     furniture_faces: NDArray[np.int64] = _array("i8", "face", 3)
     furniture_piece: NDArray[np.int64] = _array("i8", "vertex")
+    part_person: NDArray[np.int64] = _array("i8", "part")
+    person_names: NDArray[np.str_] = _array("U", "person")
+    person_position: NDArray[np.float64] = _array("f8", "step", "person", 3)
+    person_speed: NDArray[np.float64] = _array("f8", "step", "person")
+    object_names: NDArray[np.str_] = _array("U", "object")
+    mesh_source: NDArray[np.int64] = _array("i8", "mesh")
+    mesh_faces: NDArray[np.int64] = _array("i8", "mesh face", 3)
+    mesh_of_vertex: NDArray[np.int64] = _array("i8", "mesh vertex")
+    mesh_part: NDArray[np.int64] = _array("i8", "mesh vertex")
+    mesh_rows: NDArray[np.float32] = _array("f4", "step", "row", 3)
+    blend_vertex: NDArray[np.int64] = _array("i8", "blend")
+    blend_row: NDArray[np.int64] = _array("i8", "blend")
+    blend_weight: NDArray[np.float32] = _array("f4", "blend")
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
@@ -86,6 +108,11 @@ class Snapshots:
             if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
                 allowed = f"it must be from 0 to {sizes[axis] - 1}"
                 raise InputError(f"view: {name} points at a {axis} that is not there; {allowed}")
+        of, part = self.mesh_source, self.mesh_part
+        if ((of < 0) | (of >= len(self.sources))).any() or (
+            (part < -1) | (part >= sizes["part"])
+        ).any():
+            raise InputError("view: a mesh points at a person, an object or a part that is none")
         if (np.diff(self.times) <= 0).any() or (self.power_m2 < 0).any():
             raise InputError("view: times must ascend, and power_m2 must not be negative")
 
@@ -93,6 +120,23 @@ class Snapshots:
     def direct(self) -> NDArray[np.bool_]:
         """Whether each echo has a single reflection, that on the body, (echo,)."""
         return self.echo_bounces == 1
+
+    @property
+    def sources(self) -> list[str]:
+        """Names of who returns echoes: all people, then all objects."""
+        return [*self.person_names.tolist(), *self.object_names.tolist()]
+
+    @property
+    def drawn_parts(self) -> NDArray[np.bool_]:
+        """Whether each part is drawn as an ellipsoid, (part,), and not as part of a mesh."""
+        return ~np.isin(self.part_person, self.mesh_source)
+
+    def mesh_vertices(self, step: int) -> NDArray[np.float64]:
+        """Place the vertices of the moving meshes, (mesh vertex, 3) [m]."""
+        out = np.zeros((len(self.mesh_of_vertex), 3))
+        rows = self.mesh_rows[step].astype(np.float64)[self.blend_row]
+        np.add.at(out, self.blend_vertex, self.blend_weight[:, None] * rows)
+        return out
 
     def every(self, number: int) -> Snapshots:
         """Return a copy with every ``number``-th snapshot, from the first on."""
@@ -139,15 +183,20 @@ def save_snapshots(path: str | Path, snapshots: Snapshots) -> None:
 
 
 def load_snapshots(path: str | Path) -> Snapshots:
-    """Read snapshots; InputError if the file is missing, damaged or of another kind."""
+    """Read snapshots; InputError if the file is missing, damaged or of another kind.
+
+    Files of version 0.1 have one person, whose place is then that of the lower torso.
+    """
     mend = "make it anew with: rtradar run"
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)
+        if arrays["format"].tolist() == 1:
+            arrays |= _of_one_person(**arrays)
         names = ("format", *(one.name for one in fields(Snapshots)))
         found: dict[str, Any] = {name: arrays[name] for name in names}
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; {mend}") from None
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
         raise InputError(
             f"'{path}' is damaged or no file of snapshots ({' '.join(str(error).split())}); {mend}"
         ) from None
@@ -157,3 +206,27 @@ def load_snapshots(path: str | Path) -> Snapshots:
         return Snapshots(**found)
     except InputError as error:
         raise InputError(f"'{path}': {error}; {mend}") from None
+
+
+def _of_one_person(
+    times: NDArray[Any], part_names: NDArray[Any], poses: NDArray[Any], **_: Any
+) -> dict[str, Any]:
+    """Return what files of the first format lack."""
+    torso = part_names.tolist().index("lower torso")
+    place = poses[:, torso, 0].astype(np.float64)
+    moved = np.gradient(place, times, axis=0) if len(times) > 1 else np.zeros_like(place)
+    none = np.zeros(0, dtype=np.int64)
+    return {
+        "format": np.array(_FORMAT),
+        "part_person": np.zeros(len(part_names), dtype=np.int64),
+        "person_names": np.array(["person"]),
+        "person_position": place[:, None],
+        "person_speed": np.linalg.norm(moved, axis=1)[:, None],
+        "object_names": np.array([], dtype=np.str_),
+        "mesh_faces": np.zeros((0, 3), dtype=np.int64),
+        "mesh_rows": np.zeros((len(times), 0, 3), dtype=np.float32),
+        "blend_weight": np.zeros(0, dtype=np.float32),
+        **dict.fromkeys(
+            ("mesh_source", "mesh_of_vertex", "mesh_part", "blend_vertex", "blend_row"), none
+        ),
+    }

@@ -21,19 +21,25 @@ from rtradar.system.figure_style import dress, new_figure, save_figure, write_he
 from rtradar.system.files import atomic_file
 
 _HIDDEN = "#8c8c94"
+_NAMED = ("person", "part")
+"""Quantities whose colours have names, and no colour bar."""
+
+_MOST_COLUMNS = 7
 _NOW = "#e0389a"
 
 
-def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = "part") -> None:
+def draw_still(
+    path: str | Path, run_view: RunView, step: int, *, colour: str | None = None
+) -> None:
     """Draw body and paths, range-Doppler map, cloud and spectrogram of the snapshot ``step``.
 
-    ``colour`` is the quantity that colours show, one of `COLOURS`. InputError if the PNG file
-    cannot be written.
+    ``colour`` is the quantity that colours show, one of `COLOURS`, by default that of the view.
+    InputError if the PNG file cannot be written.
     """
     figure = new_figure(8.2, width_in=13)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
     time = f"{run_view.snapshots.times[step]:.2f} s"
-    paint = _Paint(run_view, colour)
+    paint = _Paint(run_view, colour or run_view.colour)
     views = [
         figure.add_subplot(grid[row, column], projection=None if column else "3d")
         for row, column in np.ndindex(2, 2)
@@ -55,17 +61,25 @@ def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = 
 
 
 class _Paint:
-    """Colours of echoes, parts and cloud points by part, power or velocity."""
+    """Colours of echoes, parts and cloud points by person, part, power or velocity."""
 
     def __init__(self, run_view: RunView, colour: str) -> None:
         self.colour, self._run_view = colour, run_view
         snapshots = run_view.snapshots
-        self._groups = np.array(group_of_parts(snapshots.part_names.tolist()))
+        self._legend = list(GROUPS.items())
+        self._named = np.array(group_of_parts(snapshots.part_names.tolist()))
+        names, tints = run_view.source_names, run_view.source_colours
+        self.sources = np.array([to_rgba(tint) for tint in tints])
+        if colour == "person":
+            self._legend, self._named = list(zip(names, tints, strict=True)), snapshots.part_person
         fastest = run_view.fastest_mps
-        of_echo = np.broadcast_to(self._groups[snapshots.echo_part], snapshots.range_m.shape)
+        of_echo = np.broadcast_to(self._named[snapshots.echo_part], snapshots.range_m.shape)
         rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
+        tints = [tint for _, tint in self._legend]
+        named = ListedColormap(tints), (-0.5, len(tints) - 0.5), of_echo
         self.map, limits, self._echo = {
-            "part": (ListedColormap(list(GROUPS.values())), (-0.5, len(GROUPS) - 0.5), of_echo),
+            "person": named,
+            "part": named,
             "power": (colormaps["viridis"], run_view.power_range_db, run_view.power_db),
             "velocity": (rates, (-fastest, fastest), snapshots.velocity_mps),
         }[colour]
@@ -78,8 +92,8 @@ class _Paint:
     def parts(self, step: int) -> NDArray[np.float64]:
         """Colour of each part (part, rgba), by its strongest direct echo."""
         snapshots = self._run_view.snapshots
-        if self.colour == "part":
-            return self._rgba(self._groups.astype(np.float64))
+        if self.colour in _NAMED:
+            return self._rgba(self._named.astype(np.float64))
         out = np.full(len(snapshots.part_names), np.nan)
         power = snapshots.power_m2[step]
         for echo in np.argsort(power, kind="stable"):
@@ -92,6 +106,8 @@ class _Paint:
         run_view = self._run_view
         if self.colour == "part":
             return self._rgba(run_view.rdt_group().astype(np.float64))
+        if self.colour == "person":
+            return self.sources[run_view.rdt_source]  # that of nobody is the last
         by_power = self.colour == "power"
         return self._rgba(run_view.rdt_power_db if by_power else run_view.rdt_points[:, 2])
 
@@ -102,9 +118,10 @@ class _Paint:
 
     def legend(self, figure: Any, views: list[Any]) -> None:
         """Add a legend of the colours below the views."""
-        if self.colour == "part":
-            patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
-            figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
+        if self.colour in _NAMED:
+            patches = [Patch(color=tint, label=name) for name, tint in self._legend]
+            columns = min(len(patches), _MOST_COLUMNS)
+            figure.legend(handles=patches, loc="outside lower center", ncols=columns)
             return
         label = VELOCITY_LABEL
         if self.colour == "power":
@@ -118,10 +135,19 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     snapshots, radar = run_view.snapshots, run_view.radar
     vertices, faces = unit_sphere(2)
     poses = snapshots.poses[step].astype(np.float64)
-    for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
+    tints = paint.parts(step)
+    for part in np.flatnonzero(snapshots.drawn_parts):
+        centre, *semi_axes = poses[part]
         corners = (centre + vertices @ np.array(semi_axes))[faces]
-        part = Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0)
-        axes.add_collection3d(part)
+        style = {"facecolors": tints[part, :3], "shade": True, "linewidth": 0}
+        axes.add_collection3d(Poly3DCollection(corners, **style))
+    moving, of_face = snapshots.mesh_vertices(step), snapshots.mesh_faces[:, 0]
+    if len(of_face):
+        own = snapshots.mesh_part[of_face]
+        source = snapshots.mesh_source[snapshots.mesh_of_vertex[of_face]]
+        rgba = np.where(own[:, None] >= 0, tints[own], paint.sources[source])
+        style = {"facecolors": rgba[:, :3], "shade": True, "linewidth": 0}
+        axes.add_collection3d(Poly3DCollection(moving[snapshots.mesh_faces], **style))
     outlines = [np.concatenate([corners, corners[:1]]) for corners in snapshots.walls]
     if outlines:
         axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
@@ -142,7 +168,7 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
     centres, walls = snapshots.poses[:, :, 0].reshape(-1, 3), snapshots.walls.reshape(-1, 3)
     furniture = snapshots.furniture_vertices
-    everything = np.concatenate([centres, walls, furniture, radar.tx, radar.rx])
+    everything = np.concatenate([centres, walls, furniture, moving, radar.tx, radar.rx])
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))

@@ -80,8 +80,8 @@ def spatial_data(cloud: SpatialCloud, radar: Radar) -> dict[str, Any]:
     """Return the strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`, for JSON.
 
     The values are ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points``
-    (point, 3), ``velocity`` and ``time`` (point,); ``radar_m``, and the ``ranges`` of the axes that
-    show it and all points but outliers, as the pictures do [m].
+    (point, 3), ``velocity`` and ``time`` (point,), perhaps ``source``; ``radar_m``, and the
+    ``ranges`` of the axes that show it and all points but outliers, as the pictures do [m].
     """
     cloud = cloud.strongest()
     measured, place = cloud.measured.tolist(), radar.position_m
@@ -89,13 +89,18 @@ def spatial_data(cloud: SpatialCloud, radar: Radar) -> dict[str, Any]:
         place_limits(cloud.points[:, axis], place[axis]) if measured[axis] else None
         for axis in range(3)
     ]
-    return {"measured": measured, "radar_m": list(place), "ranges": ranges} | _thinned(
-        points=cloud.points, velocity=cloud.velocity, time=cloud.time
-    )
+    found = _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
+    if cloud.source is not None:
+        found["source"] = cloud.source[:: _every(len(cloud.points))].tolist()
+    return {"measured": measured, "radar_m": list(place), "ranges": ranges} | found
+
+
+def _every(count: int) -> int:
+    return max(1, math.ceil(count / MOST_POINTS))
 
 
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
-    every = max(1, math.ceil(len(points) / MOST_POINTS))
+    every = _every(len(points))
     arrays = {"points": points, **values}
     packed = {name: packed_floats(array[::every]) for name, array in arrays.items()}
     return {"count": len(points), "shown": len(points[::every]), **packed}
@@ -104,6 +109,11 @@ def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict
 def packed_floats(array: NDArray[np.floating]) -> str:
     """Base64 of little-endian float32, last axis fastest."""
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
+
+
+def packed_integers(array: NDArray[np.integer]) -> str:
+    """Base64 of little-endian int32, last axis fastest."""
+    return base64.b64encode(np.ascontiguousarray(array, dtype="<i4").tobytes()).decode()
 
 
 def _ranges(body: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:

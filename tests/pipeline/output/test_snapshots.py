@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 import rtradar as rt
 from rtradar.body import Body
+from rtradar.body.people import body_of_people
 from rtradar.motion import place
 from rtradar.pipeline.output import snapshots as module
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.settings import RunSettings
 
 pytestmark = pytest.mark.drawn
 
@@ -196,7 +199,7 @@ def test_moments_come_at_most_40_times_a_second(spheres: Body) -> None:
     assert np.diff(found.window).tolist() == [50] * (len(found.window) - 1)
 
 
-def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(
+def test_furniture_is_its_mesh_or_where_that_is_fine_a_thinned_one(
     spheres: Body, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chair = Furniture(
@@ -218,17 +221,63 @@ def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(
     vertices = found.furniture_vertices.astype(float)
     own = found.furniture_faces[: len(chair.triangles().faces)]
     np.testing.assert_allclose(vertices[own], chair.triangles().corners, atol=1e-6)
-    box = found.furniture_faces[len(own) :]
-    assert len(box) == 12
-    assert (found.furniture_piece[box] == 1).all()
-    low, high = lamp.triangles().vertices.min(axis=0), lamp.triangles().vertices.max(axis=0)
-    sides = vertices[box]
-    area = (
-        np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    thinned = found.furniture_faces[len(own) :]
+    assert limit / 4 < len(thinned) <= limit
+    assert (found.furniture_piece[thinned] == 1).all()
+    # Every vertex is one of the mesh, and they reach as far as it does, but for a cell.
+    whole = lamp.triangles().vertices
+    drawn = vertices[np.unique(thinned)]
+    assert (np.abs(drawn[:, None] - whole).max(axis=2).min(axis=1) < 1e-6).all()
+    np.testing.assert_allclose(drawn.min(axis=0), whole.min(axis=0), atol=0.05)
+    np.testing.assert_allclose(drawn.max(axis=0), whole.max(axis=0), atol=0.05)
+
+
+def test_objects_are_meshes_where_they_move(spheres: Body) -> None:
+    door = rt.Object(
+        "door", "door-leaf", "wood", position_m=(0.3, -2.0, 0.0), yaw_deg=-50,
+        motion=rt.Swinging(amplitude_deg=35, period_s=0.4),
+    )  # fmt: skip
+    cart = rt.Object(
+        "cart", "trihedral", "metal", motion=rt.FollowingPath(velocity_mps=(1.0, 0.0, 0.0))
     )
-    a, b, c = high - low
-    assert area.sum() == pytest.approx(2 * (a * b + b * c + c * a), rel=1e-5)
-    # Closed, all faces outward: the volume by the divergence theorem.
-    assert abs(
-        np.einsum("ij,ij->i", sides[:, 0], np.cross(sides[:, 1], sides[:, 2])).sum() / 6
-    ) == pytest.approx(a * b * c, rel=1e-4)
+    scene = Scene(name="doors", objects=(door, cart))
+    found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True), scene)
+    assert found.sources == ["synthetic:walk", "door", "cart"]
+    assert found.mesh_source.tolist() == [1, 2]
+    assert (found.mesh_part == -1).all()
+    for step in (0, len(found.times) - 1):
+        corners = found.mesh_vertices(step)[found.mesh_faces]
+        whole = [one.triangles(found.times[step]).corners for one in (door, cart)]
+        np.testing.assert_allclose(corners, np.concatenate(whole), atol=1e-6)
+
+
+def test_a_person_who_is_a_mesh_is_drawn_as_one() -> None:
+    pytest.importorskip("anny")
+    walk = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
+    bodies = {
+        kind: body_of_people(
+            [rt.Person(walk, (0, 1), body=kind), rt.Person(walk, (0, -1))], RunSettings()
+        )
+        for kind in ("ellipsoids", "mesh")
+    }
+    # Echoes of the level that costs least; it takes ellipsoids.
+    model, body = build_model("analytic", RADAR, bodies["ellipsoids"]), bodies["mesh"]
+    found = look(body, model)
+    assert found.mesh_source.tolist() == [0]
+    assert found.drawn_parts.tolist() == [False] * 21 + [True] * 21
+    assert len(found.mesh_faces) <= module.MAX_FACES
+    mesh = body.people[0].mesh
+    assert mesh is not None
+    step = len(found.times) // 2
+    places = mesh.vertices([found.times[step]])[0]
+    drawn = found.mesh_vertices(step)
+    # Every vertex is one of the mesh where it is then, and all of the body is there.
+    apart, nearest = cKDTree(places).query(drawn)
+    assert apart.max() < 1e-5
+    parts = mesh.weights()[nearest]
+    np.testing.assert_array_equal(found.mesh_part, parts.argmax(axis=1))
+    assert set(found.mesh_part) == set(range(21))
+    # Truth: where the root of each is.
+    np.testing.assert_allclose(
+        found.person_position[:, :, 1], [[1.0, -1.0]] * len(found.times), atol=0.1
+    )
