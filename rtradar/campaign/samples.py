@@ -36,6 +36,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
+from rtradar.radar.schedule import FollowingCount
 from rtradar.scene import Object, Scene
 from rtradar.settings import RunSettings
 from rtradar.system.files import open_regular
@@ -52,7 +53,9 @@ _SLOW_BAR: Any = {"unit": "interval", "disable": None, "leave": False, "delay": 
 _BODY = ("build", "height_m")  # drawn once for each synthetic subject
 _LATER_FIELDS = (
     "multiplexing", "carrier_step_hz", "doppler_bands", "transmit_power_dbm", "noise_figure_db",
-    "noise_temperature_k", "tx_antenna", "rx_antenna",
+    "noise_temperature_k", "tx_antenna", "rx_antenna", "idle_s", "adc_start_s", "adc_rate_hz",
+    "tx_positions_m", "rx_positions_m", "tx_order", "yaw_deg", "pitch_deg", "roll_deg",
+    "frame_period_s",
 )  # fmt: skip
 """Radar fields added later, left out at their defaults, so that ids of older samples stay."""
 
@@ -260,6 +263,8 @@ def _drawn_others(others: Others, seed: int, place: tuple[float, float]) -> list
 @lru_cache(maxsize=16)
 def _radar_parameters(radar: Radar) -> dict[str, Any]:
     values = asdict(radar)
+    if isinstance(radar.chirps_per_frame, FollowingCount):
+        del values["chirps_per_frame"]
     for field in fields(radar):
         if field.name in _LATER_FIELDS and values[field.name] == field.default:
             del values[field.name]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, points_of_sines, spatial_points
 from rtradar.clouds.rdt import UniformSample
+from rtradar.errors import InputError
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,
@@ -85,6 +86,7 @@ class Processing:
     @classmethod
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
         """Build the processing that these settings name; InputError if a name is unknown."""
+        _refuse_unfinished(radar)
         window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
         return cls(
             radar,
@@ -112,6 +114,22 @@ class Processing:
                 return range_spectrum(separated, radar, window_functions=windows, out=filled[:n])
 
         return range_spectra
+
+
+def _refuse_unfinished(radar: Radar) -> None:
+    """Refuse what a radar can say of itself before it is simulated."""
+    unfinished = {
+        "tx_positions_m or rx_positions_m": not radar.is_cross,
+        "tx_order": radar.tx_order is not None,
+        "yaw_deg, pitch_deg or roll_deg": radar.is_turned,
+        "idle_s": radar.idle_s > 0,
+        "adc_start_s or adc_rate_hz": radar.sampled_duration_s != radar.chirp_duration_s,
+        "frame_period_s": radar.in_frames,
+        "multiplexing = 'bpm'": radar.multiplexing == "bpm",
+    }
+    for what, is_there in unfinished.items():
+        if is_there:
+            raise InputError(f"radar '{radar.name}': {what} is not simulated yet; leave it out")
 
 
 def block_chirps(radar: Radar) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError
+from rtradar.radar.schedule import FollowingCount
 from rtradar.system.checks import brief, check_keys
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
+_MOST_ANTENNAS, _MOST_PLACE_M, _MOST_CHIRPS = 1024, 100.0, 2**31
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
 
 
@@ -75,6 +77,34 @@ def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
     )
 
 
+def _is_place(value: Any) -> bool:
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 3:
+        return False
+    return all(map(_is_number, value)) and max(map(abs, value)) <= _MOST_PLACE_M
+
+
+_PLACES = FieldRule(
+    lambda value: (
+        value is None
+        or (
+            isinstance(value, list | tuple | np.ndarray)
+            and 1 <= len(value) <= _MOST_ANTENNAS
+            and all(map(_is_place, value))
+        )
+    ),
+    lambda value: None if value is None else tuple(tuple(map(float, place)) for place in value),
+    f"it must be a list of 1 to {_MOST_ANTENNAS} places [x, y, z], within {_MOST_PLACE_M:g} m",
+)
+
+
+def _or_none(rule: FieldRule) -> FieldRule:
+    return FieldRule(
+        lambda value: value is None or rule.allows(value),
+        lambda value: None if value is None else rule.convert(value),
+        rule.requirement,
+    )
+
+
 def _if(allows: Callable[[Any], bool], convert: type) -> FieldRule:
     """Convert values of the right kind; whether others are allowed depends on other fields."""
     return FieldRule(lambda _: True, lambda value: convert(value) if allows(value) else value, "")
@@ -85,10 +115,29 @@ FIELD_RULES: dict[str, FieldRule] = {
     **dict.fromkeys(("frame_duration_s", "frame_hop_s"), _POSITIVE),
     **dict.fromkeys(("tx_spacing_wavelengths", "rx_spacing_wavelengths"), _POSITIVE),
     "samples_per_chirp": _count(1),
+    "idle_s": _between(0, 1e3, optional=False),
+    "adc_start_s": _between(0, 1e3, optional=False),
+    "adc_rate_hz": _or_none(_POSITIVE),
+    "frame_period_s": _or_none(_POSITIVE),
+    "chirps_per_frame": FieldRule(
+        lambda value: value is None or (_is_count(value) and 1 <= value <= _MOST_CHIRPS),
+        lambda value: value if isinstance(value, int | None) else int(value),
+        f"it must be a whole number from 1 to {_MOST_CHIRPS}",
+    ),
+    **dict.fromkeys(("tx_positions_m", "rx_positions_m"), _PLACES),
+    "tx_order": FieldRule(
+        lambda value: (
+            value is None
+            or (isinstance(value, list | tuple | np.ndarray) and all(map(_is_count, value)))
+        ),
+        lambda value: None if value is None else tuple(map(int, value)),
+        "it must be a list of whole numbers, each Tx once",
+    ),
+    **dict.fromkeys(("yaw_deg", "pitch_deg", "roll_deg"), _between(-360, 360, optional=False)),
     **dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), _count(0)),
     "channels": _choice("pairs", "all"),
     "polarization": _choice("v", "h"),
-    "multiplexing": _choice("tdm", "fdm", "ddm"),
+    "multiplexing": _choice("tdm", "fdm", "ddm", "bpm"),
     "position_m": FieldRule(
         lambda value: (
             isinstance(value, list | tuple | np.ndarray)
@@ -112,14 +161,26 @@ FIELD_RULES: dict[str, FieldRule] = {
 def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     """Yield whether fields fit each other, and the complaint where they do not, one by one."""
     yield (
-        r.tx_y + r.tx_z and r.rx_y + r.rx_z,
+        r.n_tx and (r.rx_positions_m or r.rx_y + r.rx_z),
         "the array has no Tx or no Rx; give at least one of each",
     )
     yield (
         r.channels == "all"
+        or not r.is_cross
         or {rx for tx, rx in ((r.tx_y, r.rx_y), (r.tx_z, r.rx_z)) if tx} == {r.n_rx} != {0},
         f"channels = 'pairs' needs as many Rx on the y-line as on the z-line, here {r.rx_y} and "
         f"{r.rx_z}; make them equal or set channels = 'all'",
+    )
+    yield (
+        r.tx_order is None or sorted(r.tx_order) == list(range(r.n_tx)),
+        f"tx_order = {brief(r.tx_order)}; it must hold each of the {r.n_tx} Tx once, from 0 on",
+    )
+    yield (
+        r.sampled_duration_s > 0
+        and r.adc_start_s + r.sampled_duration_s <= r.chirp_duration_s * (1 + 1e-9),
+        f"samples from adc_start_s = {r.adc_start_s:g} on for {r.sampled_duration_s:.4g} s do not "
+        f"fit into chirp_duration_s = {r.chirp_duration_s:g}; begin sooner, take fewer "
+        "(samples_per_chirp) or take them faster (adc_rate_hz)",
     )
     yield (
         r.carrier_step_hz is None or r.multiplexing == "fdm",
@@ -133,8 +194,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         r.carrier_step_hz is None
         or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz),
         f"carrier_step_hz = {brief(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
-        "Hz wide (samples_per_chirp / chirp_duration_s), so carriers must be at least that far "
-        "apart",
+        "Hz wide (the sample rate), so carriers must be at least that far apart",
     )
     yield (
         -r.tx_offset_hz[0] < r.start_frequency_hz,
@@ -149,7 +209,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         "number of Tx",
     )
     yield (
-        r.multiplexing != "ddm" or r.channels == "all" or not (r.tx_y and r.tx_z),
+        r.multiplexing != "ddm" or r.channels == "all" or not (r.is_cross and r.tx_y and r.tx_z),
         "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx on "
         "one line",
     )
@@ -158,7 +218,20 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} cycle of "
         f"{r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or shorten the chirp",
     )
-    samples = r.chirps_per_frame * r.n_rx * r.samples_per_chirp
+    chirps = r.cycles_per_frame * r.n_tx
+    yield (
+        isinstance(r.chirps_per_frame, FollowingCount | None) or r.chirps_per_frame == chirps,
+        f"chirps_per_frame = {r.chirps_per_frame}; it must be a multiple of "
+        f"{r.n_tx * r.n_doppler_bands}, the Tx{' times doppler_bands' * (r.n_doppler_bands > 1)}",
+    )
+    active_s = r.cycles_per_frame * r.cycle_duration_s
+    yield (
+        r.frame_period_s is None or active_s <= r.frame_period_s * (1 + 1e-12),
+        f"frame_period_s = {r.frame_period_s}; the {chirps} chirps of one frame take "
+        f"{active_s:.4g} s: lengthen the period, or take fewer (chirps_per_frame, or "
+        "frame_duration_s)",
+    )
+    samples = chirps * r.n_rx * r.samples_per_chirp
     yield (
         samples <= _MOST_SAMPLES_PER_FRAME,
         f"frame_duration_s = {r.frame_duration_s} holds {samples:.2g} samples, more than "

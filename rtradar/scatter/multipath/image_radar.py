@@ -39,9 +39,9 @@ class ImageRadar(Radar):
     @cached_property
     def tx(self) -> NDArray[np.float64]:
         """Images of the transmitters (tx, 3) [m], world."""
-        return images(self.out, self._lines(self.tx_y, self.tx_z, self.tx_spacing_wavelengths))
+        return images(self.out, self._in_world(self.tx_m))
 
     @cached_property
     def rx(self) -> NDArray[np.float64]:
         """Images of the receivers (rx, 3) [m], world."""
-        return images(self.back, self._lines(self.rx_y, self.rx_z, self.rx_spacing_wavelengths))
+        return images(self.back, self._in_world(self.rx_m))

@@ -1,0 +1,223 @@
+"""The antennas of a radar, how they are turned, and the angles that follow."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.radar.ambiguity import LinePattern
+from rtradar.radar.waveform import Waveform
+
+Places = tuple[tuple[float, float, float], ...]
+
+
+class Array(Waveform):
+    """What of a radar follows from the places of its antennas; `Radar` has the fields."""
+
+    tx_y: int
+    tx_z: int
+    rx_y: int
+    rx_z: int
+    tx_spacing_wavelengths: float
+    rx_spacing_wavelengths: float
+    tx_positions_m: Places | None
+    rx_positions_m: Places | None
+    tx_order: tuple[int, ...] | None
+    channels: Literal["pairs", "all"]
+    position_m: tuple[float, float, float]
+    yaw_deg: float
+    pitch_deg: float
+    roll_deg: float
+
+    @property
+    def is_cross(self) -> bool:
+        """Whether Tx and Rx are the cross of two lines, neither given as a list."""
+        return self.tx_positions_m is None and self.rx_positions_m is None
+
+    @property
+    def n_tx(self) -> int:
+        """Number of transmitters, and of chirps in one cycle."""
+        listed = self.tx_positions_m
+        return self.tx_y + self.tx_z if listed is None else len(listed)
+
+    @property
+    def n_rx(self) -> int:
+        """Length of the rx axis: the number of receivers that are kept in one chirp."""
+        if self.rx_positions_m is not None:
+            return len(self.rx_positions_m)
+        one_line = self.rx_y if self.tx_y else self.rx_z
+        return one_line if self._pairs else self.rx_y + self.rx_z
+
+    @property
+    def _pairs(self) -> bool:
+        """Whether a Tx is received by its own line alone; a list has no lines."""
+        return self.channels == "pairs" and self.is_cross
+
+    @property
+    def n_channels(self) -> int:
+        """Number of virtual channels, ``n_tx * n_rx``; channel = tx * n_rx + rx."""
+        return self.n_tx * self.n_rx
+
+    @cached_property
+    def _order(self) -> NDArray[np.int64]:
+        """Which of the Tx of the fields each row of `tx` is (tx,)."""
+        return np.arange(self.n_tx) if self.tx_order is None else np.array(self.tx_order)
+
+    @cached_property
+    def tx_m(self) -> NDArray[np.float64]:
+        """Positions of the transmitters in the radar's axes (tx, 3) [m], in the order of `tx`."""
+        lines = self.tx_y, self.tx_z, self.tx_spacing_wavelengths
+        return self._places(self.tx_positions_m, *lines)[self._order]
+
+    @cached_property
+    def rx_m(self) -> NDArray[np.float64]:
+        """Positions of the receivers in the radar's axes (rx, 3) [m], in the order of `rx`."""
+        lines = self.rx_y, self.rx_z, self.rx_spacing_wavelengths
+        return self._places(self.rx_positions_m, *lines)
+
+    @cached_property
+    def tx(self) -> NDArray[np.float64]:
+        """Positions of the transmitters (tx, 3) [m], world, in the order in which they transmit.
+
+        Of a cross without ``tx_order`` it is the y-line, then the z-line.
+        """
+        return self._in_world(self.tx_m)
+
+    @cached_property
+    def rx(self) -> NDArray[np.float64]:
+        """Positions of the receivers (rx, 3) [m], world: the list, or the y- and the z-line."""
+        return self._in_world(self.rx_m)
+
+    def _places(
+        self, listed: Places | None, n_y: int, n_z: int, spacing_wavelengths: float
+    ) -> NDArray[np.float64]:
+        if listed is not None:
+            return np.array(listed, dtype=np.float64)
+        spacing_m = spacing_wavelengths * self.start_wavelength_m
+        positions = np.zeros((n_y + n_z, 3))
+        positions[:n_y, 1] = (np.arange(n_y) - (n_y - 1) / 2) * spacing_m
+        positions[n_y:, 2] = (np.arange(n_z) - (n_z - 1) / 2) * spacing_m
+        return positions
+
+    def _in_world(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        turned = places @ self.axes.T if self.is_turned else places
+        return np.asarray(turned + np.asarray(self.position_m))
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the radar's axes differ from the world's."""
+        return (self.yaw_deg, self.pitch_deg, self.roll_deg) != (0.0, 0.0, 0.0)
+
+    @cached_property
+    def axes(self) -> NDArray[np.float64]:
+        """Axes of the radar (3, 3): the columns are boresight, left and up in world axes.
+
+        A vector of the radar's axes is ``axes @ vector`` in the world's.
+        """
+        return rotation(self.yaw_deg, self.pitch_deg, self.roll_deg)
+
+    @cached_property
+    def rx_of_tx(self) -> NDArray[np.int64]:
+        """Indices into `rx` of the receivers kept while each Tx transmits, (tx, rx)."""
+        if not self._pairs:
+            return np.tile(np.arange(self.n_rx), (self.n_tx, 1))
+        first = np.repeat([0, self.rx_y], [self.tx_y, self.tx_z])[self._order]
+        return np.asarray(first[:, None] + np.arange(self.n_rx))
+
+    # -- angles ------------------------------------------------------------------------------------
+
+    @cached_property
+    def virtual_m(self) -> NDArray[np.float64]:
+        """Virtual elements (channel, 3), Tx plus Rx of each channel in the radar's axes [m]."""
+        return np.asarray((self.tx_m[:, None] + self.rx_m[self.rx_of_tx]).reshape(-1, 3))
+
+    @cached_property
+    def _patterns(self) -> tuple[LinePattern, LinePattern]:
+        """Far field of all virtual elements over the sines of azimuth and of elevation."""
+        y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
+        return y, z
+
+    @property
+    def max_azimuth_deg(self) -> float:
+        """Azimuth up to which no other direction in the plane looks alike [deg].
+
+        Of a cross it is asin(lambda / 2d) (:eq:`angle-axis`), of a listed array half the sine of
+        the first grating lobe, `LinePattern.grating_sine`.
+        """
+        return self._cross_angle_deg if self.is_cross else self._patterns[0].max_angle_deg
+
+    @property
+    def max_elevation_deg(self) -> float:
+        """Elevation up to which no other direction looks alike [deg]; see `max_azimuth_deg`."""
+        return self._cross_angle_deg if self.is_cross else self._patterns[1].max_angle_deg
+
+    @property
+    def max_angle_deg(self) -> float:
+        """Unambiguous angle, the larger of those of azimuth and elevation [deg]."""
+        axes = self.max_azimuth_deg, self.max_elevation_deg
+        if self.is_cross:
+            return axes[0]
+        measured = [most for most, there in zip(axes, self.measures, strict=True) if there]
+        return max(measured, default=90.0)
+
+    @property
+    def _cross_angle_deg(self) -> float:
+        return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
+
+    @property
+    def measures(self) -> tuple[bool, bool]:
+        """Whether the radar measures azimuth, and whether it measures elevation."""
+        if self.is_cross:
+            return self.tx_y * self.rx_y > 1, self.tx_z * self.rx_z > 1
+        y, z = self._patterns
+        return y.wide, z.wide
+
+    @property
+    def angle_resolution_deg(self) -> float:
+        """Half-power beam width at broadside, 0.886 lambda / N d of a line [deg].
+
+        It is that of the far field (:eq:`angle-axis`), and of a listed array the narrower of both
+        beam widths. Where the spacings of Tx and Rx of a cross do not fill a line without gaps, it
+        is the width for a line of as many elements.
+        """
+        if not self.is_cross:
+            return min(self.azimuth_resolution_deg, self.elevation_resolution_deg)
+        elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
+        if elements < 2:
+            return 180.0
+        return min(180.0, math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths)))
+
+    @property
+    def azimuth_resolution_deg(self) -> float:
+        """Half-power beam width in azimuth at broadside [deg]; 180 where it is not measured."""
+        return self._resolution_deg(0)
+
+    @property
+    def elevation_resolution_deg(self) -> float:
+        """Half-power beam width in elevation at broadside [deg]; 180 where it is not measured."""
+        return self._resolution_deg(1)
+
+    def _resolution_deg(self, axis: int) -> float:
+        if not self.is_cross:
+            return self._patterns[axis].width_deg
+        return self.angle_resolution_deg if self.measures[axis] else 180.0
+
+    @property
+    def _virtual_spacing_wavelengths(self) -> float:
+        return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+
+
+def rotation(yaw_deg: float, pitch_deg: float, roll_deg: float) -> NDArray[np.float64]:
+    """Rotation (3, 3) of the radar's axes: about x by roll, then up by pitch, then left by yaw."""
+    (cy, sy), (cp, sp), (cr, sr) = (
+        (math.cos(angle), math.sin(angle))
+        for angle in map(math.radians, (yaw_deg, pitch_deg, roll_deg))
+    )
+    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    pitch = np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
+    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    return np.asarray(yaw @ pitch @ roll)
