@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     )
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
+    from rtradar.receiver import Interferer, Receiver
     from rtradar.scatter import register_model, scattering_length
     from rtradar.scene import FollowingPath, Object, Scene, Swinging, Turning
     from rtradar.settings import Breathing, RunSettings
@@ -48,6 +49,7 @@ _NAMES = {
     "pipeline": "Comparison Result Simulation compare process_samples run simulate",
     "process": "register_detector",
     "radar": "Radar register_radar",
+    "receiver": "Interferer Receiver",
     "scatter": "register_model scattering_length",
     "scene": "FollowingPath Object Scene Swinging Turning",
     "settings": "Breathing RunSettings",
@@ -68,10 +70,12 @@ __all__ = [
     "FollowingPath",
     "HumanMesh",
     "InputError",
+    "Interferer",
     "Motion",
     "Object",
     "Person",
     "Radar",
+    "Receiver",
     "Result",
     "RunSettings",
     "Scene",

@@ -10,6 +10,7 @@ import numpy as np
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError
 from rtradar.radar.schedule import FollowingCount
+from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys
 
 if TYPE_CHECKING:
@@ -53,6 +54,12 @@ _ANTENNA = FieldRule(
     _same,
     "it must be a table of an antenna's fields",
 )
+_RECEIVER = FieldRule(
+    lambda value: isinstance(value, Receiver | None),
+    _same,
+    "it must be a table of a receiver's fields",
+)
+_TABLES = {id(_ANTENNA): ("antenna", Antenna), id(_RECEIVER): ("receiver", Receiver)}
 
 
 def _count(least: int) -> FieldRule:
@@ -154,6 +161,7 @@ FIELD_RULES: dict[str, FieldRule] = {
     "doppler_bands": _if(_is_count, int),
     "tx_antenna": _ANTENNA,
     "rx_antenna": _ANTENNA,
+    "receiver": _RECEIVER,
 }
 """The rule of each field by itself, in the order in which they are checked."""
 
@@ -218,6 +226,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} cycle of "
         f"{r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or shorten the chirp",
     )
+    yield from _receiver_rules(r)
     chirps = r.cycles_per_frame * r.n_tx
     yield (
         isinstance(r.chirps_per_frame, FollowingCount | None) or r.chirps_per_frame == chirps,
@@ -239,6 +248,29 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     )
 
 
+def _receiver_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+    """Yield the rules that fit a receiver to its radar, as `_rules` does."""
+    if r.receiver is None:
+        return
+    yield (
+        not r.receiver.in_dbm or r.transmit_power_dbm is not None,
+        f"receiver: {' and '.join(r.receiver.in_dbm)} in dBm needs transmit_power_dbm, to which "
+        "echoes are in proportion; give it",
+    )
+    yield (
+        r.multiplexing != "fdm" or not r.receiver.in_baseband,
+        f"receiver: {' and '.join(r.receiver.in_baseband)} acts on all bands of FDM at once, for "
+        "one ADC samples them together, and samples here are those of each band; leave it out, or "
+        "take multiplexing = 'tdm' or 'ddm'",
+    )
+    for key in ("channel_gain_db", "channel_phase_deg"):
+        value = getattr(r.receiver, key)
+        yield (
+            isinstance(value, float) or len(value) == r.n_channels,
+            f"receiver: {key} must be one number, or one for each of {r.n_channels} channels",
+        )
+
+
 def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
     """Check each field of a `Radar` by itself; return the fields in their types, the name left out.
 
@@ -250,10 +282,11 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for field, rule in FIELD_RULES.items():
         value = values[field]
-        if rule is _ANTENNA and isinstance(value, Mapping):
+        if id(rule) in _TABLES and isinstance(value, Mapping):
+            what, kind = _TABLES[id(rule)]
             try:
-                check_keys("antenna: ", value, (), tuple(vars(Antenna())))
-                value = Antenna(**value)
+                check_keys(f"{what}: ", value, (), tuple(vars(kind())))
+                value = kind(**value)
             except InputError as error:
                 raise InputError(f"{radar}: {field}: {error}") from None
         if not rule.allows(value):

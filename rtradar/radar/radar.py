@@ -21,6 +21,7 @@ from rtradar.radar import display
 from rtradar.radar.array import Places
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.radar.schedule import FollowingCount, Schedule
+from rtradar.receiver import Receiver
 from rtradar.system.checks import check_keys, printable, read_toml
 from rtradar.system.registries import RADARS
 
@@ -109,6 +110,8 @@ class Radar(Schedule):
         follows from its noise figure.
     tx_antenna, rx_antenna : Antenna, optional
         Elements of each Tx and Rx, a table in TOML; isotropic by default.
+    receiver : Receiver, optional
+        What the receiver adds to the IF, a table in TOML; an ideal one by default.
 
     Raises
     ------
@@ -170,6 +173,7 @@ class Radar(Schedule):
     noise_temperature_k: float = 290.0
     tx_antenna: Antenna | None = None
     rx_antenna: Antenna | None = None
+    receiver: Receiver | None = None
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
