@@ -42,7 +42,7 @@ def test_the_mesh_is_one_closed_surface_at_any_time(person):
 
 
 @needs_anny
-def test_knees_elbows_and_wrists_are_where_the_recording_has_them(person):
+def test_middles_of_limbs_are_where_the_recording_has_joints(person):
     times = np.linspace(0, 1, 9)
     vertices, joints = person.vertices(times), person.motion.at(times)[0]
     for node, parts in (
@@ -53,6 +53,15 @@ def test_knees_elbows_and_wrists_are_where_the_recording_has_them(person):
         first, second = (f"left {part}" for part in parts.split())
         away = section(person, vertices, first, second) - joints[:, NODES.index(f"l_{node}")]
         assert np.linalg.norm(away, axis=1).max() < 0.03
+
+
+@needs_anny
+def test_keypoints_are_where_the_recording_has_joints(person):
+    times = np.linspace(0, 1, 9)
+    found = np.einsum("kv,tvx->tkx", person.fit.keypoints, person.vertices(times))
+    nodes = [NODES.index(name) for name in shape.KEYPOINTS]
+    np.testing.assert_allclose(found, person.motion.at(times)[0][:, nodes], atol=1e-9)
+    np.testing.assert_allclose(person.fit.keypoints.sum(axis=1), 1, atol=1e-6)
 
 
 @needs_anny

