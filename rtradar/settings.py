@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
+import numpy as np
+
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, check_number, check_order
 from rtradar.system.registries import DETECTORS, MODELS
@@ -197,20 +199,24 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         _check_noise(self.snr_db, self.noise_power_m2)
-        if not 0 < self.pfa < 1:
+        if not _is_number(self.pfa) or not 0 < self.pfa < 1:
             raise InputError(
-                f"pfa = {self.pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)"
+                f"pfa = {brief(self.pfa)}; a false-alarm rate is a number between 0 and 1, "
+                "both excluded (--pfa)"
             )
         MODELS.check(self.fidelity)
         DETECTORS.check(self.detector)
         check_seed("", self.seed)
         check_order(self.order)
         check_breathing("", self.breathing)
-        if self.path_tolerance_db == -math.inf:
+        tolerance_db = self.path_tolerance_db
+        if tolerance_db is not None and not _is_number(tolerance_db):
+            tolerance_db = math.nan
+        if tolerance_db == -math.inf:
             object.__setattr__(self, "path_tolerance_db", None)
-        elif self.path_tolerance_db is not None and not -MAX_SNR_DB <= self.path_tolerance_db <= 0:
+        elif tolerance_db is not None and not -MAX_SNR_DB <= tolerance_db <= 0:
             raise InputError(
-                f"path_tolerance_db = {self.path_tolerance_db}; it must lie within "
+                f"path_tolerance_db = {brief(self.path_tolerance_db)}; it must lie within "
                 f"{-MAX_SNR_DB:g} to 0 dB, or be -inf for exact ghosts (--path-tolerance-db)"
             )
         if self.snr_db == "physical" and not self.spreading:
@@ -247,20 +253,27 @@ def settings_of(caller: str, taken: type, options: Mapping[str, Any]) -> RunSett
     return RunSettings(**options)
 
 
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+
+
 def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
     if isinstance(snr_db, str):
         if snr_db != "physical":
             raise InputError(
                 f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)"
             )
-    elif not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
+    elif not _is_number(snr_db) or not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
         raise InputError(
-            f"snr_db = {snr_db}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf for no noise "
-            "(--snr-db)"
+            f"snr_db = {brief(snr_db)}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf for no "
+            "noise (--snr-db)"
         )
-    if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
+    if noise_power_m2 is not None and not (
+        _is_number(noise_power_m2) and 0 <= noise_power_m2 < math.inf
+    ):
         raise InputError(
-            f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0"
+            f"noise_power_m2 = {brief(noise_power_m2)}; it must be a number of square metres, "
+            "at least 0"
         )
 
 

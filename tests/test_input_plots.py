@@ -81,3 +81,15 @@ def test_a_motion_of_one_frame_is_drawn() -> None:
     axes = still.plot(ax=Figure().add_subplot())
     assert len(axes.collections) == 1
     axes.figure.draw_without_rendering()
+
+
+def test_axes_may_come_first_and_what_is_none_is_refused() -> None:
+    scene, radar = rt.Scene.load("free-space"), rt.Radar.preset("paper-12ghz")
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.5)
+    for plot in (scene.plot, radar.plot, motion.plot):
+        given = Figure().add_subplot()
+        assert plot(given) is given
+        with pytest.raises(rt.InputError, match="ax = 3; it must be axes"):
+            plot(ax=3)  # type: ignore[arg-type]
+    with pytest.raises(rt.InputError, match="radar = 'x'; it must be a Radar"):
+        scene.plot("x")  # type: ignore[arg-type]

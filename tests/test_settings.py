@@ -26,6 +26,10 @@ def test_the_options_of_run_are_the_fields_of_its_settings() -> None:
         ({"noise_power_m2": math.inf}, "noise_power_m2 = inf"),
         ({"breathing": (3, 0.25)}, "breathing = .*give rt.Breathing"),
         ({"pfa": 0.0}, "pfa = 0"),
+        ({"pfa": "1e-3"}, "pfa = '1e-3'; a false-alarm rate is a number"),
+        ({"snr_db": [3]}, r"snr_db = \[3\]"),
+        ({"noise_power_m2": "a"}, "noise_power_m2 = 'a'"),
+        ({"path_tolerance_db": "-35"}, "path_tolerance_db = '-35'; it must lie"),
         ({"seed": 0.5}, "seed = 0.5"),
     ],
 )

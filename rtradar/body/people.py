@@ -137,9 +137,21 @@ class Bodies(Body):
         The people, each with a motion that begins at 0.
     duration_s : float, optional
         Time for which the set is asked [s]; that of the shortest motion if left out.
+
+    Raises
+    ------
+    InputError
+        Where there is nobody, or one is no `Body`.
     """
 
     def __init__(self, people: Sequence[Body], duration_s: float | None = None) -> None:
+        given: object = people
+        listed = isinstance(given, Sequence) and all(isinstance(one, Body) for one in given)
+        if not listed or not people:
+            raise InputError(
+                f"Bodies: people = {brief(given)}; it must be a list of one Body or more, "
+                "such as Body.from_motion gives"
+            )
         names = distinct_names([person.motion.name for person in people])
         sizes = [len(person.part_names) for person in people]
         shortest = min(person.duration_s for person in people)

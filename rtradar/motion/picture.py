@@ -16,6 +16,7 @@ from rtradar.motion.motion import Motion
 from rtradar.system.figure_style import (
     LIGHT,
     STYLE,
+    axes_given,
     dress,
     figure_for,
     new_figure,
@@ -30,6 +31,7 @@ _POSES, _PATH_POSES = 6, 400
 
 def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     """Draw a motion from the side, and from above unless axes are given, as `Motion.plot` does."""
+    _, ax = axes_given(None, ax)
     _, path = poses(motion, _PATH_POSES)
     joints = path.reshape(-1, 3)
     span = np.ptp(joints, axis=0)

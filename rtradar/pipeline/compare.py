@@ -136,7 +136,9 @@ def compare(
         results: dict[str, Result] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = run_into(folder / name, motion, radar, scene or Scene(), own)
+            results[name] = run_into(
+                folder / name, motion, radar, Scene() if scene is None else scene, own
+            )
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, radar, names[-1])

@@ -31,6 +31,7 @@ from rtradar.scatter.world import World, build_world, model_of_people
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
+from rtradar.system.checks import brief
 
 Moving = Motion | Person | Sequence[Motion | Person | Object]
 """Who and what moves: one or several, with a bare motion for a person where the scene puts them."""
@@ -41,6 +42,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
 
     Errors are those of `rtradar.run`.
     """
+    check_radar(radar)
     scene, everyone = people_in(scene, moving)
     reuse_freed_memory()
     processing = Processing.of(radar, settings)
@@ -106,11 +108,24 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     )
 
 
+def check_radar(radar: object) -> None:
+    """Raise InputError unless this is a radar."""
+    if not isinstance(radar, Radar):
+        raise InputError(
+            f"radar = {brief(radar)}; it must be a Radar, such as rt.Radar.preset('paper-12ghz')"
+        )
+
+
 def people_in(scene: Scene, given: Moving) -> tuple[Scene, tuple[Person, ...]]:
     """Return a scene with the objects that are given, and everyone in it: the scene's come last.
 
-    A bare motion is a person where the scene puts them. InputError if there is nobody.
+    A bare motion is a person where the scene puts them. InputError if there is nobody, or the scene
+    is none.
     """
+    if not isinstance(scene, Scene):
+        raise InputError(
+            f"scene = {brief(scene)}; it must be a Scene, such as rt.Scene.load('living-room')"
+        )
     several = given if isinstance(given, Sequence) else (given,)
     objects = tuple(one for one in several if isinstance(one, Object))
     if objects:

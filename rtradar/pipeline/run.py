@@ -16,7 +16,7 @@ from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
-from rtradar.pipeline.prepare import Moving, people_in, prepare
+from rtradar.pipeline.prepare import Moving, check_radar, people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.sources import Sources
@@ -91,8 +91,10 @@ def run(
     """
     settings = settings_of("run", RunOptions, options)
     if out is None:
-        return _run_in_memory(motion, radar, scene or Scene(), settings)
-    return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite, pictures)
+        return _run_in_memory(motion, radar, Scene() if scene is None else scene, settings)
+    return run_into(
+        Path(out), motion, radar, Scene() if scene is None else scene, settings, overwrite, pictures
+    )
 
 
 def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
@@ -101,6 +103,7 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
+    check_radar(radar)
     refuse_large_maps(people_in(scene, motion)[1], radar, settings)
     started, rays_before = _start()
     capture = prepare(motion, radar, scene, settings)

@@ -62,7 +62,7 @@ def simulate(
     2400
     """
     settings = settings_of("simulate", SimulationOptions, options)
-    return Simulation(prepare(motion, radar, scene or Scene(), settings))
+    return Simulation(prepare(motion, radar, Scene() if scene is None else scene, settings))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,11 +10,19 @@ from matplotlib.patches import Rectangle
 
 from rtradar.radar.display import limit_rows, measured_angles
 from rtradar.radar.radar import Radar
-from rtradar.system.figure_style import STYLE, dress, figure_for, theme_of, write_heading
+from rtradar.system.figure_style import (
+    STYLE,
+    axes_given,
+    dress,
+    figure_for,
+    theme_of,
+    write_heading,
+)
 
 
 def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
     """Draw the array of a radar, and beside it the limits, as `Radar.plot` does."""
+    _, ax = axes_given(None, ax)
     if ax is not None:
         _draw_array(radar, ax, f"{radar.name}: array, seen from behind")
         return ax

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -24,6 +25,7 @@ from rtradar.system.checks import Vector, brief, check_keys, check_number, check
 
 Array: TypeAlias = NDArray[np.float64]
 
+_LEAST_AXIS = 1e-9
 MOST_WAY_POINTS = 10_000
 MOTION_LIMITS: Limits = {
     "rate_hz": (-1000.0, 1000.0),
@@ -71,7 +73,7 @@ class _AboutAxis(RigidMotion, ABC):
     def __post_init__(self) -> None:
         where = f"motion {type(self).__name__}"
         axis = check_vector(where, "axis", self.axis, 3)
-        if not any(axis):
+        if np.linalg.norm(axis) < _LEAST_AXIS:
             raise InputError(f"{where}: axis = {brief(self.axis)}; it must have a direction")
         object.__setattr__(self, "axis", axis)
         for key, limits in MOTION_LIMITS.items():
@@ -289,6 +291,11 @@ class Object(Furniture):
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
             object.__setattr__(self, "material", material(self.material))
+        if not (self._is_mesh or isinstance(self.mesh, str | Path)):
+            raise InputError(
+                f"object {brief(self.name)}: mesh = {brief(self.mesh)}; it must be a name, a file, "
+                "or a trimesh.Trimesh"
+            )
         super().__post_init__()
         pivot = check_vector(self._where, "pivot_m", self.pivot_m, 3)
         object.__setattr__(self, "pivot_m", pivot)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rtradar.errors import InputError
 from rtradar.settings import Breathing
@@ -36,7 +36,8 @@ _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 
 def checked(where: str, people: Iterable[Person]) -> tuple[Person, ...]:
     """Return the people of a scene as a tuple; InputError if one is none."""
-    found = tuple(people)
+    given: object = people
+    found: tuple[Any, ...] = tuple(people) if isinstance(given, Iterable) else (None,)
     if found:
         from rtradar.body import Person  # which takes long to import
 
@@ -92,12 +93,12 @@ def people_of(table: Table, folder: Path) -> tuple[Person, ...]:
 def _motion(entry: Table, folder: Path) -> Motion:
     from rtradar.motion import load_motion, synthetic_motion  # which takes long to import
 
-    name = check_text("people", "motion", entry["motion"])
+    name = check_text("person", "motion", entry["motion"])
     if name.startswith(SYNTHETIC):
         if "skeleton" in entry:
             raise InputError(f"{name}: a synthetic actor has its own skeleton; leave skeleton out")
         asked = entry.get("duration_s", _ACTOR_S)
-        duration_s = check_number("people", "duration_s", asked, 0.0, _LONGEST_S)
+        duration_s = check_number("person", "duration_s", asked, 0.0, _LONGEST_S)
         activity = name.removeprefix(SYNTHETIC)
         return synthetic_motion(activity, seed=entry.get("seed", 0), duration_s=duration_s)
     for key in _OF_ACTORS:

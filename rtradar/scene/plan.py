@@ -11,12 +11,21 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene.objects import Wall
 from rtradar.scene.scene import Scene
-from rtradar.system.checks import printable
+from rtradar.system.checks import brief, printable
 from rtradar.system.figure_labels import Label, around, place_labels
-from rtradar.system.figure_style import STYLE, dress, figure_for, new_figure, png_of, theme_of
+from rtradar.system.figure_style import (
+    STYLE,
+    axes_given,
+    dress,
+    figure_for,
+    new_figure,
+    png_of,
+    theme_of,
+)
 
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
@@ -69,8 +78,11 @@ def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     return left
 
 
-def plot_scene(scene: Scene, radar: Radar | None, ax: Axes | None) -> Axes:
+def plot_scene(scene: Scene, radar: Radar | Axes | None, ax: Axes | None) -> Axes:
     """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
+    radar, ax = axes_given(radar, ax)
+    if not isinstance(radar, Radar | None):
+        raise InputError(f"plot: radar = {brief(radar)}; it must be a Radar, such as a preset")
     (x, y), limits = _place_and_limits(scene, radar)
     axes = figure_for(height_of_plan(limits)).add_subplot() if ax is None else ax
     theme = theme_of(axes)

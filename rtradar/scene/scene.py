@@ -199,13 +199,14 @@ class Scene:
             raise InputError(f"scene file '{path}': {error}") from None
         return scene
 
-    def plot(self, radar: Radar | None = None, ax: Axes | None = None) -> Axes:
+    def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the plan: walls with their materials, furniture, reflectors, radar and person.
 
         Parameters
         ----------
         radar : Radar, optional
-            Radar that is drawn where the scene has no place for one; by default the paper's.
+            Radar that is drawn where the scene has no place for one; by default the paper's. Axes
+            may come in its place.
         ax : Axes, optional
             Axes of Matplotlib to draw on; by default those of a new figure.
 

@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from rtradar.errors import InputError
+from rtradar.system.checks import brief
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -165,6 +168,22 @@ def figure_for(height_in: float) -> Figure:
     import matplotlib.pyplot as plt
 
     return plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+
+
+def axes_given(first: Any, ax: Any) -> tuple[Any, Axes | None]:
+    """Return the first argument of a plot and its axes, which may be the first argument alone.
+
+    InputError if they are no axes of Matplotlib.
+    """
+    from matplotlib.axes import Axes  # slow to import
+
+    if isinstance(first, Axes) and ax is None:
+        return None, first
+    if not isinstance(ax, Axes | None):
+        raise InputError(
+            f"plot: ax = {brief(ax)}; it must be axes of Matplotlib, such as plt.gca() gives"
+        )
+    return first, ax
 
 
 def write_heading(figure: Any, title: str) -> None:

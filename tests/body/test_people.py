@@ -92,6 +92,12 @@ def test_a_person_without_meaning_is_refused(options: dict, message: str) -> Non
         rt.Person(WALK, **options)
 
 
+@pytest.mark.parametrize("people", [[], None, [WALK]])
+def test_bodies_are_of_bodies(people: object) -> None:
+    with pytest.raises(InputError, match="a list of one Body or more"):
+        Bodies(people)  # type: ignore[arg-type]
+
+
 def test_what_is_no_motion_is_refused() -> None:
     with pytest.raises(InputError, match="Person: motion is a str"):
         rt.Person("walk")  # type: ignore[arg-type]

@@ -148,6 +148,15 @@ def test_bad_values_are_refused_and_leave_nothing(
     assert not (tmp_path / "out").exists()
 
 
+def test_what_is_no_radar_and_no_scene_is_refused(kick: rt.Motion, small: rt.Radar) -> None:
+    for wrong in ("paper-12ghz", None):
+        with pytest.raises(InputError, match=r"radar = .*rt.Radar.preset"):
+            rt.run(kick, wrong)  # type: ignore[arg-type]
+    for other in ("living-room", ""):
+        with pytest.raises(InputError, match=r"scene = .*rt.Scene.load"):
+            rt.simulate(kick, small, other)  # type: ignore[arg-type]
+
+
 def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(
     kick: rt.Motion, small: rt.Radar, tmp_path: Path
 ) -> None:

@@ -134,8 +134,10 @@ def test_a_picture_is_drawn_on_the_axes_that_are_given(
 ) -> None:
     figure = new_figure(4.0)
     own = figure.add_subplot(projection="3d" if name == "rdt" else None)
-    assert getattr(plots_of(RADAR), name)(ax=own) is own
+    assert getattr(plots_of(RADAR), name)(own) is own
     assert [axes for axes in figure.axes if axes.get_label() != "<colorbar>"] == [own]
+    with pytest.raises(rt.InputError, match="ax = 'x'; it must be axes of Matplotlib"):
+        getattr(plots_of(RADAR), name)(ax="x")
 
 
 def test_a_notebook_shows_what_is_drawn_without_axes(plots_of: Callable[..., Plots]) -> None:

@@ -66,6 +66,8 @@ def test_a_mesh_in_memory_is_a_closed_body_or_a_sheet_by_itself() -> None:
     ("made", "message"),
     [
         (lambda: rt.Turning(axis=(0, 0, 0)), "it must have a direction"),
+        (lambda: rt.Turning(axis=(1e-300, 0, 0)), "it must have a direction"),
+        (lambda: rt.Object("a", [1], "metal"), r"mesh = \[1\]; .* or a trimesh.Trimesh"),
         (lambda: rt.Turning(rate_hz=np.inf), "rate_hz"),
         (lambda: rt.Swinging(period_s=0), "period_s"),
         (lambda: rt.FollowingPath(), "give velocity_mps, or points_m"),

@@ -157,7 +157,8 @@ def _checked(activity: str, traits: Traits) -> dict[str, Any]:
         value = chosen[name]
         if not (math.isfinite(value) and low <= value <= high) or value == 0:
             raise InputError(
-                f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}"
+                f"synthetic {activity}: {name} = {value}; allowed is "
+                f"{low:g}{'' if low else ', excluded,'} to {high:g}"
             )
     return chosen
 

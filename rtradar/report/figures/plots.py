@@ -34,7 +34,7 @@ from rtradar.report.figures.fitting import (
 )
 from rtradar.report.figures.maps import angle_label, angle_view, rdt_points, thinned
 from rtradar.system.checks import check_number
-from rtradar.system.figure_style import DIVERGING, dress, figure_for, theme_of
+from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,13 +85,14 @@ class Plots:
     summary: Mapping[str, Any]
     new_figure: Callable[[float], Figure] = field(default=figure_for)
 
-    def range_doppler(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+    def range_doppler(self, time_s: float | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the range-Doppler map of one frame, and its detections in a second panel beside it.
 
         Parameters
         ----------
         time_s : float, optional
-            Time of the frame [s]; the frame in which what moves has most energy if left out.
+            Time of the frame [s]; the frame in which what moves has most energy if left out. Axes
+            may come in its place.
         ax : Axes, optional
             Axes for the map alone.
 
@@ -100,7 +101,8 @@ class Plots:
         Axes
             Axes of the map.
         """
-        frame, when = self.frame(time_s)
+        when_s, ax = axes_given(time_s, ax)
+        frame, when = self.frame(when_s)
         map_, mask = self.maps["range_doppler"][frame], self.maps["detections"][frame].values > 0
         unit = self._unit(range_m=self.radar.range_m[:, None])
         level = unit.level(map_.values / self.radar.n_channels)
@@ -196,7 +198,7 @@ class Plots:
         add_colour_bar(image, [axes], unit.label("one channel"))
         return axes
 
-    def range_angle(self, time_s: float | None = None, ax: Axes | None = None) -> Axes:
+    def range_angle(self, time_s: float | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw power over range and each measured angle of one frame, in a panel for each.
 
         Parameters
@@ -216,12 +218,13 @@ class Plots:
         InputError
             If the radar measures no angle.
         """
+        when_s, ax = axes_given(time_s, ax)
         names = self._measured("range_angle")
         if ax is not None or len(names) == 1:
-            return self._range_angle(names[0], time_s, ax)
+            return self._range_angle(names[0], when_s, ax)
         upper, lower = self.new_figure(7.0).subplots(2, 1)
-        self._range_angle(names[0], time_s, upper)
-        self._range_angle(names[1], time_s, lower, heading=False)
+        self._range_angle(names[0], when_s, upper)
+        self._range_angle(names[1], when_s, lower, heading=False)
         return cast(Axes, upper)
 
     def rdt(self, ax: Axes | None = None) -> Axes:
@@ -242,6 +245,7 @@ class Plots:
         InputError
             If the axes have no z axis.
         """
+        _, ax = axes_given(None, ax)
         if ax is not None and ax.name != "3d":
             raise InputError("rdt: ax has no z axis; make it with projection='3d'")
         axes: Any = self._axes(ax, 4.7, projection="3d")
@@ -282,6 +286,7 @@ class Plots:
         InputError
             If the radar measures no angle.
         """
+        _, ax = axes_given(None, ax)
         ups = [1 if name == "azimuth" else 2 for name in self._measured("spatial")]
         cloud = self._strongest
         every = math.ceil(max(len(cloud.points), 1) / _DOTS)
@@ -397,6 +402,7 @@ class Plots:
         return f"x [m], from the distance to the array's line\n({other} is not measured)"
 
     def _axes(self, ax: Axes | None, height_in: float = 4.4, **options: Any) -> Axes:
+        _, ax = axes_given(None, ax)
         return self.new_figure(height_in).add_subplot(**options) if ax is None else ax
 
     def _unit(self, **options: Any) -> FieldUnit:
