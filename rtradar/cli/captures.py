@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
@@ -83,11 +84,13 @@ def add(commands: Subcommands) -> None:
     add_command(
         commands,
         "compare",
-        "simulate one recording by several models with the same noise, and show what differs",
+        "simulate one recording by several models with the same noise, or take folders of run and "
+        "process, and show what differs",
         _add_compare,
         (
             "rtradar compare synthetic:kick --out out/kick",
             "rtradar compare walk.bvh --fidelities analytic,specular,fresnel --out out/levels",
+            "rtradar compare out/measured out/simulated --out out/both",
         ),
     )
 
@@ -280,6 +283,8 @@ def _show(options: argparse.Namespace, page: str) -> None:
 
 
 def _compare(options: argparse.Namespace) -> int:
+    if any(map(os.path.isdir, options.motion)):
+        return _compare_folders(options)
     from rtradar.settings import check_fidelities
 
     fidelities = [name.strip() for name in options.fidelities.split(",")]
@@ -296,6 +301,20 @@ def _compare(options: argparse.Namespace) -> int:
         for name, figures in found.summary["fidelities"].items():
             details = figures["stages"], found.summary["versions"], figures["variant"]
             say(options, f"{name}:\n{_details(*details)}")
+    say(options, found.table())
+    _show(options, "compare.html")
+    return 0
+
+
+def _compare_folders(options: argparse.Namespace) -> int:
+    check_place(options.json)
+    if others := [name for name in options.motion if not os.path.isdir(name)]:
+        raise InputError(f"'{others[0]}' is no folder, and others are; give folders, or recordings")
+    from rtradar.pipeline.compare_folders import compare_folders
+
+    found = compare_folders(options.motion, out=options.out, overwrite=options.overwrite)
+    if options.json is not None:
+        write_json(options.json, found.summary)
     say(options, found.table())
     _show(options, "compare.html")
     return 0

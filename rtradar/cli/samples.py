@@ -140,7 +140,12 @@ def _process(options: argparse.Namespace) -> int:
 
     with lines_shown():
         found = process_samples(
-            samples, samples.radar, options.out, overwrite=options.overwrite, **settings
+            samples,
+            samples.radar,
+            options.out,
+            overwrite=options.overwrite,
+            unit=samples.unit,
+            **settings,
         )
     tell(options, found.summary)
     return 0

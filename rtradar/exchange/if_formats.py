@@ -112,7 +112,7 @@ def _rows(
         return complex_of_real(block) if real else block.astype(np.complex64)
 
     size = (shape[0] * tx, shape[-2], shape[-1] // 2 if real else shape[-1])
-    return SampleFile(path, radar_of(text) if text else None, size, rows)
+    return SampleFile(path, radar_of(text) if text else None, size, rows, "m" if text else "count")
 
 
 def _put(place: Any, name: str, values: ArrayLike) -> None:

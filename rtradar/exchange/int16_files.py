@@ -129,11 +129,11 @@ def open_int16(
         raise ValueError(f"scale is {scale:g}")
     if layout is None:
         return _open_plain(path, radar, scale, tuple(map(int, about["shape"])))
-    own, size = of_radar(layout, radar), path.stat().st_size
+    own, n_bytes = of_radar(layout, radar), path.stat().st_size
     row = 2 * words_of(own, radar)
-    chirps, odd = divmod(size, row)
+    chirps, odd = divmod(n_bytes, row)
     if odd or not chirps:
-        raise InputError(_of_another_size(path, radar, own, size))
+        raise InputError(_of_another_size(path, radar, own, n_bytes))
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
         words = _words(path, first * row, (last - first) * row // 2)
@@ -142,7 +142,8 @@ def open_int16(
             return complex_of_real(parts[..., 0])
         return parts.astype(np.float32).view(np.complex64)[..., 0]
 
-    return SampleFile(path, radar, (chirps, radar.n_rx, radar.samples_per_chirp), read)
+    size = (chirps, radar.n_rx, radar.samples_per_chirp)
+    return SampleFile(path, radar, size, read, "m" if about else "count")
 
 
 def _open_plain(path: Path, radar: Radar, scale: float, shape: tuple[int, ...]) -> SampleFile:

@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,6 +80,8 @@ class SampleFile:
         Length of the axes (chirp, rx, sample).
     read : callable
         Reads the chirps from a first one until before a last one, (chirp, rx, sample) complex64.
+    unit : {"m", "count"}
+        Unit of the samples; ``count``, the numbers of an ADC, where the file does not tell.
 
     Raises
     ------
@@ -91,6 +93,7 @@ class SampleFile:
     radar: Radar | None
     shape: tuple[int, int, int]
     read: Callable[[int, int], NDArray[np.complex64]]
+    unit: Literal["m", "count"] = "m"
     dtype = np.dtype(np.complex64)
     ndim = 3
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,7 +32,7 @@ from rtradar.scene import Scene
 from rtradar.settings import RunOptions, check_fidelities, settings_of
 from rtradar.system.output_folder import atomic_folder
 
-_MEASURES = (
+MEASURES = (
     # key, heading, digits
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
@@ -71,14 +72,17 @@ class Comparison:
         Contents of ``compare.json``.
     out : path
         Folder of the files; the run of each model is in a folder of its name.
+    measures : tuple
+        Key, heading and digits of each figure that is shown.
     """
 
     summary: dict[str, Any]
     out: Path
+    measures: tuple[tuple[str, str, int], ...] = MEASURES
 
     def table(self) -> str:
         """Return the figures as aligned text, one column for each model."""
-        rows = comparison_rows(self.summary)
+        rows = comparison_rows(self.summary, self.measures)
         first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
         return "\n".join(
             "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]) for row in rows
@@ -153,12 +157,14 @@ def compare(
     return Comparison(summary, Path(out))
 
 
-def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
+def comparison_rows(
+    summary: Mapping[str, Any], measures: Sequence[tuple[str, str, int]] = MEASURES
+) -> list[list[str]]:
     """Return a comparison as text: a heading row, then a row a measure with a column a model."""
-    found = summary["fidelities"]
+    found = summary["fidelities"] if "fidelities" in summary else summary["folders"]
     headings = [f"{name} (reference)" if name == summary["reference"] else name for name in found]
     rows = [["", *headings]]
-    for key, heading, digits in _MEASURES:
+    for key, heading, digits in measures:
         values = [figures[key] for figures in found.values()]
         texts = ("-" if value is None else f"{value:.{digits}f}" for value in values)
         rows.append([heading, *texts])
@@ -183,7 +189,7 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
     power = _total_db(result) - _total_db(reference)
-    maps, overlap, spectrogram = _map_agreement(_maps_of(result), _maps_of(reference))
+    maps, overlap, spectrogram = map_agreement(_maps_of(result), _maps_of(reference))
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     hidden = _budget(result).hidden_at
     of_parts = hidden.mean(axis=0).tolist()
@@ -327,21 +333,34 @@ def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: A
     return float(there.mean() + back.mean()) / 2
 
 
-def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, LevelAgreement]:
-    """Compare range-Doppler maps over cells that either detects, detections, and spectrograms."""
+def map_agreement(
+    ours: Path, reference: Path, *, gain: bool = False
+) -> tuple[LevelAgreement, float, LevelAgreement]:
+    """Compare range-Doppler maps over cells that either detects, detections, and spectrograms.
+
+    Of captures of other lengths the frames at the start count. With a ``gain`` between both, root
+    mean squares are about the mean difference.
+    """
     with h5py.File(ours) as first, h5py.File(reference) as second:
         cells, both, either = [], 0, 0
-        for frame in range(len(first["time"])):
+        for frame in range(min(len(maps["time"]) for maps in (first, second))):
             mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))
             union = mask | other
             both, either = both + int((mask & other).sum()), either + int(union.sum())
             cells.append([maps["range_doppler"][frame][union] for maps in (first, second)])
         power, its_power = (np.concatenate(column) for column in zip(*cells, strict=True))
         levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
+        columns = min(len(maps["spectrogram_time"]) for maps in (first, second))
         spectrogram, its = (
-            thinned(maps["spectrogram"], maps["spectrogram_time"][:])[0] for maps in (first, second)
+            thinned(maps["spectrogram"][:columns], maps["spectrogram_time"][:columns])[0]
+            for maps in (first, second)
         )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
+        if gain:
+            levels, alike = (
+                one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
+                for one in (levels, alike)
+            )
         return levels, both / either if either else 1.0, alike
 
 

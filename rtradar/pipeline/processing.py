@@ -73,7 +73,8 @@ class Processing:
     """How range spectra of one capture are processed, with the radar at its position in the scene.
 
     ``detect`` marks the cells of a frame, ``removal`` removes static clutter before Doppler,
-    ``seed`` is that of the sampling of clouds, and ``stages`` record the time.
+    ``seed`` is that of the sampling of clouds, ``stages`` record the time, and ``unit`` is that of
+    the samples.
     """
 
     radar: Radar
@@ -82,6 +83,7 @@ class Processing:
     window_functions: WindowFunctions = DEFAULT_WINDOWS
     seed: int = 0
     stages: Stages = field(default_factory=Stages)
+    unit: str = "m"
 
     @classmethod
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, Protocol, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.settings import ProcessingOptions, RunSettings, settings_of
 from rtradar.signal.multiplexing import chirps_together
+from rtradar.system.checks import brief
 from rtradar.system.output_folder import atomic_folder
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ def process_samples(
     out: str | Path | None = None,
     *,
     overwrite: bool = False,
+    unit: Literal["m", "count"] = "m",
     **options: Unpack[ProcessingOptions],
 ) -> Result:
     """Process IF samples, simulated or measured, as `run` does: maps, detections, angles, clouds.
@@ -70,14 +73,16 @@ def process_samples(
         are needed, such as one of Zarr. Frames of whole cycles, (cycle, tx, rx, sample), will do as
         well, and so will blocks of any length, one after another. Precision is single
         inside. Chirps after the last whole cycle are left out. Under Doppler division a chirp is a
-        whole cycle. Powers of the maps are in the square of the samples' unit, which is m where
-        pictures are to show cross-sections.
+        whole cycle.
     radar : Radar
         Radar that has received the samples, at its position.
     out : path, optional
         Folder for maps, clouds, pictures, report and summary; as for `run`.
     overwrite : bool
         Whether files of others in ``out`` are replaced; as for `run`.
+    unit : {"m", "count"}
+        Unit of the samples. Powers of the maps are in its square; pictures show cross-sections of
+        samples in metres, and levels of those that are the numbers of an ADC.
     **options
         Settings of the processing, such as ``pfa`` or ``clutter_removal``: fields of
         `rtradar.RunSettings`.
@@ -109,7 +114,9 @@ def process_samples(
     forget_peak_memory()
     started = time.perf_counter()
     blocks = _Blocks(samples, radar, in_memory=out is None)
-    processing = Processing.of(radar, settings)
+    if unit not in ("m", "count"):
+        raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
+    processing = replace(Processing.of(radar, settings), unit=unit)
     maps = None
     if out is None:
         file = BytesIO()

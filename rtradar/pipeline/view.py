@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -100,12 +101,7 @@ def load_run_view(folder: Path) -> RunView:
 
     InputError if one of them is missing or damaged, or they are not of one run.
     """
-    if not os.path.isfile(folder / "summary.json"):
-        raise InputError(
-            f"'{folder}' holds no run (there is no summary.json); give the folder that "
-            "'rtradar run --out' named"
-        )
-    return run_view_of(folder, *_summary(folder / "summary.json"))
+    return run_view_of(folder, *run_summary(folder))
 
 
 def run_view_of(
@@ -116,28 +112,18 @@ def run_view_of(
     InputError as in `load_run_view`.
     """
     snapshots = load_snapshots(folder / "view.npz")
-    rdt = _archive(folder / "cloud_rdt.npz", ("points",))
+    points = run_points(folder)
     columns = ("points", "velocity", "power", "time")
     spatial = _archive(folder / "cloud_xyz.npz", columns, ("points",), ("source",))
     try:
         cloud = SpatialCloud(**spatial)
     except (InputError, TypeError) as error:
         raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
-    path = folder / "maps.h5"
-    try:
-        with open_regular(path) as raw, h5py.File(raw) as file:
-            maps = _maps(file)
-            if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
-                raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
-            points = rdt["points"].reshape(-1, 3)
-            return assembled(maps, snapshots, points, cloud, radar, summary, windows)
-    except InputError:
-        raise
-    except _DAMAGE as error:
-        why: str | None = "is damaged, or of another kind"
-        if isinstance(error, FileNotFoundError):
-            why = error.strerror
-        raise InputError(f"'{path}': {why}; {_MEND}") from None
+    with run_maps(folder) as file:
+        maps = _maps(file)
+        if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
+            raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
+        return assembled(maps, snapshots, points, cloud, radar, summary, windows)
 
 
 def assembled(
@@ -171,7 +157,14 @@ def assembled(
     )
 
 
-def _summary(path: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
+def run_summary(folder: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
+    """Read the summary of a folder, its radar and window functions; InputError if there is none."""
+    path = folder / "summary.json"
+    if not os.path.isfile(path):
+        raise InputError(
+            f"'{folder}' holds no run (there is no summary.json); give the folder that "
+            "'rtradar run --out' named"
+        )
     try:
         summary = read_json(path)
         parameters = summary["parameters"]
@@ -182,6 +175,28 @@ def _summary(path: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
         raise InputError(f"'{path}': {error}; {_MEND}") from None
     except _DAMAGE:
         raise InputError(f"'{path}' is damaged; {_MEND}") from None
+
+
+def run_points(folder: Path) -> NDArray[np.float64]:
+    """Read the RDT cloud (point, 3) of a folder; InputError if it is missing or damaged."""
+    points: NDArray[np.float64] = _archive(folder / "cloud_rdt.npz", ("points",))["points"]
+    return points.reshape(-1, 3)
+
+
+@contextmanager
+def run_maps(folder: Path) -> Iterator[h5py.File]:
+    """Open the maps of a folder; InputError if they are missing or damaged."""
+    path = folder / "maps.h5"
+    try:
+        with open_regular(path) as raw, h5py.File(raw) as file:
+            yield file
+    except InputError:
+        raise
+    except _DAMAGE as error:
+        why: str | None = "is damaged, or of another kind"
+        if isinstance(error, FileNotFoundError):
+            why = error.strerror
+        raise InputError(f"'{path}': {why}; {_MEND}") from None
 
 
 def _line(value: Any) -> str:

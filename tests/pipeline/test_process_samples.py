@@ -165,6 +165,16 @@ def test_maps_too_large_for_memory_are_refused(
             rt.process_samples(given, small)
 
 
+def test_numbers_of_an_adc_are_shown_as_such(small: rt.Radar, samples: xr.DataArray) -> None:
+    result = rt.process_samples(samples * 1e6, small, unit="count")
+    assert result.maps["range_doppler"].attrs["units"] == "count2"
+    assert result.summary["parameters"]["unit"] == "count"
+    bar = result.plot.range_doppler().figure.axes[-1]
+    assert bar.get_ylabel() == "Power, mean of channels [dB re 1 count^2]"
+    with pytest.raises(InputError, match="unit = 'V'; it must be m, or count"):
+        rt.process_samples(samples, small, unit="V")  # type: ignore[arg-type]
+
+
 def test_noise_alone_gives_empty_clouds_and_says_so(small: rt.Radar) -> None:
     noise = np.random.default_rng(0).standard_normal((600, 4, 256)).view(np.complex128)
     with pytest.warns(ValidityWarning, match="nothing was detected"):

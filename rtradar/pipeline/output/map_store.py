@@ -83,7 +83,7 @@ class MapStore:
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
     becomes an attribute of their datasets, ``attributes`` those of the file. The maps ``left_out``
-    are not made.
+    are not made. ``unit`` is that of the samples, whose square is that of powers.
     """
 
     def __init__(
@@ -93,9 +93,10 @@ class MapStore:
         attributes: Mapping[str, Any],
         clutter_removal: Mapping[str, str] | None = None,
         left_out: Collection[str] = (),
+        unit: str = "m",
     ) -> None:
         # The newest format indexes growing data in constant memory.
-        self._owned = isinstance(file, Path)
+        self._owned, self._unit = isinstance(file, Path), unit
         self._raw = LastingFile(file.open("w+b") if isinstance(file, Path) else file)
         self._file = h5py.File(self._raw, "w", libver="latest")
         self._file.attrs.update(attributes)
@@ -124,7 +125,8 @@ class MapStore:
         axis.attrs["units"], axis.attrs["long_name"] = _AXES[name]
 
     def _describe(self, data: Any, kind: _Map, **attributes: Any) -> None:
-        data.attrs.update({"units": kind.unit, "long_name": kind.meaning, **attributes})
+        unit = f"{self._unit}2" if kind.unit == "m2" else kind.unit
+        data.attrs.update({"units": unit, "long_name": kind.meaning, **attributes})
         for number, axis in enumerate(kind.axes):
             data.dims[number].attach_scale(self._file[axis])
 

@@ -132,7 +132,8 @@ def summary_of_samples(
     of_processing = {key: value for key, value in settings.parameters().items() if key in names}
     capture_s = n_chirps * radar.chirp_interval_s
     return {
-        "parameters": of_processing | {"duration_s": capture_s, "radar": dataclasses.asdict(radar)},
+        "parameters": of_processing
+        | {"duration_s": capture_s, "unit": processing.unit, "radar": dataclasses.asdict(radar)},
         "seed": settings.seed,
         "versions": {"python": platform.python_version(), **_versions()},
         **cost(processing, n_chirps, started_s),

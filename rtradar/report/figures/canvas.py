@@ -2,7 +2,7 @@
 
 Maps hold abs(amplitude)^2 [m^2] including the spreading loss 1 / (R1^2 R2^2)
 (`rtradar.conventions`). Read as a cross-section, a person of 1 m^2 at 4 m would be 24 dB too low.
-Pictures therefore use one of three units:
+Pictures therefore use one of these units:
 
 ``dBm``
     Received power, if the radar states its transmit power.
@@ -17,6 +17,8 @@ Pictures therefore use one of three units:
     body parts, which have no single loss to remove. If the loss were removed before the sum, the
     noise of the farthest bins would dominate and hide the person. A level above the noise would
     have no meaning in runs without noise.
+``dB re 1 count^2``
+    The power itself, of samples that are the numbers of an ADC.
 """
 
 from __future__ import annotations
@@ -36,7 +38,10 @@ from rtradar.system.figure_style import STYLE, dress, fit, theme_of
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
 
-_QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power"}
+COUNTS = "dB re 1 count^2"
+"""Unit of the power of samples that are the numbers of an ADC."""
+
+_QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power", COUNTS: "Power"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +75,17 @@ def field_unit(
     spreading: bool = True,
     range_m: ArrayLike | None = None,
     strongest_m2: float = 1.0,
+    relative: bool = False,
 ) -> FieldUnit:
     """Choose the unit of power in the pictures of a run, as this module's docstring explains.
 
     ``spreading`` tells whether amplitudes include the spreading loss. ``range_m`` are the ranges of
     the powers [m], of a shape that broadcasts with them, or None for sums over ranges.
-    ``strongest_m2`` is the reference of ``dB re maximum`` [m^2].
+    ``strongest_m2`` is the reference of ``dB re maximum`` [m^2], which is taken always if
+    ``relative``.
     """
+    if relative:
+        return FieldUnit("dB re maximum", 1 / max(strongest_m2, float(np.finfo(np.float32).tiny)))
     if not spreading:
         return FieldUnit("dBsm", 1.0)
     if radar.transmit_power_dbm is not None:

@@ -19,6 +19,7 @@ from rtradar.errors import InputError
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import (
+    COUNTS,
     VELOCITY_LABEL,
     FieldUnit,
     add_colour_bar,
@@ -117,7 +118,9 @@ class Plots:
             left, right = ax, None
         image, colours = draw_view(left, level, velocity, distance, view, unit=unit)
         left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
-        note = f"{colours} {masking_note(map_.values, mask)}"
+        note = colours
+        if self._parameters.get("detector") != "ti-oob":  # which leaves out what is no peak
+            note += f" {masking_note(map_.values, mask)}"
         what = "Range-Doppler map"
         what += f" and {np.count_nonzero(mask)} detections" if right is not None else ""
         title = self._title(f"{what},\n{when}", map_)
@@ -406,6 +409,8 @@ class Plots:
         return self.new_figure(height_in).add_subplot(**options) if ax is None else ax
 
     def _unit(self, **options: Any) -> FieldUnit:
+        if self.maps["range_doppler"].attrs.get("units", "m2") != "m2":
+            return FieldUnit(COUNTS, 1.0)
         return field_unit(self.radar, spreading=self._parameters.get("spreading", True), **options)
 
     def _title(self, what: str, data: xr.DataArray) -> str:

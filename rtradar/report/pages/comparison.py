@@ -35,6 +35,10 @@ _NOTE = """<p class="note">Differences are to the reference, {}. Maps are compar
 range-Doppler in the cells that either model detects, spectrograms in the cells 10 dB above the
 median of either. All models have the same noise, sample by sample. Echo power is of one chirp every
 10 ms, each from another Tx, which makes it saw.</p>"""
+_FOLDER_NOTE = """<p class="note">Differences are to the reference, {}, frame by frame from the
+start of both. Maps are compared in decibels: range-Doppler in the cells that either detects,
+spectrograms in the cells 10 dB above the median of either. Where the units of the samples differ,
+the mean difference is the factor between both, and root mean squares are about it.</p>"""
 _MAP_NOTE = """<p class="note">All maps have the same axes and colours. A difference is in decibels,
 the model less the reference, {}: red where the model is stronger. Below the floor of the colours
 nothing differs. The pointer shows range, velocity and level. Each model has a folder with its own
@@ -186,6 +190,40 @@ def write_comparison(
         ),
         data=comparison_data(views),
         scripts=("plots.js", "figure.js", "compare.js"),
+    )
+
+
+def write_folders(
+    path: Path,
+    summary: Mapping[str, Any],
+    rows: Sequence[Sequence[str]],
+    pictures: Mapping[str, Path],
+) -> None:
+    """Write a comparison of folders as a page: what `write_comparison` writes, but for models."""
+    folders, reference = summary["folders"], escape(summary["reference"])
+    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
+    settings = "".join(
+        f"<h3>{escape(name)}</h3>"
+        + _wide(mapping_table({k: v for k, v in found["parameters"].items() if k != "radar"}))
+        for name, found in folders.items()
+    )
+    sections = {
+        "measures": (
+            "What differs",
+            _wide(table(rows[1:], rows[0])) + _FOLDER_NOTE.format(reference),
+        ),
+        "maps": ("Pictures", f'<div class="pictures">{drawn}</div>'),
+        "parameters": ("Settings", settings),
+    }
+    radar = folders[summary["reference"]]["parameters"]["radar"]["name"]
+    write_page(
+        path,
+        Titles("rtradar compare", " and ".join(folders), str(radar)),
+        contents({name: title for name, (title, _) in sections.items()}),
+        (
+            f'<section id="{name}"><h2>{escape(title)}</h2>{text}</section>\n'
+            for name, (title, text) in sections.items()
+        ),
     )
 
 

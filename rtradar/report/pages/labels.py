@@ -42,6 +42,7 @@ _LABELS = {
     "detector_options": "Options of the detector",
     "range_window": "Window function over range",
     "doppler_window": "Window function over velocity",
+    "unit": "Unit of the samples",
     "noise_power_given_m2": "Noise power given",
     # radar
     "name": "Name",
