@@ -123,7 +123,7 @@ def spatial_points(
     spectra : AngleSpectra
         Angle spectra of the detected cells.
     radar : Radar
-        Radar whose axes are parallel to the world axes.
+        Radar at its position, turned as it is.
     time_s : float
         Centre of the frame [s].
     source : (cell,) int64, optional
@@ -144,7 +144,7 @@ def spatial_points(
         if power is None:
             direction[:, axis] = np.nan
     return SpatialCloud(
-        np.asarray(radar.position_m) + spectra.range_m[cell, None] * direction,
+        _in_world(spectra.range_m[cell, None] * direction, radar),
         spectra.velocity[cell],
         (y.power[cell, rank] + z.power[cell, rank]) / 2,
         np.full(len(cell), time_s),
@@ -186,12 +186,24 @@ def points_of_sines(
     direction = np.column_stack([np.sqrt(forward[kept]), sines[kept]])
     velocity = radar.velocity_mps(mask.shape[1])
     return SpatialCloud(
-        np.asarray(radar.position_m) + radar.range_m[row[kept], None] * direction,
+        _in_world(radar.range_m[row[kept], None] * direction, radar),
         velocity[column[kept]],
         power[row[kept], column[kept]] / radar.n_channels,
         np.full(int(kept.sum()), time_s),
         None if source is None else source[kept],
     )
+
+
+def _in_world(places: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
+    """World coordinates (n, 3) of places in the radar's axes.
+
+    What is not measured is NaN, but where other axes mix it into all coordinates it is taken as 0.
+    """
+    if not radar.is_turned:
+        return np.asarray(radar.position_m) + places
+    world = np.nan_to_num(places) @ radar.axes.T + np.asarray(radar.position_m)
+    missing = np.isnan(places).all(axis=0) & (np.abs(np.diag(radar.axes)) > 1 - 1e-12)
+    return np.where(missing, np.nan, world)
 
 
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:

@@ -25,6 +25,7 @@ from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget, link_budget
 from rtradar.scatter.multipath.room_model import RoomModel
+from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.validity import warn_of
 from rtradar.scatter.world import World, build_world, model_of_people
@@ -56,6 +57,8 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
                 radar = scene.place(radar)
                 processing = replace(processing, radar=radar)
             n_chirps, frame_starts = _frames(radar, body)
+            placed, in_world = scene, body
+            radar, body, scene = in_radar_axes(radar, body, scene)
             warm_up_start = time.perf_counter()
             model = _echo_model(radar, body, scene, settings)
             chirps = np.arange(2 * radar.n_tx)
@@ -92,10 +95,10 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
                 tones = model.with_person(direct) if isinstance(model, World) else direct
     return Capture(
         people=everyone,
-        scene=scene,
+        scene=placed,
         settings=settings,
         processing=processing,
-        body=body,
+        body=in_world,
         model=model,
         tones=tones,
         inside=inside,

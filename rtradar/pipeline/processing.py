@@ -121,11 +121,6 @@ class Processing:
 def _refuse_unfinished(radar: Radar) -> None:
     """Refuse what a radar can say of itself before it is simulated."""
     unfinished = {
-        "tx_positions_m or rx_positions_m": not radar.is_cross,
-        "tx_order": radar.tx_order is not None,
-        "yaw_deg, pitch_deg or roll_deg": radar.is_turned,
-        "idle_s": radar.idle_s > 0,
-        "adc_start_s or adc_rate_hz": radar.sampled_duration_s != radar.chirp_duration_s,
         "frame_period_s": radar.in_frames,
         "multiplexing = 'bpm'": radar.multiplexing == "bpm",
     }

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.angles import add_interpolated, beam_power, highest_maxima
+from rtradar.process.beams import cuts_through_highest
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,
@@ -131,6 +132,13 @@ def angle_spectra(
     turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
     samples = cells.astype(np.complex64, copy=False)
     still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
+
+    if not radar.is_cross:
+        known_bins = bins if focus else None
+        cuts = cuts_through_highest(
+            samples * still[:, None], known_bins, radar, sine_grid(radar), range_walk(radar)
+        )
+        return AngleSpectra(sine_grid(radar), *cuts, ranges, rates)
 
     def power(axis: int) -> NDArray[np.float32] | None:
         line = lines[axis - 1]

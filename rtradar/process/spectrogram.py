@@ -238,7 +238,7 @@ def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
 
 def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDArray[np.float64]:
     """Middle of the windows from these cycles on (time,) [s]; they are even about window / 2."""
-    own = float(radar.tx_delay_s[tx]) + radar.chirp_duration_s / 2
+    own = float(radar.tx_delay_s[tx] + radar.chirp_times(1)[0])
     return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
 
 

@@ -29,6 +29,12 @@ _MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.4 
 _TAYLOR_EQUAL_LOBES = 4
 
 
+_NO_LINE = (
+    "angle: radar '{}' has no line of at least 2 channels; give a Tx and 2 Rx (or 2 Tx and an Rx) "
+    "along y or z"
+)
+
+
 @dataclass(frozen=True)
 class Line:
     """One virtual line: the channels whose Tx and Rx both lie on it, along world axis 1 or 2.
@@ -62,26 +68,27 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     """The y-line and the z-line; None where one has fewer than two elements, InputError for both.
 
     Channels of a Tx on one line and an Rx on the other, which ``channels = "all"`` has, belong to
-    neither.
+    neither. An array of antennas in lists has no lines; `beams` steers it.
     """
-    lines = _line(radar, 1), _line(radar, 2)
-    if lines == (None, None):
-        raise InputError(
-            f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx "
-            "(or 2 Tx and an Rx) along y or z"
-        )
+    if not any(radar.measures):
+        raise InputError(_NO_LINE.format(radar.name))
+    lines = (_line(radar, 1), _line(radar, 2)) if radar.is_cross else (None, None)
+    if lines == (None, None) and radar.is_cross:
+        raise InputError(_NO_LINE.format(radar.name))
     return lines
 
 
 def _line(radar: Radar, axis: int) -> Line | None:
-    tx_there, rx_there = np.arange(radar.n_tx) < radar.tx_y, np.arange(len(radar.rx)) < radar.rx_y
+    order = range(radar.n_tx) if radar.tx_order is None else radar.tx_order
+    tx_there, rx_there = np.array(order) < radar.tx_y, np.arange(len(radar.rx)) < radar.rx_y
     if axis == 2:
         tx_there, rx_there = ~tx_there, ~rx_there
     tx, slot = np.nonzero(tx_there[:, None] & rx_there[radar.rx_of_tx])
     if len(tx) < 2:
         return None
-    centre = radar.position_m[axis]
-    places = radar.tx[tx, axis] - centre, radar.rx[radar.rx_of_tx[tx, slot], axis] - centre
+    centre = 0.0 if radar.is_turned else radar.position_m[axis]
+    tx_m, rx_m = (radar.tx_m, radar.rx_m) if radar.is_turned else (radar.tx, radar.rx)
+    places = tx_m[tx, axis] - centre, rx_m[radar.rx_of_tx[tx, slot], axis] - centre
     return Line(axis, np.asarray(tx * radar.n_rx + slot, dtype=np.int64), *places)
 
 
@@ -93,9 +100,10 @@ def sine_grid(radar: Radar) -> NDArray[np.float64]:
     """
     largest = np.sin(np.radians(radar.max_angle_deg))
     lines = [line for line in virtual_lines(radar) if line is not None]
-    aperture = max(np.ptp(line.tx_m + line.rx_m) for line in lines) / radar.wavelength_m
+    places = [line.tx_m + line.rx_m for line in lines] or list(radar.virtual_m[:, 1:].T)
+    aperture = max(map(np.ptp, places)) / radar.wavelength_m
     half = int(np.ceil(_OVERSAMPLING * largest * aperture)) + 1
-    elements = max(len(line.channels) for line in lines)
+    elements = max(map(len, places))
     if (2 * half + 1) * elements * radar.samples_per_chirp > _MOST_WEIGHTS:
         raise InputError(
             f"angle: radar '{radar.name}' has a line {aperture:.3g} wavelengths long, whose beams "
@@ -123,6 +131,11 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
 def range_walk(radar: Radar) -> int:
     """Range bins on either side of a cell in which some elements receive its echo from the side."""
     lines = [line for line in virtual_lines(radar) if line is not None]
+    if not radar.is_cross:
+        farthest = (
+            np.linalg.norm(radar.tx_m, axis=1).max() + np.linalg.norm(radar.rx_m, axis=1).max()
+        )
+        return int(np.ceil(farthest / 2 / radar.range_bin_m))
     farthest = max(np.abs(line.tx_m + line.rx_m).max() for line in lines)
     return int(np.ceil(farthest * float(sine_grid(radar)[-1]) / 2 / radar.range_bin_m))
 

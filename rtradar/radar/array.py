@@ -92,6 +92,22 @@ class Array(Waveform):
         """Positions of the receivers (rx, 3) [m], world: the list, or the y- and the z-line."""
         return self._in_world(self.rx_m)
 
+    @cached_property
+    def tx_lines(self) -> list[NDArray[np.int64]]:
+        """Straight, evenly spaced lines of Tx, each as indices into `tx` from end to end."""
+        if self.tx_positions_m is not None:
+            return _runs(self.tx_m)
+        place = np.argsort(self._order)
+        return [line for line in (place[: self.tx_y], place[self.tx_y :]) if len(line)]
+
+    @cached_property
+    def rx_lines(self) -> list[NDArray[np.int64]]:
+        """Straight, evenly spaced lines of Rx, each as indices into `rx` from end to end."""
+        if self.rx_positions_m is not None:
+            return _runs(self.rx_m)
+        place = np.arange(self.rx_y + self.rx_z)
+        return [line for line in (place[: self.rx_y], place[self.rx_y :]) if len(line)]
+
     def _places(
         self, listed: Places | None, n_y: int, n_z: int, spacing_wavelengths: float
     ) -> NDArray[np.float64]:
@@ -209,6 +225,20 @@ class Array(Waveform):
     @property
     def _virtual_spacing_wavelengths(self) -> float:
         return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+
+
+def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:
+    """Antennas (antenna, 3) that follow each other in even steps, and those that stand alone."""
+    runs, begin = [], 0
+    while begin < len(places):
+        end = begin + 1
+        steps = np.diff(places[begin:], axis=0)
+        if len(steps) > 1 and np.allclose(steps[1], steps[0], rtol=1e-9, atol=1e-9):
+            uneven = np.abs(steps - steps[0]).max(axis=1) > 1e-9
+            end = begin + 1 + (int(uneven.argmax()) if uneven.any() else len(steps))
+        runs.append(np.arange(begin, end))
+        begin = end
+    return runs
 
 
 def rotation(yaw_deg: float, pitch_deg: float, roll_deg: float) -> NDArray[np.float64]:

@@ -90,8 +90,8 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    lines = {"azimuth": radar.tx_y * radar.rx_y, "elevation": radar.tx_z * radar.rx_z}
-    return tuple(name for name, channels in lines.items() if channels > 1)
+    names = zip(("azimuth", "elevation"), radar.measures, strict=True)
+    return tuple(name for name, measured in names if measured)
 
 
 def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:

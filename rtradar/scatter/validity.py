@@ -132,9 +132,11 @@ def folded_angle_deg(radar: Radar) -> float:
     """
     taking_turns = radar.tx_delay_s[-1] > 0
     on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
-    if not (taking_turns and on_a_line):
+    if not (taking_turns and (on_a_line or not radar.is_cross)):
         return 0.0
     spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
+    if radar.tx_positions_m is not None:
+        spacing_m = float(np.median(np.linalg.norm(np.diff(radar.tx_m, axis=0), axis=1)))
     return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
 
 

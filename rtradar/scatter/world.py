@@ -20,6 +20,7 @@ from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
+from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.rigid.legs import Past
 from rtradar.scatter.validity import Limit
@@ -122,6 +123,7 @@ def build_world(
     Without objects it is what `build_model` makes, whose parameters and errors these are. A level
     that traces nothing lets nothing occlude an object either.
     """
+    radar, body, scene = in_radar_axes(radar, body, scene)
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
     if not scene.objects:

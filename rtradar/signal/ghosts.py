@@ -94,7 +94,7 @@ class GhostIf:
         cycle, tx = chirps // radar.n_tx, radar.tx_of_chirp(chirps)
         first = self._first_anchor(cycle)
         weight = _cubic_weights(self.cycles[first[:, None] + np.arange(ANCHORS)], cycle)
-        carrier = radar.start_frequency_hz + radar.tx_offset_hz[tx]
+        carrier = radar.sampled_start_hz + radar.tx_offset_hz[tx]
         between = Between(first - self._first, weight, tx, carrier.astype(np.float64))
         sweep = Sweep(float(radar.slope_hz_per_s), float(radar.sample_rate_hz))
         add_anchored_tones(self._held, between, sweep, samples)

@@ -117,7 +117,7 @@ class RoomIf:
         if shadow:
             self._groups = [_coarser(group, radar) for group in self._groups]
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
-            frequency = radar.start_frequency_hz + radar.slope_hz_per_s * frequency
+            frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)
         self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 

@@ -147,7 +147,7 @@ def _tones(
 ) -> Tones:
     length = np.ascontiguousarray(echoes.length)
     powers = powers_of_sample_number(echoes.frequency, radar, origin)
-    sweep = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
+    sweep = float(radar.sampled_start_hz), radar.slope_hz_per_s, radar.sample_rate_hz
     return Tones(length, amplitude, powers, *sweep)
 
 
@@ -163,7 +163,7 @@ def powers_of_sample_number(
     """Weights (power, node) of values at nodes in the polynomial in n / samples less an origin."""
     if len(frequency) == 1:
         return np.ones((1, 1))
-    nodes = (frequency - radar.start_frequency_hz) / radar.bandwidth_hz - origin
+    nodes = (frequency - radar.sampled_start_hz) / radar.sampled_bandwidth_hz - origin
     return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
 
 
@@ -180,7 +180,7 @@ def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.floa
     ends = slice(None, None, max(1, echoes.length.shape[1] - 1))
     lengths = [echoes.length[chirps, ends] for chirps in (before, after)]
     rate = np.abs(lengths[1] - lengths[0]) / (times[after] - times[before])[:, None, None]
-    bins_of_rate = radar.chirp_duration_s / (2 * radar.range_bin_m)
+    bins_of_rate = radar.sampled_duration_s / (2 * radar.range_bin_m)
     if rate.max(initial=0.0) * bins_of_rate <= MAX_BINS_IN_CHIRP:
         return
     for chirps, length in zip((before, after), lengths, strict=True):

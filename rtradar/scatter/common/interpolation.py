@@ -26,7 +26,7 @@ def sweep_nodes(radar: Radar, count: int) -> Array:
     They are the zeros of the Chebyshev polynomial of that degree over it.
     """
     place = -np.cos((np.arange(count) + 0.5) * np.pi / count)
-    return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * place)
+    return np.asarray(radar.centre_frequency_hz + radar.sampled_bandwidth_hz / 2 * place)
 
 
 def interpolation_weights(nodes: Array, places: Array) -> Array:
@@ -47,18 +47,12 @@ def interpolation_weights(nodes: Array, places: Array) -> Array:
 # -- lines of antennas -----------------------------------------------------------------------------
 
 
-def _lines(count_y: int, count: int) -> list[Indices]:
-    """Indices of the antennas on the y-line and on the z-line, without empty lines."""
-    lines = np.arange(count_y), np.arange(count_y, count)
-    return [line for line in lines if len(line)]
-
-
 def _tx_lines(radar: Radar) -> list[tuple[Indices, list[Indices]]]:
     """Each line of Tx with the lines of the Rx that are kept with it, as indices among these."""
     found = []
-    for line in _lines(radar.tx_y, radar.n_tx):
+    for line in radar.tx_lines:
         kept = radar.rx_of_tx[line[0]]
-        groups = np.flatnonzero(kept < radar.rx_y), np.flatnonzero(kept >= radar.rx_y)
+        groups = [np.flatnonzero(np.isin(kept, own)) for own in radar.rx_lines]
         found.append((line, [group for group in groups if len(group)]))
     return found
 
@@ -97,7 +91,9 @@ class ArrayEnds:
     def of(cls, radar: Radar) -> ArrayEnds:
         """Return the ends of the lines of this radar."""
         lines = _tx_lines(radar)
-        line_of_tx = np.repeat(np.arange(len(lines)), [len(line) for line, _ in lines])
+        line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, 2))
+        for number, (line, _) in enumerate(lines):
+            line_of_tx[line], tx_weight[line] = number, _straight(len(line))
         rx = [radar.rx[radar.rx_of_tx[line[0]]] for line, _ in lines]
         weights = np.zeros((len(lines), radar.n_rx, 2 * len(lines[0][1])))
         for weight, (_, groups) in zip(weights, lines, strict=True):
@@ -113,7 +109,7 @@ class ArrayEnds:
             rx=np.array(ends),
             tx_middle=np.array([radar.tx[line].mean(axis=0) for line, _ in lines]),
             rx_middle=np.array([kept.mean(axis=0) for kept in rx]),
-            tx_weight=np.concatenate([_straight(len(line)) for line, _ in lines]),
+            tx_weight=tx_weight,
             rx_weight=weights[line_of_tx],
         )
 
@@ -123,15 +119,17 @@ def shadow_nodes(radar: Radar) -> tuple[Array, Array, Array]:
 
     Their weights in each antenna, (tx, node) and (rx, node), follow.
     """
-    blocks = []
-    for antennas, along_y, ends in ((radar.tx, radar.tx_y, 2), (radar.rx, radar.rx_y, 1)):
-        for line in _lines(along_y, len(antennas)):
+    blocks, found = [], []
+    for antennas, lines, ends in ((radar.tx, radar.tx_lines, 2), (radar.rx, radar.rx_lines, 1)):
+        for line in lines:
             if ends == 1 or len(line) == 1:
                 blocks.append((antennas[line].mean(axis=0)[None], np.ones((len(line), 1))))
             else:
                 blocks.append((antennas[line[[0, -1]]], _straight(len(line))))
+        found.append(np.argsort(np.concatenate(lines)))
     weights = np.split(block_diag(*(weight for _, weight in blocks)), [radar.n_tx])
-    return np.concatenate([places for places, _ in blocks]), weights[0], weights[1]
+    tx, rx = (own[order] for own, order in zip(weights, found, strict=True))
+    return np.concatenate([places for places, _ in blocks]), tx, rx
 
 
 class ArrayNodes(NamedTuple):

@@ -36,9 +36,10 @@ def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
     length = echoes.length.mean(axis=1)
     rate = (length[1] - length[0]) / (_STEP_CYCLES * radar.cycle_duration_s)
     # The direction follows from the slope of the lengths along the line of receivers.
-    places, azimuth = radar.rx[: radar.rx_y, 1], np.zeros(len(power))
-    if len(places) > 1:
-        slope = np.polyfit(places, echoes.length[0, : radar.rx_y], 1)[0]
+    line = max(radar.rx_lines, key=lambda own: np.ptp(radar.rx_m[own, 1]))
+    places, azimuth = radar.rx[line, 1], np.zeros(len(power))
+    if np.ptp(places) > 0:
+        slope = np.polyfit(places, echoes.length[0, line], 1)[0]
         azimuth = np.arcsin(np.clip(-slope, -1, 1))
     values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
     names = np.array(model.path_names)

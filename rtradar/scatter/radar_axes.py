@@ -1,0 +1,118 @@
+"""The world as a radar sees it that is turned: in its own axes, about its own position.
+
+Lengths of paths and what bodies return do not depend on the axes, and antennas and polarisation are
+those of the radar. Models therefore compute in axes in which the radar is upright.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.body import Body
+from rtradar.body.body import Poses
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scene import Scene
+
+Array = NDArray[np.float64]
+
+_Pose = Callable[[Array], tuple[Array, Array]]
+"""Axes (time, 3, 3) and positions (time, 3) [m] of a radar at some times [s]."""
+
+
+class BodyInRadarAxes(Body):
+    """A body whose places are those that a radar sees, about its ``centre`` (3,) [m]."""
+
+    def __init__(self, body: Body, pose: _Pose, centre: Array) -> None:
+        kept = ("motion", "semi_axes", "breathing", "material", "mesh")
+        found = ("names", "owner", "materials", "part_names", "duration_s")
+        given = {name: getattr(body, name, None) for name in (*kept, *found)}
+        for name, value in {**given, "_seen": body, "_pose": pose, "_centre": centre}.items():
+            object.__setattr__(self, name, value)
+
+    _seen: Body
+    _pose: _Pose
+    _centre: Array
+
+    @property
+    def people(self) -> tuple[Body, ...]:
+        """The people, each as the radar sees them."""
+        if len(self._seen.people) == 1:
+            return (self,)
+        return tuple(BodyInRadarAxes(one, self._pose, self._centre) for one in self._seen.people)
+
+    def at(self, times: ArrayLike) -> Poses:
+        """Poses in the axes of the radar; see `Body.at`."""
+        centres, frames, semi_axes = self._seen.at(times)
+        axes, places = self._pose(np.asarray(times, np.float64))
+        seen = np.einsum("tji,tpj->tpi", axes, centres - places[:, None]) + self._centre
+        return Poses(seen, np.einsum("tji,tpjk->tpik", axes, frames), semi_axes)
+
+    def skin(self, times: ArrayLike, divisions: int = 0) -> Array:
+        """Vertices of the mesh in the axes of the radar; see `Body.skin`."""
+        axes, places = self._pose(np.asarray(times, np.float64))
+        vertices = self._seen.skin(times, divisions) - places[:, None]
+        return np.asarray(np.einsum("tji,tvj->tvi", axes, vertices) + self._centre)
+
+
+def in_radar_axes(radar: Radar, body: Body, scene: Scene) -> tuple[Radar, Body, Scene]:
+    """Give a radar that is upright, and a body and a scene as the given radar sees them.
+
+    All three are themselves where the radar is upright. An `InputError` is raised where something
+    in the scene cannot be seen in other axes.
+    """
+    if not radar.is_turned:
+        return radar, body, scene
+    centre, axes = np.array(radar.position_m), radar.axes
+
+    def pose(times: Array) -> tuple[Array, Array]:
+        count = len(times)
+        return np.broadcast_to(axes, (count, 3, 3)), np.broadcast_to(centre, (count, 3))
+
+    upright = dataclasses.replace(radar, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0)
+    return upright, BodyInRadarAxes(body, pose, centre), _turned(scene, radar)
+
+
+def _turned(scene: Scene, radar: Radar) -> Scene:
+    centre, axes = np.array(radar.position_m), radar.axes
+    tilted = radar.pitch_deg != 0 or radar.roll_deg != 0
+    if scene.objects or (scene.furniture and tilted):
+        what = "objects that move" if scene.objects else "furniture and pitch_deg or roll_deg"
+        raise InputError(
+            f"scene '{scene.name}': a radar that is turned is not simulated with {what}; leave "
+            "them out, or the turn"
+        )
+
+    def place(point: ArrayLike) -> tuple[float, float, float]:
+        x, y, z = ((np.asarray(point) - centre) @ axes + centre).tolist()
+        return x, y, z
+
+    def along(vector: ArrayLike) -> tuple[float, float, float]:
+        x, y, z = (np.asarray(vector) @ axes).tolist()
+        return x, y, z
+
+    walls = tuple(
+        dataclasses.replace(
+            wall,
+            corner_m=place(wall.corner_m),
+            edge_u_m=along(wall.edge_u_m),
+            edge_v_m=along(wall.edge_v_m),
+        )
+        for wall in scene.walls
+    )
+    furniture = tuple(
+        dataclasses.replace(
+            piece, position_m=place(piece.position_m), yaw_deg=_degrees(piece.yaw_deg, radar)
+        )
+        for piece in scene.furniture
+    )
+    return dataclasses.replace(scene, walls=walls, furniture=furniture)
+
+
+def _degrees(yaw_deg: float, radar: Radar) -> float:
+    """Yaw in the radar's axes, from -180 to 180 degrees."""
+    return (yaw_deg - radar.yaw_deg + 180) % 360 - 180
