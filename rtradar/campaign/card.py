@@ -40,7 +40,9 @@ data["label"], data["label"].attrs["classes"]
 ```
 
 Clouds are filled up with NaN: the first `n_points` of `points` and the first `n_spatial` of
-`spatial` are points. Entries that are no number and no text, such as positions, are JSON."""
+`spatial` are points. `spatial_source`, where several people or objects are, says who returned each
+of them: its number in `source_names`, or -1 for the room or nobody. Entries that are no number and
+no text, such as positions, are JSON."""
 
 
 def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:

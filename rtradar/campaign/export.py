@@ -35,6 +35,7 @@ _MOST_A_CHUNK = 256
 _COUNTS = {"points": ("n_points", "RDT cloud"), "spatial": ("n_spatial", "spatial cloud")}
 """Name of the number of points of a cloud, and what the cloud is called."""
 _COORDINATES = {"coordinate": ["time", "range", "velocity"], "axis": ["x", "y", "z"]}
+_NOT_KNOWN = -2  # who returned a point that is none, or of a sample with one person
 _UNITS = re.compile(r"_(s|m|deg|db)$")
 
 
@@ -140,6 +141,9 @@ def _write_arrays(group: Any, collection: Collection) -> None:
             said = f"number of points of the {cloud}; what follows them is NaN"
             _put(group, count, shapes[:, 0], ["sample"], long_name=said)
         _stream(group, name, shape, ("sample", *ARRAYS[name].dims), collection)
+        if name == "spatial" and any("source_names" in row for row in collection.provenance):
+            own = "spatial_source"
+            _stream(group, own, shape[:1], ("sample", *ARRAYS[own].dims), collection)
     for name in axes:
         first = read_sample(collection.paths[0], name)
         if all(np.array_equal(read_sample(path, name), first) for path in collection.paths):
@@ -166,20 +170,23 @@ def _stream(
     kind = np.dtype(ARRAYS[name].dtype)
     each_bytes = max(1, int(np.prod(shape)) * kind.itemsize)
     step = min(max(1, _CHUNK_BYTES // each_bytes), _MOST_A_CHUNK, len(collection))
+    fill = np.nan if kind.kind == "f" else _NOT_KNOWN
     array = group.create_array(
         own_name or name,
         shape=(len(collection), *shape),
         chunks=(step, *(max(1, size) for size in shape)),
         dtype=kind,
         dimension_names=dims,
-        fill_value=np.nan,
+        fill_value=fill,
     )
     array.attrs.update(attributes(name))
     bar: dict[str, Any] = {"desc": name, "unit": "chunk", "disable": None, "leave": False}
     for begin in tqdm(range(0, len(collection), step), **bar):
-        block = np.full((min(step, len(collection) - begin), *shape), np.nan, kind)
-        for row, path in zip(block, collection.paths[begin : begin + step], strict=True):
-            values = read_sample(path, name)
+        block = np.full((min(step, len(collection) - begin), *shape), fill, kind)
+        for number, row in enumerate(block, start=begin):
+            if name == "spatial_source" and collection.spatial_source(number) is None:
+                continue
+            values = read_sample(collection.paths[number], name)
             row[tuple(map(slice, values.shape))] = values
         array[begin : begin + len(block)] = block
 

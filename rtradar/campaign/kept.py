@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.pipeline.prepare import Moving, prepare
-from rtradar.pipeline.processing import CloudMaker, Clouds, Processing
+from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
+from rtradar.pipeline.sources import Sources
 from rtradar.process import (
     SlidingSpectrogram,
     angle_grid,
@@ -28,11 +29,16 @@ KEPT = tuple(kind for kind in KINDS if kind not in ("clouds", "spatial"))
 
 
 class Capture(NamedTuple):
-    """Clouds of one sample, the arrays that it keeps by name, and the time of warming up [s]."""
+    """Clouds of one sample, the arrays that it keeps by name, and the time of warming up [s].
+
+    ``sources`` are the names of people and objects whom the spatial points may be of; there are
+    none where one person is alone.
+    """
 
     clouds: Clouds
-    maps: dict[str, NDArray[np.floating]]
+    maps: dict[str, NDArray[Any]]
     warmup_s: float
+    sources: tuple[str, ...] = ()
 
 
 def capture_of(
@@ -43,12 +49,14 @@ def capture_of(
     Joints are those of the first person.
     """
     capture = prepare(people, radar, scene, RunSettings(**options))
-    keeper = MapKeeper(capture.processing, keep)
+    sources = (*capture.body.names, *(one.name for one in capture.scene.objects))
+    several = len(sources) > 1
+    keeper = MapKeeper(capture.processing, keep, Sources(capture).of_cells if several else None)
     capture.stream(keeper, progress=False)
     maps = keeper.maps()
     if "joints" in keep:
         maps["joints"] = capture.body.motion.at(maps["time"])[0]
-    return Capture(keeper.finish(), maps, capture.warmup_s)
+    return Capture(keeper.finish(), maps, capture.warmup_s, sources if several else ())
 
 
 def sizes(radar: Radar) -> tuple[object, ...]:
@@ -65,12 +73,18 @@ def sizes(radar: Radar) -> tuple[object, ...]:
 class MapKeeper:
     """Makes the clouds of one capture from its range spectra, and collects maps on the way.
 
-    So that memory stays low, `push` takes at most ``max_chirps`` chirps.
+    ``source_of`` tells who returned most of a cell, where that is asked. So that memory stays low,
+    `push` takes at most ``max_chirps`` chirps.
     """
 
-    def __init__(self, processing: Processing, keep: Sequence[str]) -> None:
+    def __init__(
+        self,
+        processing: Processing,
+        keep: Sequence[str],
+        source_of: SourceOfCells | None = None,
+    ) -> None:
         self._processing, self._keep, radar = processing, keep, processing.radar
-        self._clouds = CloudMaker(processing)
+        self._clouds = CloudMaker(processing, source_of)
         self.max_chirps = self._clouds.max_chirps
         self._spectrogram = SlidingSpectrogram(
             radar, removal=processing.removal, window_functions=processing.window_functions

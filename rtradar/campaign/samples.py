@@ -295,7 +295,7 @@ class Made(NamedTuple):
     sample: Sample
     spatial: NDArray[np.float64]
     work_s: float
-    maps: Mapping[str, NDArray[np.floating]] = {}
+    maps: Mapping[str, NDArray[Any]] = {}
 
 
 def make_sample(plan: SamplePlan) -> Made:
@@ -313,7 +313,7 @@ def make_sample(plan: SamplePlan) -> Made:
     people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
-        clouds, maps, warmup_s = capture_of(
+        clouds, maps, warmup_s, sources = capture_of(
             people, plan.radar, plan.scene, values.get("keep", ()), **settings
         )
     limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}
@@ -326,11 +326,15 @@ def make_sample(plan: SamplePlan) -> Made:
     if "joints" in maps:
         found["joint_names"] = list(NODES)  # of the body, whatever skeleton the recording has
     places = clouds.spatial.points
+    kept = np.arange(len(places))
     if len(places) > SPATIAL_POINTS:
         random = np.random.default_rng(stream(values["seed"], _SPATIAL_STREAM))
-        places = places[np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))]
+        kept = np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))
+    if sources and clouds.spatial.source is not None:
+        found["source_names"] = list(sources)
+        maps["spatial_source"] = clouds.spatial.source[kept]
     sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
-    return Made(sample, places, time.perf_counter() - began - warmup_s, maps)
+    return Made(sample, places[kept], time.perf_counter() - began - warmup_s, maps)
 
 
 def _others(others: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> list[Person]:

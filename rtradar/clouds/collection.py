@@ -219,7 +219,9 @@ class Collection:
             rows.append(row | {"folder": str(path.parent), "digest": read_digest(path)})
         return pd.DataFrame(rows, index=pd.Index(self.ids, name="id"))
 
-    def torch(self, kind: str = "clouds", *, points: int = 1000) -> SampleDataset:
+    def torch(
+        self, kind: str = "clouds", *, points: int = 1000, source: bool = False
+    ) -> SampleDataset:
         """Return the samples as a `torch.utils.data.Dataset`, for a `DataLoader`.
 
         All items have one size, so that they can be batched as they are. They follow from the
@@ -236,6 +238,9 @@ class Collection:
         points : int
             Number of points of each cloud. Of larger clouds as many are taken, a random sample of
             an RDT cloud; points of smaller ones are repeated, and an empty one becomes zeros.
+        source : bool
+            Of ``spatial``, whether each item has a third entry: who returned each point, int64
+            (point,), as `spatial_source` gives it; -2 in an empty cloud.
 
         Returns
         -------
@@ -264,6 +269,11 @@ class Collection:
                 f"not every sample of collection {self._name} holds {kind}, only "
                 f'{", ".join(self.kinds)}; build it anew with keep = ["{kind}"]'
             )
+        if source and not (kind == "spatial" and all(map(self._has_sources, range(len(self))))):
+            raise InputError(
+                "source = True: only kind = 'spatial' of samples with several people or objects "
+                "says who returned its points; leave it out"
+            )
         clouds = kind in ("clouds", "spatial")
         shapes = {read_shape(path, KINDS[kind]) for path in self.paths if not clouds}
         if len(shapes) > 1:
@@ -273,7 +283,7 @@ class Collection:
                 "build data sets of one duration_s and one radar"
             )
         return SampleDataset(
-            self.paths, self.labels.tolist(), KINDS[kind], points if clouds else None
+            self.paths, self.labels.tolist(), KINDS[kind], points if clouds else None, source
         )
 
     def points(self, index: int) -> NDArray[np.float64]:
@@ -313,3 +323,31 @@ class Collection:
         """
         points: NDArray[np.float64] = read_sample(self.paths[index], "spatial")
         return points
+
+    def spatial_source(self, index: int) -> NDArray[np.int64] | None:
+        """Read who returned each point of the spatial cloud.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (m,) int64, optional
+            For each point the index of who returned most of it: 0 the person of the label, then
+            others and objects as ``source_names`` of the provenance lists them, -1 the room or
+            nobody. None where one person is alone.
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        if not self._has_sources(index):
+            return None
+        found: NDArray[np.int64] = read_sample(self.paths[index], "spatial_source").astype(np.int64)
+        return found
+
+    def _has_sources(self, index: int) -> bool:
+        return "source_names" in self._about[index]["provenance"]

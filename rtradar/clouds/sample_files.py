@@ -1,8 +1,9 @@
 """File of one sample of a data set: a NumPy archive that is whole or absent.
 
-It holds ``points``, ``spatial``, perhaps maps and joints, and ``about`` (label and provenance as
-JSON). It is not compressed and has fixed dates, so that the same sample gives the same bytes
-everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all bytes before them. A
+It holds ``points``, ``spatial``, perhaps ``spatial_source``, maps and joints, and ``about`` (label
+and provenance as JSON). It is not compressed and has fixed dates, so that the same sample gives the
+same bytes everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all bytes before
+them. A
 file that is read may be damaged or come from a stranger, so its contents are checked before use.
 """
 
@@ -41,6 +42,13 @@ _SINCE = "since the start of the capture"
 ARRAYS: Mapping[str, Array] = {
     "points": Array(("point", "coordinate"), "s, m, m/s", "time, range and velocity of the points"),
     "spatial": Array(("spatial_point", "axis"), "m", "world x, y and z of the points"),
+    "spatial_source": Array(
+        ("spatial_point",),
+        "1",
+        "who returned most of the point: 0 the person of the label, then others and objects, "
+        "as source_names lists them; -1 the room or nobody; -2 not known",
+        "<i2",
+    ),
     "spectrogram": Array(
         ("spectrogram_time", "spectrogram_velocity"),
         "m2",
@@ -65,7 +73,11 @@ ARRAYS: Mapping[str, Array] = {
         ("spectrogram_velocity",), "m/s", "rate of range, positive receding"
     ),
 }
-"""Arrays that the file of a sample may hold: clouds, maps, joints, and the axes of those."""
+"""Arrays that the file of a sample may hold: clouds, maps, joints, and the axes of those.
+
+``spatial_source`` is there where ``source_names`` of the provenance lists several people or
+objects.
+"""
 
 KINDS = {
     "clouds": "points",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -17,7 +18,7 @@ from torch.utils.data import Dataset
 from rtradar.clouds.sample_files import read_sample
 
 
-class SampleDataset(Dataset[tuple[Tensor, int]]):
+class SampleDataset(Dataset[Any]):
     """Pairs of one array of a sample and the number of its class, read when they are asked for.
 
     Parameters
@@ -30,6 +31,8 @@ class SampleDataset(Dataset[tuple[Tensor, int]]):
         Name of the array in the files.
     n_points : int, optional
         Number of points of each cloud; None for arrays that are no clouds.
+    source : bool
+        Whether who returned each point of a spatial cloud is a third entry of each item.
 
     Attributes
     ----------
@@ -38,32 +41,44 @@ class SampleDataset(Dataset[tuple[Tensor, int]]):
     """
 
     def __init__(
-        self, paths: Sequence[Path], labels: Sequence[str], entry: str, n_points: int | None
+        self,
+        paths: Sequence[Path],
+        labels: Sequence[str],
+        entry: str,
+        n_points: int | None,
+        source: bool = False,
     ) -> None:
         self.classes = tuple(sorted(set(labels)))
         self._paths, self._entry, self._n_points = tuple(paths), entry, n_points
+        self._source = source
         number = {name: index for index, name in enumerate(self.classes)}
         self._labels = [number[label] for label in labels]
 
     def __len__(self) -> int:
         return len(self._paths)
 
-    def __getitem__(self, index: int) -> tuple[Tensor, int]:
-        values = read_sample(self._paths[index], self._entry)
+    def __getitem__(self, index: int) -> tuple[Tensor, int] | tuple[Tensor, int, Tensor]:
+        path, in_order = self._paths[index], self._entry == "spatial"
+        values = read_sample(path, self._entry)
         if self._n_points is not None:
-            values = of_size(values, self._n_points, in_order=self._entry == "spatial")
-        return torch.from_numpy(np.array(values, dtype=np.float32)), self._labels[index]
+            values = of_size(values, self._n_points, in_order=in_order)
+        item = torch.from_numpy(np.array(values, dtype=np.float32)), self._labels[index]
+        if not self._source or self._n_points is None:
+            return item
+        source = read_sample(path, "spatial_source").astype(np.int64)
+        source = of_size(source, self._n_points, in_order=in_order, empty=-2)
+        return *item, torch.from_numpy(source)
 
 
 def of_size(
-    points: NDArray[np.float64], n_points: int, *, in_order: bool = False
-) -> NDArray[np.float64]:
-    """Take or repeat points of a cloud so that it has ``n_points``; an empty one gets zeros.
+    points: NDArray[Any], n_points: int, *, in_order: bool = False, empty: int = 0
+) -> NDArray[Any]:
+    """Take or repeat points of a cloud so that it has ``n_points``, of an empty one ``empty``.
 
     Points in random order are taken from the first on, those ``in_order`` evenly from all.
     """
     if not len(points):
-        return np.zeros((n_points, 3))
+        return np.full((n_points, *points.shape[1:]), empty, dtype=points.dtype)
     if in_order:
         return points[np.linspace(0, len(points) - 1, n_points).round().astype(np.int64)]
     return points[np.arange(n_points) % len(points)]

@@ -9,14 +9,17 @@ import h5py
 import numpy as np
 import pytest
 import torch
+import xarray as xr
 from torch.utils.data import DataLoader
 
 import rtradar as rt
-from rtradar.campaign import build_dataset
+from rtradar.campaign import build_dataset, export_dataset
 from rtradar.campaign.kept import capture_of
 from rtradar.campaign.samples import make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
-from rtradar.clouds.sample_files import check_size
+from rtradar.clouds import Collection
+from rtradar.clouds.sample_files import check_size, write_sample
+from rtradar.clouds.sample_index import write_index
 from rtradar.errors import InputError
 from rtradar.motion.skeleton import NODES
 
@@ -193,3 +196,72 @@ def test_a_collection_without_maps_says_so(here: None, tmp_path: Path) -> None:
         rt.Collection(tmp_path / "out").torch("spectrograms")
     with pytest.raises(InputError, match="have 200 MB; 190 MB are allowed"):
         check_size({"joints": np.zeros(25_000_000)})
+
+
+@pytest.fixture(scope="module")
+def crowd(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two samples, one of three people far apart, the other of one alone."""
+    folder = tmp_path_factory.mktemp("crowd")
+    others = '[others]\ncount = 2\nlabels = ["stand"]\nx_m = [-1.5, 0]\ny_m = [-2, 2]\n'
+    plans = [
+        plan_samples(read_spec(write(folder, SPEC.replace("count = 2", "count = 1") + more)))[0]
+        for more in (others, "")
+    ]
+    for number, plan in enumerate(plans):
+        sample, spatial, _, maps = make_sample(plan.packed())
+        write_sample(folder, f"s{number}", sample, spatial, maps)
+    return folder
+
+
+def only(folder: Path, *names: str) -> Collection:
+    write_index(folder, names)
+    return Collection(folder)
+
+
+def test_a_sample_of_several_people_says_who_returned_its_points(crowd: Path) -> None:
+    found = only(crowd, "s0", "s1")
+    assert len(found.provenance[0]["source_names"]) == 3
+    assert found.spatial_source(1) is None
+    source, places = found.spatial_source(0), found.spatial(0)
+    assert source is not None
+    assert source.shape == places.shape[:1]
+    assert set(source) <= {-1, 0, 1, 2}
+    # Those who stand are a metre and more apart from everyone: their points are near them.
+    plan = found.provenance[0]
+    for number, other in enumerate(plan["others"], start=1):
+        own = places[source == number]
+        assert len(own) > 20
+        middle = np.median(own[:, :2], axis=0)
+        gaps = [np.linalg.norm(middle - one["position_m"]) for one in plan["others"]]
+        assert int(np.argmin(gaps)) == number - 1
+        assert gaps[number - 1] < 0.5, other
+
+
+def test_a_loader_gives_who_returned_each_point(crowd: Path) -> None:
+    found = only(crowd, "s0")
+    source = found.spatial_source(0)
+    assert source is not None
+    points, label, own = found.torch("spatial", points=7, source=True)[0]
+    chosen = np.linspace(0, len(source) - 1, 7).round().astype(int)
+    np.testing.assert_array_equal(points, found.spatial(0)[chosen].astype(np.float32))
+    np.testing.assert_array_equal(own, source[chosen])
+    assert (label, own.dtype) == (0, torch.int64)
+    (_, _, batch), *_ = DataLoader(found.torch("spatial", points=7, source=True), batch_size=1)
+    assert batch.shape == (1, 7)
+    for names, kind in ((("s0", "s1"), "spatial"), (("s0",), "clouds")):
+        with pytest.raises(InputError, match="source = True: only kind = 'spatial'"):
+            only(crowd, *names).torch(kind, source=True)
+
+
+def test_an_export_says_who_returned_each_point(crowd: Path, tmp_path: Path) -> None:
+    found = only(crowd, "s0", "s1")
+    export_dataset([crowd], tmp_path / "x.zarr")
+    with xr.open_zarr(tmp_path / "x.zarr") as data:
+        read = data["spatial_source"]
+        assert read.dims == ("sample", "spatial_point")
+        assert read.dtype == np.int16
+        source = found.spatial_source(0)
+        assert source is not None
+        np.testing.assert_array_equal(read[0, : len(source)], source)
+        assert (read[0, len(source) :] == -2).all()
+        assert (read[1] == -2).all()
