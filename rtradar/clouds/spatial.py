@@ -165,9 +165,9 @@ def points_of_sines(
     Parameters
     ----------
     sines : (cell, 2) float64
-        Sines of the direction along y and z of each cell of ``mask``, in the order of
-        ``np.argwhere``; NaN where one is not measured. A pair with u^2 + w^2 > 1 is no direction
-        and dropped.
+        Sines of the direction along the radar's y and z of each cell of ``mask``, in the order of
+        ``np.argwhere``; NaN where one is not measured, which is taken for 0 if the radar is turned.
+        A pair with u^2 + w^2 > 1 is no direction and dropped.
     mask : (range, velocity) bool
         Detected cells.
     power : (range, velocity) float
@@ -184,6 +184,8 @@ def points_of_sines(
     forward = 1 - np.nansum(sines**2, axis=1)
     kept = forward >= 0
     direction = np.column_stack([np.sqrt(forward[kept]), sines[kept]])
+    if radar.is_turned:
+        direction = np.nan_to_num(direction, nan=0.0) @ radar.axes.T
     velocity = radar.velocity_mps(mask.shape[1])
     return SpatialCloud(
         _in_world(radar.range_m[row[kept], None] * direction, radar),

@@ -23,6 +23,7 @@ from rtradar.exchange.recording import (
     radar_of,
 )
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.real_samples import complex_of_real, real_of_complex
 from rtradar.system.files import atomic_file, open_regular, read_json
 
@@ -132,7 +133,7 @@ def open_int16(
     own, n_bytes = of_radar(layout, radar), path.stat().st_size
     row = 2 * words_of(own, radar)
     chirps, odd = divmod(n_bytes, row)
-    if odd or not chirps:
+    if odd or not chirps or chirps % _whole(radar):
         raise InputError(_of_another_size(path, radar, own, n_bytes))
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
@@ -174,12 +175,19 @@ def _of_another_size(path: Path, radar: Radar, layout: Dca1000Layout, size: int)
     kind, count = ("real", 2) if layout.real else ("complex", 1)
     of_chirp = f"{radar.n_rx} Rx, {count * radar.samples_per_chirp} {kind} samples, {layout.lanes} "
     cure = "give the radar and the layout that recorded it (--radar, --lanes, --real)"
-    if size > row:
-        cure += f", or cut it to its first {size // row * row} bytes"
+    group, whole = "frames" if radar.in_frames else "cycles", _whole(radar)
+    if size >= whole * row:
+        cure += f", or cut it to its first {size // (whole * row) * whole * row} bytes"
     return (
         f"'{path}' has {size} bytes, which are {size / row:.6g} chirps of radar '{radar.name}' "
-        f"({of_chirp}lanes: {row} bytes); {cure}"
+        f"({of_chirp}lanes: {row} bytes), no whole number of {group} of {whole}; {cure}"
     )
+
+
+def _whole(radar: Radar) -> int:
+    """Number of stored chirps in a frame of a radar that pauses between them, else in a cycle."""
+    together = radar.chirps_per_frame if radar.in_frames else radar.n_tx
+    return together // chirps_together(radar)
 
 
 def _description(path: Path) -> dict[str, Any] | None:

@@ -47,7 +47,7 @@ def ti_oob(
     cube : (cycle, tx, rx, range) complex
         Range spectra of one frame, without static clutter.
     radar : Radar
-        Radar under TDM.
+        Radar under TDM or BPM.
     window_functions : WindowFunctions
         Window functions, of which that in slow time is applied.
     threshold_db : float
@@ -61,18 +61,18 @@ def ti_oob(
     mask : (range, velocity) bool
         Cells that are points.
     sines : (cell, 2) float64
-        Sines of the direction along y and z of each cell, in the order of ``np.argwhere(mask)``;
-        NaN where the array does not measure one.
+        Sines of the direction along the radar's y and z of each cell, in the order of
+        ``np.argwhere(mask)``; NaN where the array does not measure one.
 
     Raises
     ------
     InputError
         Where an option is out of its range, or the radar multiplexes otherwise.
     """
-    if radar.multiplexing != "tdm":
+    if radar.multiplexing not in ("tdm", "bpm"):
         raise InputError(
             f"detector ti-oob: radar '{radar.name}' has multiplexing = '{radar.multiplexing}'; the "
-            "chain is that of tdm"
+            "chain is that of tdm and bpm"
         )
     if not threshold_db > 0:
         raise InputError(f"detector ti-oob: threshold_db = {threshold_db}; it must be above 0 dB")
@@ -141,7 +141,7 @@ def _sines(values: NDArray[np.complexfloating], radar: Radar, velocity: _Reals) 
     still = (values * np.exp(-2j * np.pi * turns)[:, :, None]).reshape(
         len(values), radar.n_channels
     )
-    y, z = _virtual_wavelengths(radar)
+    y, z = radar.virtual_m.T[1:] / radar.wavelength_m
     row = np.unique(np.rint(z / _SAME_ROW), return_inverse=True)[1]
     rows = [np.flatnonzero(row == number) for number in range(row.max() + 1)]
     found = np.full((len(values), 2), np.nan)
@@ -160,9 +160,3 @@ def _sines(values: NDArray[np.complexfloating], radar: Radar, velocity: _Reals) 
         between = (sums[:, :-1] * sums[:, 1:].conj())[:, nearest].sum(axis=1)
         found[:, 1] = np.angle(between) / (2 * np.pi * steps[nearest].mean())
     return found
-
-
-def _virtual_wavelengths(radar: Radar) -> tuple[_Reals, _Reals]:
-    """Places y and z of the virtual antennas (channel,) about the centre, in wavelengths."""
-    places = radar.tx[:, None] + radar.rx[radar.rx_of_tx] - 2 * np.asarray(radar.position_m)
-    return tuple(places.reshape(-1, 3).T[1:] / radar.wavelength_m)

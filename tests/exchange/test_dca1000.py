@@ -164,10 +164,16 @@ def test_a_file_of_another_length_or_without_a_radar_is_refused(tmp_path: Path) 
     file.write_bytes(bytes(1001))
     says = (
         r"has 1001 bytes, which are 15\.6406 chirps of radar 'board' \(4 Rx, 4 complex samples, "
-        r"2 lanes: 64 bytes\); give .* or cut it to its first 960 bytes"
+        r"2 lanes: 64 bytes\), no whole number of cycles of 2; give .* or cut it to its first 896 "
     )
     with pytest.raises(InputError, match=says):
         open_samples(file, RADAR)
+    file.write_bytes(bytes(64 * 15))
+    with pytest.raises(InputError, match=r"which are 15 chirps .* cut it to its first 896 bytes"):
+        open_samples(file, RADAR)
+    frames = dataclasses.replace(RADAR, chirps_per_frame=8, frame_period_s=0.1)
+    with pytest.raises(InputError, match=r"no whole number of frames of 8; .* first 512 bytes"):
+        open_samples(file, frames)
     with pytest.raises(InputError, match="no JSON file beside it tells of its radar"):
         open_samples(file)
     file.write_bytes(b"")

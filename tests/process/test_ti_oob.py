@@ -129,6 +129,25 @@ def test_one_line_of_antennas_measures_one_angle() -> None:
     np.testing.assert_allclose(sines, [[np.nan, 0.25]], atol=0.01)
 
 
+def test_a_board_with_one_raised_tx_measures_both_angles() -> None:
+    """The array of an IWR1443 in its own order, turned; directions are in the radar's axes."""
+    half = RADAR.wavelength_m / 2
+    board = dataclasses.replace(
+        RADAR,
+        tx_positions_m=[(0, 0, 0), (0, 2 * half, half), (0, 4 * half, 0)],
+        rx_positions_m=[(0, k * half, 0) for k in range(4)],
+        tx_order=(0, 2, 1),
+        frame_duration_s=60e-6 * 3 * 32,
+        yaw_deg=30.0,
+    )
+    u, w = 0.3, -0.2
+    there = board.axes @ np.array([np.sqrt(1 - u * u - w * w), u, w])
+    mask, sines = ti_oob(cube_of((2.5, 1.5, there[1], there[2]), radar=board), board)
+    np.testing.assert_allclose(sines, [[u, w]], atol=0.03)
+    place = points_of_sines(sines, mask, np.ones(mask.shape), board, 0.0).points[0]
+    np.testing.assert_allclose(place, 2.5 * there, atol=0.1)
+
+
 def test_azimuth_is_on_the_grid_of_measured_clouds() -> None:
     """The direction along y is a whole number of 1/32, as in clouds that such a chip gave."""
     walk = rt.synthetic_motion("walk", duration_s=0.5)
