@@ -1,6 +1,7 @@
 """People whose body is a mesh: the sum over the skin, between keyframes, and beside others."""
 
 import dataclasses
+import functools
 import importlib.util
 
 import numpy as np
@@ -22,6 +23,7 @@ needs_anny = pytest.mark.skipif(
 RADAR = dataclasses.replace(rt.Radar.preset("paper-12ghz"), tx_y=1, tx_z=0, rx_y=2, rx_z=0)
 
 
+@functools.cache
 def person(shift=(0.0, 0.0, 0.0), **options):
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2).shifted(shift)
     body = Body.from_motion(motion, **options)
@@ -37,18 +39,26 @@ def field(echoes, radar=RADAR):
 
 @needs_anny
 def test_the_sum_over_the_skin_is_that_of_the_mesh_at_rest():
-    body = person()
-    found = field(build_model("reference", RADAR, body).echoes(np.array([1000])))[0]
-    time = RADAR.centres_of(np.array([1000]))[0]
-    mesh = body.mesh.trimesh(time, 1)
-    tx, rx = RADAR.tx[:1], RADAR.rx
-    whole = rt.scattering_length(mesh, tx, rx, RADAR.centre_frequency_hz, "physical-optics")
-    ranges = np.linalg.norm(tx, axis=1) * np.linalg.norm(rx, axis=1)
+    body, chirps = person(), np.array([1000, 1300])
+    found = field(build_model("reference", RADAR, body).echoes(chirps))
     k = 2 * np.pi * RADAR.centre_frequency_hz / SPEED_OF_LIGHT_MPS
-    path = np.linalg.norm(tx, axis=1) + np.linalg.norm(rx, axis=1)
-    expected = whole / ranges * np.exp(-1j * k * path)
-    # Edges of shadows are cut at facets here, and more finely there.
-    assert np.abs(found - expected) == pytest.approx(0, abs=0.05 * np.abs(expected).min())
+    to_tx, to_rx = (np.linalg.norm(own, axis=1) for own in (RADAR.tx[:1], RADAR.rx))
+    expected = (
+        np.exp(-1j * k * (to_tx + to_rx))
+        / (to_tx * to_rx)
+        * [
+            rt.scattering_length(
+                body.mesh.trimesh(time, 1),
+                RADAR.tx[:1],
+                RADAR.rx,
+                RADAR.centre_frequency_hz,
+                "physical-optics",
+            )
+            for time in RADAR.centres_of(chirps)
+        ]
+    )
+    # Edges of shadows are cut at facets here, and more finely there; in fades that tells most.
+    assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
 
 
 @needs_anny
