@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import re
+import runpy
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -38,6 +39,7 @@ from rtradar.settings import RunSettings
 
 SCENES = Path(__file__).parents[1] / "scenes"
 MESHES = Path(__file__).parents[1] / "meshes"
+BOARDS = Path(__file__).parents[1] / "validation" / "closed_forms" / "boards.py"
 PAPER = {
     "max_range_m": ("largest range", "9.6 m", "{:.3f} m"),
     "range_bin_m": ("range bin", "0.0375 m", "{:.5f} m"),
@@ -246,6 +248,33 @@ def radar_limits() -> str:
     return pipe_table(["limit", "paper", *(f"`{name}`" for name in radars)], rows)
 
 
+def board_limits() -> str:
+    """What follows from the files of boards, and in brackets what the datasheets allow or state."""
+    rows = []
+    for name, sheet in runpy.run_path(str(BOARDS))["DATASHEETS"].items():
+        radar = Radar.preset(name)
+        sweep = np.array([0, radar.bandwidth_hz]) + radar.start_frequency_hz
+        sides = radar.azimuth_resolution_deg, radar.elevation_resolution_deg
+        stated = f" ({sheet.beam_deg:g}°)" if sheet.beam_deg else ""
+        rows.append(
+            [
+                f"`{name}`",
+                "{:g} to {:g}".format(*sweep / 1e9) + " ({:g} to {:g})".format(*sheet.band_ghz),
+                f"{radar.slope_hz_per_s / 1e12:g} ({sheet.slope_mhz_per_us or '?'})",
+                f"{radar.sample_rate_hz / 1e6:g} ({sheet.rate_mhz:g})",
+                f"{radar.chirp_period_s * 1e6:g} ({sheet.chirp_us or '?'})",
+                f"{100 * radar.range_bin_m:.2f} cm, {radar.max_range_m:.1f} m",
+                f"{radar.velocity_bin_mps:.3f}, ±{radar.max_velocity_mps:.2f} m/s",
+                f"{sides[0]:.0f}°{stated} × {sides[1]:.0f}°",
+                f"{radar.transmit_power_dbm:g} dBm, {radar.noise_figure_db:g} dB",
+                sheet.source,
+            ]
+        )
+    head = ["board", "sweep [GHz]", "slope [MHz/µs], at most", "samples [MHz], at most"]
+    head += ["chirp and idle [µs], at least", "range", "velocity", "beam", "power, noise"]
+    return pipe_table([*head, "datasheet"], rows)
+
+
 def materials() -> str:
     """Constants of all materials; of those that are no power law, the frequencies alone."""
     rows = []
@@ -316,6 +345,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "radar-keys": lambda: keys(Radar),
     "antenna-keys": lambda: keys(Antenna),
     "radar-limits": radar_limits,
+    "board-limits": board_limits,
     "scene-keys": scene_keys,
     "materials": materials,
     "meshes": meshes,

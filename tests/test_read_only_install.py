@@ -52,7 +52,7 @@ def read_only(tmp_path: Path) -> Command:
         install / "rtradar",
         ignore=shutil.ignore_patterns("__pycache__"),
     )
-    for folder in ("scenes", "meshes"):
+    for folder in ("radars", "scenes", "meshes"):
         there = Path(rtradar.__file__).parents[1] / folder
         if there.is_dir():
             shutil.copytree(there, install / folder)

@@ -41,7 +41,7 @@ PATTERN = re.compile(rf"(?<![A-Za-z])(?:{'|'.join(BANNED)})(?![A-Za-z])", re.IGN
 
 def texts() -> list[Path]:
     """Sources and pages of the project that must keep to the words."""
-    folders = ("rtradar", "tests", "validation", "docs", "scenes")
+    folders = ("rtradar", "tests", "validation", "docs", "radars", "scenes")
     found = [path for folder in folders for path in (ROOT / folder).rglob("*")]
     pages = [*ROOT.glob("*.md"), *ROOT.glob("*.toml"), *found]
     kinds = {".py", ".md", ".rst", ".toml", ".sh"}

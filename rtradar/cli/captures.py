@@ -168,8 +168,9 @@ def _add_capture(command: OneLineParser) -> None:
     )
     command.option(
         "--radar",
-        "NAME|TOML",
-        f"radar: {', '.join(RADARS)}, or a TOML file (default: %(default)s)",
+        "NAME|TOML|CFG",
+        f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK (default: "
+        "%(default)s)",
         default="paper-12ghz",
     )
     command.option(

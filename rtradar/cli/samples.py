@@ -14,6 +14,7 @@ from rtradar.system.files import check_place, write_json
 if TYPE_CHECKING:
     from rtradar.cli.values import OneLineParser, Subcommands
     from rtradar.exchange import Dca1000Layout
+    from rtradar.radar import Radar
 
 
 def add(commands: Subcommands) -> None:
@@ -25,7 +26,7 @@ def add(commands: Subcommands) -> None:
         _add_process,
         (
             "rtradar process adc_data.bin --radar iwr1443 --out out/measured",
-            "rtradar process adc_data.bin --radar mine.toml --q-first --out out/measured",
+            "rtradar process adc_data.bin --radar profile.cfg --out out/measured",
             "rtradar process out/walk --detector ca-cfar --out out/again     # run with --save-if",
         ),
     )
@@ -56,8 +57,9 @@ def _add_process(process: OneLineParser) -> None:
     )
     process.option(
         "--radar",
-        "NAME|TOML",
-        f"radar: {', '.join(RADARS)}, or a TOML file (default: the one that the samples name)",
+        "NAME|TOML|CFG",
+        f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK, which also "
+        "says the order of a DCA1000's words (default: the one that the samples name)",
     )
     _add_layout(process)
     add_settings(process, ProcessingOptions.__annotations__)
@@ -122,6 +124,24 @@ def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
     return Dca1000Layout(**given) if asked else None
 
 
+def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca1000Layout | None]:
+    """Return the radar, and the order of words by the options, else by the .cfg file.
+
+    Where a JSON file lies beside the samples it says the order, for rtradar wrote both.
+    """
+    from rtradar.exchange import Dca1000Layout
+    from rtradar.radar import Radar
+    from rtradar.radar.ti_cfg import read_ti_cfg
+
+    layout = _layout(options)
+    if options.radar is None or not options.radar.endswith(".cfg"):
+        return None if options.radar is None else Radar.load(options.radar), layout
+    said = read_ti_cfg(options.radar)
+    if layout is None and not options.samples.with_suffix(".json").exists():
+        layout = Dca1000Layout(real=said.real, q_first=said.q_first, rx_mask=said.rx_mask)
+    return said.radar, layout
+
+
 def _process(options: argparse.Namespace) -> int:
     check_place(options.json)
     from rtradar.settings import ProcessingOptions, RunSettings
@@ -129,10 +149,8 @@ def _process(options: argparse.Namespace) -> int:
     settings = {name: getattr(options, name) for name in ProcessingOptions.__annotations__}
     RunSettings(**settings)  # refuses what is wrong before anything slow is imported
     from rtradar.exchange import open_samples
-    from rtradar.radar import Radar
 
-    radar = None if options.radar is None else Radar.load(options.radar)
-    samples = open_samples(options.samples, radar, _layout(options))
+    samples = open_samples(options.samples, *_radar_and_layout(options))
     if samples.radar is None:
         raise InputError(f"'{options.samples}' does not tell of its radar; name it (--radar)")
     from rtradar.pipeline import process_samples

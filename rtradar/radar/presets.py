@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from rtradar.radar.radar import Radar
+from rtradar.system.files import shipped_folder
 
 
 def paper_12ghz() -> Radar:
@@ -13,3 +16,14 @@ def paper_12ghz() -> Radar:
 def paper_77ghz() -> Radar:
     """Make the paper's radar at 77 GHz, whose chirps are five times shorter."""
     return Radar(start_frequency_hz=77e9, chirp_duration_s=12.5e-6)
+
+
+def _shipped(name: str) -> Callable[[], Radar]:
+    """Return a function that reads the radar of that name from its file, which has its sources."""
+    return lambda: Radar.load(shipped_folder("radars") / f"{name}.toml")
+
+
+iwr1443, iwr1843, awr1843 = map(_shipped, ("iwr1443", "iwr1843", "awr1843"))
+awr2243, awr2944 = map(_shipped, ("awr2243", "awr2944"))
+iwr6843, iwr6843aop = map(_shipped, ("iwr6843", "iwr6843aop"))
+radhar, mars = map(_shipped, ("radhar", "mars"))

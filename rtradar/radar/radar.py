@@ -220,7 +220,7 @@ class Radar(Schedule):
         >>> rt.Radar.preset("paper-77ghz").start_frequency_hz
         77000000000.0
         """
-        make = PRESETS.find(name, instead=", or the path of a TOML file")
+        make = PRESETS.find(name, instead=", or the path of a TOML or .cfg file")
         with PRESETS.guarded(name):
             radar = make()
         if not isinstance(radar, Radar):
@@ -234,7 +234,7 @@ class Radar(Schedule):
         Parameters
         ----------
         source : str or path
-            Name of a preset, or path of a ``.toml`` file.
+            Name of a preset, or path of a ``.toml`` file or of a ``.cfg`` file (`from_ti_cfg`).
 
         Returns
         -------
@@ -246,6 +246,8 @@ class Radar(Schedule):
             Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
         path = Path(source)
+        if path.suffix == ".cfg":
+            return cls.from_ti_cfg(path)
         if str(source) in PRESETS or path.suffix != ".toml":
             return cls.preset(str(source))
         table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
@@ -255,6 +257,35 @@ class Radar(Schedule):
             return cls(**{"name": printable(path.stem), **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None
+
+    @classmethod
+    def from_ti_cfg(cls, path: str | Path, board: str | None = None) -> Radar:
+        """Read a configuration file of TI's mmWave SDK, as it is sent to a chip.
+
+        Times, slope, samples, Tx of each chirp, Rx and frames are those of the file, antennas,
+        powers and noise those of the board. A warning names the lines that are not read.
+
+        Parameters
+        ----------
+        path : str or path
+            Path of the ``.cfg`` file.
+        board : str, optional
+            Preset whose antennas are meant. By default the line ``% Platform:`` of the file says
+            it, as in ``% Platform:xWR14xx``, else the band: ``iwr6843`` or ``iwr1843``.
+
+        Returns
+        -------
+        Radar
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be read, has a line that is malformed, or asks for what is not
+            simulated: advanced frames, several Tx in one chirp, chirps that differ.
+        """
+        from rtradar.radar.ti_cfg import read_ti_cfg
+
+        return read_ti_cfg(path, board).radar
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the array, and beside it the ranges and velocities that it can measure.

@@ -10,12 +10,16 @@ from pathlib import Path
 from rtradar.system.files import shipped_folder
 from rtradar.system.registry import Registry
 
+BOARDS = ("iwr1443", "iwr1843", "awr1843", "awr2243", "iwr6843", "iwr6843aop", "awr2944")
+"""Radars that are boards of Texas Instruments."""
+
 RADARS = Registry(
     "rtradar.radars",
     "radar",
     {
         "paper-12ghz": "rtradar.radar.presets:paper_12ghz",
         "paper-77ghz": "rtradar.radar.presets:paper_77ghz",
+        **{name: f"rtradar.radar.presets:{name}" for name in (*BOARDS, "radhar", "mars")},
     },
 )
 """Radars that have a name: each is made by a function without arguments."""

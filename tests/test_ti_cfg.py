@@ -1,0 +1,230 @@
+"""Configuration files of TI's mmWave SDK as radars, and the boards that their antennas are on."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rtradar.cli.samples import _radar_and_layout
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.exchange import Dca1000Layout
+from rtradar.radar import Radar
+from rtradar.radar.ti_cfg import read_ti_cfg
+from rtradar.system.registries import BOARDS
+
+PROFILE = """\
+% Platform:xWR14xx
+sensorStop
+flushCfg
+dfeDataOutputMode 1
+channelCfg 15 7 0
+adcCfg 2 1
+adcbufCfg 0 1 0 1
+profileCfg 0 77 7 7 57.14 0 0 70 1 240 4884 0 0 30
+chirpCfg 0 0 0 0 0 0 0 1
+chirpCfg 1 1 0 0 0 0 0 4
+chirpCfg 2 2 0 0 0 0 0 2
+frameCfg 0 2 16 0 33.333 1 0
+guiMonitor 1 0 0 0 0 0   % what the demo sends
+sensorStart
+"""
+
+
+def write(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = PROFILE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    file = folder / "people.cfg"
+    file.write_text(text)
+    return file
+
+
+def test_a_profile_says_what_the_chip_does(tmp_path: Path) -> None:
+    board = Radar.preset("iwr1443")
+    radar = Radar.load(write(tmp_path))
+    assert radar == Radar.from_ti_cfg(tmp_path / "people.cfg")
+    assert radar.name == "iwr1443 people"
+    assert radar.start_frequency_hz == 77e9
+    assert radar.slope_hz_per_s == pytest.approx(70e12)
+    assert radar.chirp_period_s == pytest.approx(64.14e-6)
+    assert (radar.samples_per_chirp, radar.sample_rate_hz) == (240, 4.884e6)
+    assert radar.adc_start_s == pytest.approx(7e-6)
+    assert (radar.chirps_per_frame, radar.cycles_per_frame) == (48, 16)
+    assert radar.frame_period_s == pytest.approx(33.333e-3)
+    assert radar.tx_order == (0, 2, 1)
+    assert radar.rx_positions_m == board.rx_positions_m
+    assert radar.tx_positions_m == board.tx_positions_m
+    assert radar.transmit_power_dbm == board.transmit_power_dbm
+
+
+def test_radhar_is_that_profile_as_far_as_its_points_go(tmp_path: Path) -> None:
+    profile, radar = Radar.load(write(tmp_path)), Radar.preset("radhar")
+    assert radar.range_bin_m == pytest.approx(0.043577, abs=5e-7)
+    assert radar.max_range_m == pytest.approx(126 * 0.043577, abs=1e-4)
+    assert radar.velocity_bin_mps == pytest.approx(0.6147, abs=5e-5)
+    assert radar.max_velocity_mps == pytest.approx(4.917, abs=5e-4)
+    assert radar.cycles_per_frame == 16
+    for limit in ("range_bin_m", "velocity_bin_mps", "max_velocity_mps"):
+        assert getattr(radar, limit) == pytest.approx(getattr(profile, limit), rel=1e-6)
+
+
+def test_what_is_off_is_left_out(tmp_path: Path) -> None:
+    board = Radar.preset("iwr6843")
+    file = write(
+        tmp_path,
+        ("% Platform:xWR14xx", "% Platform:xWR68xx"),
+        ("channelCfg 15 7 0", "channelCfg 0xa 5 0"),
+        ("profileCfg 0 77", "profileCfg 0 60"),
+        ("0 0 70", "197379 0 70"),  # 3 dB less at each Tx
+        ("chirpCfg 2 2 0 0 0 0 0 2\n", ""),
+        ("frameCfg 0 2", "frameCfg 0 1"),
+    )
+    radar = Radar.from_ti_cfg(file)
+    assert radar.rx_positions_m == (board.rx_positions_m[1], board.rx_positions_m[3])
+    assert radar.tx_positions_m == (board.tx_positions_m[0], board.tx_positions_m[2])
+    assert (radar.tx_order, radar.chirps_per_frame) == ((0, 1), 32)
+    assert radar.transmit_power_dbm == board.transmit_power_dbm - 3
+    assert read_ti_cfg(file).rx_mask == 10
+
+
+def test_real_samples_are_half_as_many_complex_ones(tmp_path: Path) -> None:
+    file = write(tmp_path, ("adcCfg 2 1", "adcCfg 2 0"))
+    said = read_ti_cfg(file)
+    assert said.real
+    assert not said.q_first
+    assert (said.radar.samples_per_chirp, said.radar.sample_rate_hz) == (120, 2.442e6)
+    assert read_ti_cfg(write(tmp_path)).q_first
+
+
+def test_the_file_of_an_awr2944_has_the_samples_before_the_period(tmp_path: Path) -> None:
+    file = write(
+        tmp_path,
+        ("xWR14xx", "xWR294x"),
+        ("channelCfg 15 7 0", "channelCfg 15 15 0 0 0"),
+        ("chirpCfg 2 2 0 0 0 0 0 2\n", "chirpCfg 2 2 0 0 0 0 0 8\nchirpCfg 3 3 0 0 0 0 0 2\n"),
+        ("frameCfg 0 2 16 0 33.333 1 0", "frameCfg 0 3 16 0 240 33.333 1 0"),
+    )
+    radar = Radar.from_ti_cfg(file)
+    assert radar.tx_order == (0, 2, 3, 1)
+    assert radar.frame_period_s == pytest.approx(33.333e-3)
+
+
+def test_a_frame_may_repeat_its_cycle(tmp_path: Path) -> None:
+    lines = "chirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 0 0 0 0 0 4\nchirpCfg 2 2 0 0 0 0 0 2\n"
+    file = write(tmp_path, (lines, "chirpCfg 0 2 0 0 0 0 0 1\n"))
+    radar = Radar.from_ti_cfg(file)
+    assert (radar.n_tx, radar.cycles_per_frame) == (1, 48)
+
+
+def test_the_board_is_named_or_follows_from_the_band(tmp_path: Path) -> None:
+    file = write(tmp_path, ("% Platform:xWR14xx\n", ""))
+    with pytest.warns(ValidityWarning, match="names no board: the antennas are those of iwr1843"):
+        assert Radar.from_ti_cfg(file).name == "iwr1843 people"
+    assert Radar.from_ti_cfg(file, board="awr2243").name == "awr2243 people"
+    file.write_text(file.read_text().replace("Cfg 0 77", "Cfg 0 60"))
+    with pytest.warns(ValidityWarning, match="iwr6843"):
+        Radar.from_ti_cfg(file)
+
+
+def test_lines_that_are_not_read_are_named_in_one_warning(tmp_path: Path) -> None:
+    file = write(tmp_path, ("sensorStart\n", "trackingCfg 1 2\nfoo\nfoo 1\n"))
+    with pytest.warns(ValidityWarning) as caught:
+        Radar.from_ti_cfg(file)
+    (warning,) = caught
+    assert "not read: trackingCfg (line 14), foo (line 15)" in str(warning.message)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("frameCfg 0 2 16", "frameCfg 0 3 16", "line 12: no chirpCfg says what chirp 3 is"),
+        ("frameCfg 0 2 16", "frameCfg 0 2 1.5", "line 12: the number of loops is 1.5"),
+        ("frameCfg 0 2 16 0 33.333 1 0", "frameCfg 0 2 16", "line 12: frameCfg has 3 values"),
+        ("33.333", "1", "frame_period_s = 0.001"),
+        ("57.14", "soon", "line 8: profileCfg has 'soon', which is no number"),
+        ("0 0 70", "0 0 -70", "line 8: the sweep must rise"),
+        ("0 0 70", "0 4 70", "line 8: phases of the Tx"),
+        ("0 0 70", "768 0 70", "line 8: the Tx have different powers"),
+        ("240 4884", "600 4884", "do not fit into chirp_duration_s"),
+        ("0 0 0 0 0 0 0 1", "0 0 0 0 0 0 0 5", "line 9: several Tx transmit in one chirp"),
+        ("0 0 0 0 0 0 0 1", "0 0 0 0 0 2 0 1", "line 9: the chirp differs from its profile"),
+        ("chirpCfg 1 1 0 0 0 0 0 4", "chirpCfg 1 1 0 0 0 0 0 1", "a Tx transmits twice"),
+        ("chirpCfg 1 1 0", "chirpCfg 1 1 1", "line 12: its chirps must have one profileCfg"),
+        ("channelCfg 15 7", "channelCfg 15 3", "line 10: Tx 3 transmits, but channelCfg"),
+        ("channelCfg 15 7", "channelCfg 0 7", "line 5: the mask of Rx is 0"),
+        ("adcCfg 2 1", "adcCfg 2 2", "line 6: the samples must be complex 1x (1) or real (0)"),
+        ("dfeDataOutputMode 1", "dfeDataOutputMode 3", "line 4: dfeDataOutputMode must be 1"),
+        ("sensorStart", "bpmCfg -1 1 0 2", "line 14: binary phase modulation"),
+        ("sensorStart", "advFrameCfg 1 0 0 1 0", "line 14: frames of several kinds"),
+        ("adcCfg 2 1\n", "", "has no adcCfg"),
+        ("xWR14xx", "xWR16xx", "is for platform xWR16xx, whose antennas are not known"),
+    ],
+)
+def test_what_is_not_simulated_is_refused_in_one_line(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        Radar.load(write(tmp_path, (old, new)))
+    assert says in str(caught.value)
+    assert "people.cfg'" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="No such file"):
+        Radar.load(tmp_path / "none.cfg")
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_text_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
+    lines = PROFILE.splitlines()
+    words = st.sampled_from(PROFILE.split()) | st.text(max_size=6) | st.floats().map(str)
+    for _ in range(data.draw(st.integers(1, 4))):
+        k = data.draw(st.integers(0, len(lines) - 1))
+        lines[k] = " ".join(data.draw(st.lists(words, max_size=15)))
+    file = tmp_path / "any.cfg"
+    file.write_text("\n".join(lines), encoding="utf-8", errors="replace")
+    with warnings.catch_warnings(), contextlib.suppress(InputError):
+        warnings.simplefilter("ignore")
+        assert Radar.from_ti_cfg(file).n_tx >= 1
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_a_board_has_all_that_is_asked_of_it(name: str) -> None:
+    radar = Radar.preset(name)
+    assert radar.n_rx == 4
+    assert radar.n_tx == (4 if name == "awr2944" else 3)
+    assert radar.transmit_power_dbm is not None
+    assert radar.noise_figure_db is not None
+    assert radar.tx_antenna is not None
+    assert radar.rx_antenna == radar.tx_antenna
+    # Each virtual element is somewhere else, and their centre is the radar's place.
+    places = np.round(radar.virtual_m * 1e6)
+    assert len(np.unique(places, axis=0)) == radar.n_channels
+    np.testing.assert_allclose(radar.virtual_m.mean(axis=0), 0, atol=1e-5)
+
+
+def test_rtradar_process_takes_the_order_of_words_from_the_profile(tmp_path: Path) -> None:
+    file = write(tmp_path)
+    options = argparse.Namespace(
+        radar=str(file), samples=tmp_path / "adc.bin", lanes=None, real=False, q_first=False
+    )
+    options.rx_mask, options.format = None, None
+    assert _radar_and_layout(options) == (
+        Radar.load(file),
+        Dca1000Layout(q_first=True, rx_mask=15),
+    )
+    options.lanes = 2  # what is asked for is not mixed with the profile
+    assert _radar_and_layout(options)[1] == Dca1000Layout(lanes=2)
+    options.lanes = None
+    (tmp_path / "adc.json").write_text("{}")  # says the order of what rtradar wrote
+    assert _radar_and_layout(options)[1] is None
