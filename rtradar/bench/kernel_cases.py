@@ -101,6 +101,78 @@ def _noise(k: Any) -> Calls:
     return call, lambda: k.noise_reference(*given, out.shape)
 
 
+# -- receiver --------------------------------------------------------------------------------------
+
+
+def _samples(*shape: int) -> Any:
+    parts = np.random.default_rng(1).standard_normal((*shape, 2), dtype=np.float32)
+    return parts.view(np.complex64)[..., 0]
+
+
+def _in_place(kernel: Any, *given: Any) -> Any:
+    samples = _samples(48, 8, 256)
+
+    def call() -> Any:
+        out = samples.copy()
+        kernel(*given, out)
+        return out
+
+    return call, samples
+
+
+@kernel_case("receiver.turn_by_noise", "phase noise of 48 chirps, 8 receivers, 256 samples", 2e-7)
+def _turn_by_noise(k: Any) -> Calls:
+    phase = np.random.default_rng(0).normal(0, 0.1, (48, 256)).astype(np.float32)
+    call, samples = _in_place(k.turn_by_noise, phase)
+    return call, lambda: k.turn_by_noise_reference(phase, samples)
+
+
+@kernel_case("receiver.add_still", "leakage and its noise, 48 chirps, 8 receivers", 5e-7)
+def _add_still(k: Any) -> Calls:
+    phase = np.random.default_rng(0).normal(0, 0.1, (48, 2, 256)).astype(np.float32)
+    given = (
+        np.arange(48) % 12,
+        _samples(12, 8, 256),
+        phase,
+        _samples(12, 8, 2, 256),
+        _samples(12, 8),
+    )
+    call, samples = _in_place(k.add_still, *given)
+    return call, lambda: k.add_still_reference(*given, samples)
+
+
+@kernel_case("receiver.mirror", "IQ errors of 48 chirps, 8 receivers, 256 samples", 2e-7)
+def _mirror(k: Any) -> Calls:
+    given = np.complex64(1.01 + 0.02j), np.complex64(0.03 - 0.01j)
+    call, samples = _in_place(k.mirror, *given)
+    return call, lambda: k.mirror_reference(*given, samples)
+
+
+@kernel_case("receiver.high_pass", "two filters, 48 chirps, 8 receivers, 256 samples", 2e-6)
+def _high_pass(k: Any) -> Calls:
+    corners = np.array([0.05, 0.2], np.float32)
+    call, samples = _in_place(k.high_pass, corners)
+    return call, lambda: k.high_pass_reference(corners, samples)
+
+
+@kernel_case("receiver.convert", "an ADC of 6 bits, 48 chirps, 8 receivers, 256 samples", 0)
+def _convert(k: Any) -> Calls:
+    # A power of two, so that steps are the same numbers in both.
+    given = np.complex64(0.25 - 0.125j), np.float32(2.0**-4), np.float32(2)
+    call, samples = _in_place(k.convert, *given)
+    return call, lambda: k.convert_reference(*given, samples)
+
+
+@kernel_case("receiver.add_ramps", "another radar in 48 chirps, 8 receivers, 256 samples", 1e-5)
+def _add_ramps(k: Any) -> Calls:
+    starts, tx = np.arange(48) * 62.5e-6, np.arange(48) % 12
+    ramps = 12e9, 1.1e14, 30e-6, 40.7e-6, 1e-5
+    given = starts, np.full(48, 12e9), tx, 6.4e13, 4.096e6, ramps, _samples(12, 8)
+    out = np.empty((48, 8, 256), np.complex64)
+    call = filled(k.add_ramps, *given, out=(out,), adds=True)
+    return call, lambda: k.add_ramps_reference(*given, out.shape)
+
+
 # -- processing ------------------------------------------------------------------------------------
 
 

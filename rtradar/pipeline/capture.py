@@ -21,7 +21,7 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.signal import Noise, receive, synthesize
+from rtradar.signal import Noise, ReceiverStage, receive, synthesize
 from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.files import uninterruptible
@@ -50,7 +50,8 @@ class Capture:
     ``inside`` approximates.
     ``link_budget`` is that of the person's parts, ``warned`` its warnings. ``n_chirps`` are
     whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
-    the IF samples, and ``warmup_s`` the time until everything was compiled or loaded [s].
+    the IF samples, ``receiver`` what else their receiver adds, and ``warmup_s`` the time until
+    everything was compiled or loaded [s].
     """
 
     people: tuple[Person, ...]
@@ -64,6 +65,7 @@ class Capture:
     link_budget: LinkBudget
     warned: tuple[str, ...]
     noise: Noise
+    receiver: ReceiverStage | None
     n_chirps: int
     frame_starts: NDArray[np.int64]
     warmup_s: float
@@ -128,12 +130,23 @@ class Capture:
                 samples = synthesize(echoes, radar, times, dtype=np.complex64, out=samples_of[:n])
                 if ghosts is not None:
                     ghosts.add(samples, np.arange(first, first + n))
+            phases = None
+            if self.receiver is not None:
+                with stages.time("receiver"):
+                    phases = self.receiver.phases(echoes, first)
+                    self.receiver.turn_moving(samples, phases)
             if room is not None:
                 with stages.time("clutter"):
                     room.add(samples, np.arange(first, first + n))
+            if self.receiver is not None:
+                with stages.time("receiver"):
+                    self.receiver.transmit(samples, phases, first)
             with stages.time("noise"):
                 received = receive(samples, radar, first)
                 self.noise.add(received, radar, first)
+            if self.receiver is not None:
+                with stages.time("receiver"):
+                    self.receiver.receive(received, first)
             return received
 
         # A function of its own: names that a loop binds would keep echoes alive while the next

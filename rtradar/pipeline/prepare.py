@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body, Person
 from rtradar.body.people import body_of_people
+from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.indoors import indoors
+from rtradar.pipeline.indoors import Indoors, indoors
 from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import reuse_freed_memory, stage_line
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
+from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget, link_budget
@@ -31,7 +33,8 @@ from rtradar.scatter.validity import warn_of
 from rtradar.scatter.world import World, build_world, model_of_people
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
-from rtradar.signal import Noise
+from rtradar.signal import Expected, Noise, ReceiverStage
+from rtradar.signal.phase_noise import mean_delays
 from rtradar.system.checks import brief
 
 Moving = Motion | Person | Sequence[Motion | Person | Object]
@@ -50,6 +53,11 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     if settings.snr_db == "physical":
         # They report a missing value before the work.
         radar.noise_power_w, radar.watts_per_m2  # noqa: B018
+    if radar.receiver is not None and not settings.spreading:
+        raise InputError(
+            f"radar '{radar.name}' has a [receiver], whose levels need the loss with distance; "
+            "leave out --no-spreading (spreading=False)"
+        )
     with stage_line("preparing"):
         with processing_compiled_beside():
             with processing.stages.time("motion"):
@@ -105,6 +113,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         link_budget=budget,
         warned=tuple(str(warning.message) for warning in caught),
         noise=noise,
+        receiver=_receiver(radar, budget, noise, echoes, inside, n_chirps, settings),
         n_chirps=n_chirps,
         frame_starts=frame_starts,
         warmup_s=warmup_s,
@@ -170,6 +179,33 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
         spreading=settings.spreading,
         materials=body.materials,
         **(settings.model_options or {}),
+    )
+
+
+def _receiver(
+    radar: Radar,
+    budget: LinkBudget,
+    noise: Noise,
+    echoes: Echoes,
+    inside: Indoors | None,
+    n_chirps: int,
+    settings: RunSettings,
+) -> ReceiverStage | None:
+    """Return what the receiver adds, by some echoes of people and the noise of a map's cell."""
+    if radar.receiver is None:
+        return None
+    gain = 1.0
+    lengths = radar.samples_per_chirp, radar.cycles_per_frame
+    for window, n in zip((settings.range_window, settings.doppler_window), lengths, strict=True):
+        gain *= float((weights(window, n) ** 2).sum())
+    moving_s = float(mean_delays(echoes).mean())
+    return ReceiverStage(
+        radar,
+        Expected(budget.power, moving_s, noise.power, noise.power * gain),
+        n_chirps=n_chirps,
+        seed=settings.seed,
+        room=inside.room if inside else None,
+        keep_all=settings.keep_all,
     )
 
 

@@ -126,6 +126,11 @@ class RoomIf:
         """Mean power of the room's IF samples without a person [m^2]."""
         return float((np.abs(self._whole) ** 2).mean())
 
+    @property
+    def cycle(self) -> tuple[Echoes, ...]:
+        """Echoes of one cycle of the room without a person."""
+        return tuple(group.echoes for group in self._groups)
+
     def clutter_if(self, chirps: NDArray[np.int64]) -> _Samples:
         """Return the IF samples of the room (chirp, rx, sample); chirps as in `add`."""
         out = np.zeros((len(chirps), *self._whole.shape[1:]), dtype=np.complex64)

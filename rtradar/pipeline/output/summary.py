@@ -83,6 +83,8 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
     summary["limits"] = _limits(capture)
     if (modelled := account_of(capture.model)) is not None:
         summary["modelled"] = modelled
+    if capture.receiver is not None:
+        summary["receiver"] = [dataclasses.asdict(effect) for effect in capture.receiver.effects]
     if capture.inside:
         summary["room"] = capture.inside.summary
     return summary

@@ -1,0 +1,194 @@
+"""What a receiver does to its samples, row by row: phase noise, filters, converters, other radars.
+
+Each row is computed by itself, so that how a capture is cut into blocks changes no bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtradar.kernels.elementary import phasor
+from rtradar.kernels.jit import compiled
+
+
+@compiled(fastmath={"contract"})
+def turn_by_noise(phase, out):
+    """Multiply ``out (chirp, rx, sample)`` by 1 + j ``phase (chirp, sample)``, both in float32."""
+    for chirp in range(len(out)):
+        small = phase[chirp]
+        for receiver in range(out.shape[1]):
+            own = out[chirp, receiver]
+            for i in range(len(own)):
+                z = own[i]
+                own[i] = complex(z.real - small[i] * z.imag, z.imag + small[i] * z.real)
+
+
+def turn_by_noise_reference(phase, given):
+    """`turn_by_noise` of what is given."""
+    return given * (1 + 1j * phase[:, None])
+
+
+@compiled(fastmath={"contract"})
+def add_still(tx, still, phase, fields, gain, out):
+    """Add to ``out (chirp, rx, sample)`` what is still, with its phase noise, and multiply by gain.
+
+    ``still (tx, rx, sample)`` is added, and j times the sum over nodes of ``phase (chirp, node,
+    sample)`` times ``fields (tx, rx, node, sample)``; then comes ``gain (tx, rx)``.
+    """
+    for chirp in range(len(tx)):
+        for receiver in range(out.shape[1]):
+            own, constant = out[chirp, receiver], still[tx[chirp], receiver]
+            factor = gain[tx[chirp], receiver]
+            for i in range(len(own)):
+                own[i] += constant[i]
+            for node in range(fields.shape[2]):
+                small, field = phase[chirp, node], fields[tx[chirp], receiver, node]
+                for i in range(len(own)):
+                    own[i] += complex(-small[i] * field[i].imag, small[i] * field[i].real)
+            if factor != np.complex64(1):
+                for i in range(len(own)):
+                    own[i] *= factor
+
+
+def add_still_reference(tx, still, phase, fields, gain, given):
+    """`add_still` to what is given."""
+    noise = 1j * np.einsum("cpn,crpn->crn", phase, fields[tx])
+    return gain[tx][:, :, None] * (given + still[tx] + noise)
+
+
+@compiled(fastmath={"contract"})
+def high_pass(corners, out):
+    """Apply high-pass filters of first order to ``out (row, rx, sample)``, one after the other.
+
+    ``corners (filter,)`` float32 are pi f_c / Fs (bilinear transform, right at low frequencies).
+    Before the first sample come those after it, mirrored, until the filter has settled. All
+    receivers of a row go side by side, in vector lanes.
+    """
+    n_rx, n_samples, one = out.shape[1], out.shape[2], np.float32(1)
+    lanes = np.empty((n_samples, 2 * n_rx), np.float32)
+    state, before = np.empty(2 * n_rx, np.float32), np.empty(2 * n_rx, np.float32)
+    for row in range(len(out)):
+        samples = out[row]
+        for receiver in range(n_rx):
+            for i in range(n_samples):
+                lanes[i, 2 * receiver] = samples[receiver, i].real
+                lanes[i, 2 * receiver + 1] = samples[receiver, i].imag
+        for corner in corners:
+            kept, passed = (one - corner) / (one + corner), one / (one + corner)
+            # The filter settles within some of its time constants, 1 / (2 corner) samples each.
+            ahead = min(n_samples - 1, int(np.float32(4) / corner) + 1)
+            for lane in range(2 * n_rx):
+                state[lane], before[lane] = 0, lanes[ahead, lane]
+            for i in range(ahead - 1, 0, -1):
+                for lane in range(2 * n_rx):
+                    new = lanes[i, lane]
+                    state[lane] = kept * state[lane] + passed * (new - before[lane])
+                    before[lane] = new
+            for i in range(n_samples):
+                for lane in range(2 * n_rx):
+                    new = lanes[i, lane]
+                    state[lane] = kept * state[lane] + passed * (new - before[lane])
+                    before[lane] = new
+                    lanes[i, lane] = state[lane]
+        for receiver in range(n_rx):
+            for i in range(n_samples):
+                samples[receiver, i] = complex(lanes[i, 2 * receiver], lanes[i, 2 * receiver + 1])
+
+
+def high_pass_reference(corners, given):
+    """`high_pass` of what is given, by SciPy's filter."""
+    from scipy.signal import lfilter
+
+    samples = given.astype(np.complex128)
+    for corner in corners:
+        ahead = min(given.shape[2] - 1, int(4 / corner) + 1)
+        longer = np.concatenate([samples[..., ahead:0:-1], samples], axis=-1)
+        ratio = np.array([1, -1]) / (1 + corner), np.array([1, -(1 - corner) / (1 + corner)])
+        samples = lfilter(*ratio, longer - longer[..., :1], axis=-1)[..., ahead:]
+    return samples
+
+
+@compiled(fastmath={"contract"})
+def mirror(own, image, out):
+    """Make own z + image conj(z) of each z of ``out (row, rx, sample)``."""
+    for row in range(len(out)):
+        for receiver in range(out.shape[1]):
+            samples = out[row, receiver]
+            for i in range(len(samples)):
+                samples[i] = own * samples[i] + image * samples[i].conjugate()
+
+
+def mirror_reference(own, image, given):
+    """`mirror` of what is given."""
+    return own * given + image * given.conj()
+
+
+@compiled(fastmath={"contract"})
+def convert(dc, step, limit, out):
+    """Add ``dc`` to ``out (row, rx, sample)``, round both parts to steps, and clip them.
+
+    There are no steps if ``step`` is 0. The highest value is a step below ``limit``, the lowest its
+    negative.
+    """
+    half = np.float32(0.5)
+    for row in range(len(out)):
+        for receiver in range(out.shape[1]):
+            samples = out[row, receiver]
+            for i in range(len(samples)):
+                real, imaginary = samples[i].real + dc.real, samples[i].imag + dc.imag
+                if step > 0:
+                    real = step * np.floor(real / step + half)
+                    imaginary = step * np.floor(imaginary / step + half)
+                samples[i] = complex(
+                    min(max(real, -limit), limit - step), min(max(imaginary, -limit), limit - step)
+                )
+
+
+def convert_reference(dc, step, limit, given):
+    """`convert` of what is given."""
+    parts = np.stack([(given + dc).real, (given + dc).imag])
+    if step > 0:
+        parts = step * np.floor(parts / step + 0.5)
+    parts = np.clip(parts, -limit, limit - step)
+    return parts[0] + 1j * parts[1]
+
+
+@compiled(fastmath={"contract"})
+def add_ramps(starts, frequency, tx, slope, rate, ramps, steering, out):
+    """Add another radar's ramps to ``out (row, rx, sample)`` while they are in the band of the IF.
+
+    Rows begin at ``starts (row,)`` at ``frequency (row,)`` with our ``slope``. ``ramps`` are start
+    frequency and slope, duration, period and first start of the other's. ``steering (tx, rx)`` are
+    complex amplitudes, and ``tx (row,)`` is whose row it is.
+    """
+    other, other_slope, ramp_s, period_s, first_s = ramps
+    n_samples = out.shape[2]
+    for row in range(len(starts)):
+        since = starts[row] - first_s
+        begin = max(0, int(np.floor((since - ramp_s) / period_s)))
+        for number in range(begin, int(np.floor((since + n_samples / rate) / period_s)) + 1):
+            late = since - number * period_s
+            offset = frequency[row] - other - other_slope * late
+            at_start = (other + other_slope / 2 * late) * late
+            for i in range(n_samples):
+                t = i / rate
+                beat = offset + (slope - other_slope) * t
+                if 0 <= late + t < ramp_s and 0 <= beat < rate:
+                    turns = (offset + (slope - other_slope) / 2 * t) * t - at_start
+                    real, imaginary = phasor(turns)
+                    wave = complex(real, imaginary)
+                    for receiver in range(out.shape[1]):
+                        out[row, receiver, i] += steering[tx[row], receiver] * wave
+
+
+def add_ramps_reference(starts, frequency, tx, slope, rate, ramps, steering, shape):
+    """`add_ramps` to zeros, for ramps that do not overlap."""
+    other, other_slope, ramp_s, period_s, first_s = ramps
+    t = np.arange(shape[2]) / rate
+    since = starts[:, None] + t - first_s
+    late = since - np.floor(since / period_s) * period_s
+    theirs = other * late + other_slope / 2 * late**2
+    beat = frequency[:, None] + slope * t - other - other_slope * late
+    inside = (since >= 0) & (late < ramp_s) & (beat >= 0) & (beat < rate)
+    turns = frequency[:, None] * t + slope / 2 * t**2 - theirs
+    return (inside * np.exp(2j * np.pi * turns))[:, None] * steering[tx][:, :, None]

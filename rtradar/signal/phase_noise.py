@@ -1,0 +1,169 @@
+"""Phase noise of the oscillator that is left in the IF, where both ways of it cancel in part.
+
+An echo of delay tau is mixed with the noise phi(t) - phi(t - tau), whose spectrum is that of the
+oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
+x + j (phi(t) - phi(t - tau)) x. Of what is still, (phi(t) - phi(t - tau)) / tau is interpolated
+between some delays, and echoes are summed once for each. Of what moves all echoes have the mean
+delay of their power, chirp by chirp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError
+from rtradar.kernels.gaussian_noise import add_noise
+from rtradar.radar import Radar
+from rtradar.receiver import Receiver
+from rtradar.signal.synthesis import synthesize
+from rtradar.system.seeds import stream
+from rtradar.system.threads import thread_map
+
+_Array = NDArray[np.float64]
+
+_STREAM = 7
+"""Number of these random streams, which differ from those of the noise of a cycle."""
+
+_TOLERANCE = 0.02
+"""Error of the interpolation over delays, as a fraction of the noise's amplitude: 0.2 dB."""
+
+_CYCLES_AT_ONCE = 16
+"""Cycles of one task of a thread, because a return to Python waits for the other threads there."""
+
+_MOST_RAD = 0.3
+"""Largest deviation of a phase whose square is left out."""
+
+_DELAYS = 256
+"""Steps of delay in which the power of still echoes is added up for their level."""
+
+
+def density_of(receiver: Receiver, frequency: _Array) -> _Array:
+    """Spectral density of the oscillator's phase on either side of the carrier [rad^2/Hz]."""
+    offsets = np.log10(np.maximum(frequency, 1e-3))
+    points = np.log10(np.array(receiver.phase_noise_hz))
+    return np.asarray(10 ** (np.interp(offsets, points, receiver.phase_noise_dbc_hz) / 10))
+
+
+class PhaseNoise:
+    """Residual phase noise of echoes, from a random stream for each cycle.
+
+    ``still`` are the echoes of one cycle that do not move, ``moving_s`` the delay of those that do.
+    """
+
+    def __init__(
+        self, radar: Radar, receiver: Receiver, seed: int, still: Sequence[Echoes], moving_s: float
+    ) -> None:
+        self._radar, self._seed = radar, seed
+        self._rows = 1 if radar.at_once else radar.n_tx
+        n, rate = radar.samples_per_chirp, radar.sample_rate_hz
+        self._frequency: _Array = np.arange(n // 2 + 1, dtype=np.float64) * (rate / n)
+        self._density = density_of(receiver, self._frequency)
+        self._scale = np.sqrt(n * rate * self._density / 2)
+        self._still = still
+        longest = max((one.length.max() for one in still if one.length.size), default=0.0)
+        self._longest_s = longest / SPEED_OF_LIGHT_MPS
+        most_s = max(self._longest_s, moving_s)
+        of_all = self._density * self._filter(most_s)
+        deviation = math.sqrt(2 * float(of_all.sum()) * rate / n)
+        if deviation > _MOST_RAD:
+            raise InputError(
+                f"receiver: phase_noise_dbc_hz leaves {deviation:.2g} rad in an echo after "
+                f"{most_s:.2g} s; up to {_MOST_RAD} rad are modelled, as noise beside an echo, so "
+                "give a lower level"
+            )
+        self._nodes_s = self._nodes() if still else np.zeros(0)
+
+    def _filter(self, delay_s: float) -> _Array:
+        return np.asarray(4 * np.sin(np.pi * self._frequency * delay_s) ** 2)
+
+    def _nodes(self) -> _Array:
+        """Chebyshev nodes from 0 to the longest delay, as many as the tolerance asks for."""
+        half, count = math.pi * self._radar.sample_rate_hz * self._longest_s / 2, 1
+        while 2 * (half / 2) ** count / math.factorial(count) > _TOLERANCE:
+            count += 1
+        places = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        return np.asarray(self._longest_s * (1 + places) / 2)
+
+    def fields(self) -> NDArray[np.complex64]:
+        """IF of the still echoes (tx, rx, node, sample), which noise at the nodes multiplies."""
+        radar, nodes = self._radar, self._nodes_s
+        shape = radar.n_tx, radar.n_rx, len(nodes), radar.samples_per_chirp
+        found, times = np.zeros(shape, np.complex64), radar.chirp_times(radar.n_tx)
+        for echoes in self._still:
+            delay = echoes.length / SPEED_OF_LIGHT_MPS
+            for number, node in enumerate(nodes):
+                others = np.delete(nodes, number)
+                weight = delay / node * np.prod([(delay - x) / (node - x) for x in others], axis=0)
+                weighted = replace(echoes, amplitude=echoes.amplitude * weight)
+                found[:, :, number] += synthesize(weighted, radar, times, dtype=np.complex64)
+        return found
+
+    def level_m2(self, moving_m2: float, moving_s: float) -> float:
+        """Power per sample of white noise as dense as the residual noise is where it is densest."""
+        total = self._filter(moving_s) * moving_m2
+        for echoes in self._still:
+            power = (np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1))
+            delay = echoes.length.mean(axis=(0, 1)) / SPEED_OF_LIGHT_MPS
+            sums, edges = np.histogram(
+                delay, _DELAYS, (0, max(self._longest_s, 1e-15)), weights=power
+            )
+            for one, middle in zip(sums, (edges[1:] + edges[:-1]) / 2, strict=True):
+                if one > 0:
+                    total = total + one * self._filter(middle)
+        return float((total * self._density).max() * self._radar.sample_rate_hz)
+
+    def phases(self, first: int, moving_s: _Array) -> NDArray[np.float32]:
+        """Residual phase noise (chirp, 1 + node, sample) [rad] of chirps from ``first`` on.
+
+        The first is that of echoes with the delays ``moving_s (chirp,)``, the others are those at
+        the nodes.
+        """
+        radar, n = self._radar, self._radar.samples_per_chirp
+        out = np.empty((len(moving_s), 1 + len(self._nodes_s), n), np.float32)
+        half_turn = (np.pi * self._frequency).astype(np.float32)
+        at_nodes = _residue(half_turn * self._nodes_s[:, None].astype(np.float32))
+        scale = self._scale.astype(np.float32)
+
+        def fill_cycle(begin: int) -> None:
+            bits = np.random.SFC64(stream(self._seed, (first + begin) // radar.n_tx, _STREAM))
+            random = np.zeros((self._rows, 1, len(half_turn)), np.complex64)
+            state = np.asarray(bits.state["state"]["state"])
+            add_noise(state[None], self._rows, np.float32(1), random)
+            own = slice(begin, begin + radar.n_tx)
+            delay = moving_s[own].astype(np.float32)
+            filters = np.empty((len(delay), 1 + len(at_nodes), len(half_turn)), np.complex64)
+            filters[:, 0] = _residue(half_turn * delay[:, None])
+            filters[:, 1:] = at_nodes
+            filters *= random * scale
+            # Cycle by cycle, for the FFT of other numbers of rows may round otherwise.
+            out[own] = scipy.fft.irfft(filters, n, axis=-1)
+
+        def fill(begin: int) -> None:
+            for cycle in range(begin, min(begin + at_once, len(out)), radar.n_tx):
+                fill_cycle(cycle)
+
+        at_once = _CYCLES_AT_ONCE * radar.n_tx
+        thread_map(fill, range(0, len(out), at_once))
+        return out
+
+
+def _residue(half: NDArray[np.float32]) -> NDArray[np.complex64]:
+    """1 - exp(-2j half), to as many digits where it is small."""
+    sine, out = np.sin(half), np.empty(half.shape, np.complex64)
+    out.real, out.imag = 2 * sine * sine, 2 * sine * np.cos(half)
+    return out
+
+
+def mean_delays(echoes: Echoes) -> _Array:
+    """Mean delay (chirp,) [s] of echoes by their power, at the first receiver."""
+    power = np.abs(echoes.amplitude[0, :, 0]) ** 2
+    total = np.maximum(power.sum(axis=-1), np.finfo(np.float64).tiny)
+    return np.asarray((power * echoes.length[:, 0]).sum(axis=-1) / total / SPEED_OF_LIGHT_MPS)
