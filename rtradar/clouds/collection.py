@@ -239,7 +239,7 @@ class Collection:
             Number of points of each cloud. Of larger clouds as many are taken, a random sample of
             an RDT cloud; points of smaller ones are repeated, and an empty one becomes zeros.
         source : bool
-            Of ``spatial``, whether each item has a third entry: who returned each point, int64
+            Whether each item of ``spatial`` has a third entry: who returned each point, int64
             (point,), as `spatial_source` gives it; -2 in an empty cloud.
 
         Returns
