@@ -23,10 +23,10 @@ from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.rigid.legs import Past
+from rtradar.scatter.rigid.people import OccludingPeople
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
 _INSTANTS = 8
@@ -131,7 +131,7 @@ def build_world(
     past = None
     if model.variant is not None:
         mi = use(select(variant))
-        past = Past(mi, RoomTracer(mi, scene), body, BodyTracer(mi, body.semi_axes))
+        past = Past(mi, RoomTracer(mi, scene), OccludingPeople(mi, body))
     rigid = partial(RigidEchoes, radar, past=past, walls=scene.walls, spreading=spreading)
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     objects = [

@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
-from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
 from rtradar.scatter.common.polarization import antenna_field, bisector, sent_field, unit
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scatter.rigid.people import OccludingPeople
 from rtradar.scene import Material, Object, reflection
-from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
@@ -40,8 +39,7 @@ class Past(NamedTuple):
 
     mi: Any
     room: RoomTracer
-    body: Body
-    people: BodyTracer
+    people: OccludingPeople
 
 
 class RigidLegs:
@@ -90,12 +88,8 @@ class RigidLegs:
     def _clear(self, time_s: float, origins: Array, targets: Array, but: Object | None) -> Bools:
         if self._past is None or len(origins) == 0:
             return np.ones(len(origins), dtype=bool)
-        body, people = self._past.body, self._past.people
         clear = ~self._past.room.blocked(origins, targets, time_s, but=but)
-        poses = body.at([min(max(time_s, 0.0), body.duration_s)])
-        people.pose(poses.centres[0], poses.frames[0])
-        on_none = np.full(int(clear.sum()), -1, dtype=np.int64)
-        clear[clear] = people.sees(origins[clear], targets[clear], on_none)
+        clear[clear] = self._past.people.clear(time_s, origins[clear], targets[clear])
         return clear
 
     def longer_m(self, point: Array) -> float:
