@@ -351,7 +351,7 @@ def _facets_by_length(k: Any) -> Calls:
 
 
 @kernel_case(
-    "scatter.silhouettes.occluded_fractions", "shadow of 4 parts on 20 legs, 400 lines", 3e-3
+    "scatter.silhouettes.occluded_fractions", "shadow of 4 parts and a triangle on 20 legs", 3e-3
 )
 def _occluded_fractions(k: Any) -> Calls:
     rng, table = np.random.default_rng(1), k.wave_table(0.1)
@@ -361,7 +361,9 @@ def _occluded_fractions(k: Any) -> Calls:
     axes, frames = rng.uniform(0.05, 0.25, (4, 3)), np.linalg.qr(rng.normal(size=(4, 3, 3)))[0]
     centres = np.array([0, 0, 1.1]) + rng.uniform(-0.3, 0.3, (4, 3))
     maps = np.ascontiguousarray(np.swapaxes(frames, 1, 2) / axes[:, :, None])
-    given = (starts, ends, np.zeros(20), 1.3 * length), 0.0214, (centres, maps, axes.max(axis=1))
+    triangle = np.array([[[0.3, -0.4, 0.7], [0.1, 0.3, 0.8], [-0.2, 0.1, 1.4]]])
+    body = centres, maps, axes.max(axis=1), triangle, np.zeros(1, dtype=bool)
+    given = (starts, ends, np.zeros(20), 1.3 * length), 0.0214, body
     scales = np.array([0.87, 1.13])
     out = np.empty((20, 2), dtype=np.complex128)
     call = filled(k.occluded_fractions, *given, 4.0, 400, scales, table, out=(out,))

@@ -54,7 +54,11 @@ def indoors(
     paths = model.prune(n_chirps, noise)
     order = max(settings.order, 1)
     clutter = Clutter(radar, scene, variant=variant, order=order).prune(noise)
-    room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body))
+    allowed = 0.0
+    if settings.path_tolerance_db is not None:
+        allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
+    shadow = ClutterShadow(clutter, body, scene.objects, allowed)
+    room = RoomIf(radar, clutter.cycle(), shadow)
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
         "paths": [asdict(path) for path in paths],
@@ -68,7 +72,6 @@ def indoors(
     }
     ghosts = None
     if settings.path_tolerance_db is not None and person_power_m2 > 0 and model.has_ghost_tones:
-        allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
         ghosts, said = ghosts_within(model, radar, n_chirps, allowed)
         error = said.pop("error_m2") / person_power_m2
         said["error_db"] = 10 * math.log10(error) if error > 0 else None

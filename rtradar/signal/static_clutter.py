@@ -33,14 +33,15 @@ class MovingShadow(Protocol):
     """What of static clutter a body occludes, as `ClutterShadow` computes it.
 
     ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
-    each object of the clutter, ``mirrors`` the objects that walls reflect, ``frequency (node,)``
-    the frequencies of their shadow [Hz].
+    each object of the clutter, ``mirrors`` the objects that walls reflect; ``frequency (node,)``
+    are the frequencies of their shadow, ``point_frequency (node,)`` those of the others' [Hz].
     """
 
     step: int
     starts: NDArray[np.int64]
     mirrors: tuple[int, ...]
     frequency: _Array
+    point_frequency: _Array
 
     def at(self, keyframe: int) -> Shadow:
         """Return what is occluded at a keyframe."""
@@ -80,11 +81,13 @@ def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group
     return groups
 
 
-def _coarser(group: _Group, radar: Radar) -> _Group:
-    """Give amplitudes at no more frequencies than a shadow, weaker than the room, asks for."""
-    echoes, nodes = group.echoes, sweep_nodes(radar, _SHADOW_NODES)
-    if len(echoes.frequency) <= _SHADOW_NODES:
-        return group
+def _resampled(group: _Group, radar: Radar, shadow: MovingShadow) -> _Group:
+    """Give amplitudes at the frequencies of the shadow, or at no more than it asks for."""
+    echoes, nodes = group.echoes, shadow.point_frequency
+    if len(nodes) == 1:
+        if len(echoes.frequency) <= _SHADOW_NODES:
+            return group
+        nodes = sweep_nodes(radar, _SHADOW_NODES)
     weights = interpolation_weights(echoes.frequency, nodes)
     amplitude = np.tensordot(weights, echoes.amplitude, axes=1)
     return group._replace(echoes=replace(echoes, amplitude=amplitude, frequency=nodes))
@@ -115,7 +118,7 @@ class RoomIf:
                 self._mirrors[number] = samples
         self._whole: _Samples = whole.astype(np.complex64)
         if shadow:
-            self._groups = [_coarser(group, radar) for group in self._groups]
+            self._groups = [_resampled(group, radar, shadow) for group in self._groups]
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)

@@ -91,7 +91,7 @@ def left_of(
                 else:
                     echo = lost.echo - shadow.starts[number]
                     inside = (echo >= 0) & (echo < len(own.part))
-                    left[:, row][..., echo[inside]] -= weight * lost.fraction[tx][:, inside]
+                    left[:, row][..., echo[inside]] -= weight * lost.fraction[:, tx][..., inside]
         out.append(left)
     return out
 
@@ -107,20 +107,19 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
     tx, nodes = RADAR.tx_of_chirp(chirps), sweep_nodes(RADAR, 11)
     # Not in a row and none of them moves: their times are those of any chirps.
     times, expected = RADAR.chirp_times(len(chirps)), np.zeros_like(got)
+    wholes = list(objects)
     for number, own in enumerate(objects):
-        if number in shadow.mirrors:
-            fine = interpolation_weights(own.frequency, nodes)
-            own = replace(own, amplitude=np.tensordot(fine, own.amplitude, 1), frequency=nodes)
-        objects[number] = own
-    for own, left in zip(objects, left_of(shadow, chirps, objects), strict=True):
-        # What is lost of furniture is a parabola over the sweep.
-        few = sweep_nodes(RADAR, min(len(own.frequency), 3 if len(own.part) > 16 else 99))
-        coarse = interpolation_weights(few, own.frequency)
-        coarse = coarse @ interpolation_weights(own.frequency, few)
-        lost = np.tensordot(coarse, own.amplitude, 1)[:, tx] * (1 - left)
-        whole = own.amplitude[:, tx]
-        echoes = replace(own, length=own.length[tx], amplitude=whole - lost, tx=tx)
-        expected += synthesize(echoes, RADAR, times)
+        # What is lost of points is a parabola over the sweep.
+        of_points = sweep_nodes(RADAR, len(shadow.point_frequency))
+        own_nodes = nodes if number in shadow.mirrors else of_points
+        fine = interpolation_weights(own.frequency, own_nodes)
+        amplitude = np.tensordot(fine, own.amplitude, 1)
+        objects[number] = replace(own, amplitude=amplitude, frequency=own_nodes)
+    for whole, own, left in zip(wholes, objects, left_of(shadow, chirps, objects), strict=True):
+        lost = own.amplitude[:, tx] * (1 - left)
+        for echoes, sign, amplitude in ((whole, 1, whole.amplitude[:, tx]), (own, -1, lost)):
+            echoes = replace(echoes, length=own.length[tx], amplitude=amplitude, tx=tx)
+            expected += sign * synthesize(echoes, RADAR, times)
     np.testing.assert_allclose(got, expected, rtol=0, atol=3e-6 * np.abs(expected).max())
     still = RoomIf(RADAR, objects).clutter_if(chirps)
     assert np.abs(got - still).max() > 0.003 * np.abs(still).max()

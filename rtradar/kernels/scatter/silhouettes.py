@@ -1,13 +1,14 @@
-"""Kirchhoff's diffraction by the silhouette of a body of ellipsoids across straight legs.
+"""Kirchhoff's diffraction by silhouettes of ellipsoids and triangles across straight legs.
 
-Every part is a screen across the leg, where it comes nearest to it. Offsets from the leg are in
-units of sqrt(wavelength * before * after / length), the radius of the first Fresnel zone there, and
-the silhouettes of all parts are one set S of such offsets. The occluded fraction of the field is
+Every ellipsoid is a screen across the leg, where it comes nearest to it, and every corner of a
+triangle is at its own place along the leg. Offsets from the leg are in units of sqrt(wavelength *
+before * after / length), the radius of the first Fresnel zone there, and all silhouettes are one
+set S of such offsets. The occluded fraction of the field is
 
     F = (eps - j) integral over S of exp((j - eps) pi (x^2 + y^2)) dx dy,
 
 as for a wave exp(+j k length), the convention of IF samples. Along lines through the leg the
-integral over the radius is closed form, and so are the crossings with ellipses. The small ``eps``
+integral over the radius is closed form, and so are the crossings with outlines. The small ``eps``
 lets what is many Fresnel zones aside fade: what a round body sends there are echoes of its own.
 """
 
@@ -21,6 +22,8 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
 
+Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Field = NDArray[np.complex128]
 
@@ -30,12 +33,29 @@ _STEPS = 64
 _LEAST_M2 = 1e-6
 
 
+class Posed(NamedTuple):
+    """What casts a shadow, at one time.
+
+    Ellipsoids have ``centres (part, 3)`` [m], ``maps (part, 3, 3)`` to the axes where each is the
+    unit sphere, and the largest semi-axes ``longest (part,)`` [m]. Triangles have ``corners (face,
+    3, 3)`` [m]; of those that are ``closed (face,)``, wound anticlockwise seen from outside, half
+    are behind the others.
+    """
+
+    centres: Array
+    maps: Array
+    longest: Array
+    corners: Array
+    closed: Bools
+
+
 class Shadow(NamedTuple):
-    """What a body takes from static clutter at one keyframe.
+    """What moves takes from static clutter at one keyframe.
 
     ``echo (n,)`` counts through the objects of the clutter, one after the other, ascending;
-    ``fraction (tx, rx, n)`` complex of each is lost. ``mirror (m,)`` are numbers of objects, whose
-    echoes all lose ``of_mirror (m, tx, rx, node)`` complex, at frequencies over the sweep.
+    ``fraction (node, tx, rx, n)`` complex of each is lost, at one frequency or three. ``mirror
+    (m,)`` are numbers of objects, whose echoes all lose ``of_mirror (m, tx, rx, node)`` complex, at
+    frequencies over the sweep.
     """
 
     echo: Indices
@@ -66,15 +86,12 @@ def _crossing(rho, scales, table, sign, out):
 
 
 @inlined(fastmath={"contract"})
-def _near_parts(start, way, size, before, length, wavelength, reach, body, near):
-    """Find the parts near a leg: their silhouettes' quadratic forms (part, 6); return how many."""
-    centres, maps, longest = body
-    # Two unit vectors across the leg.
+def _across(way, side, up):
+    """Fill in two unit vectors across a leg, a right-handed frame with its direction."""
     axis = 0
     for i in range(1, 3):
         if abs(way[i]) < abs(way[axis]):
             axis = i
-    side, up = np.zeros(3), np.empty(3)
     for i in range(3):
         side[i] = (1.0 if i == axis else 0.0) - way[axis] * way[i]
     norm = math.sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2])
@@ -83,6 +100,12 @@ def _near_parts(start, way, size, before, length, wavelength, reach, body, near)
     up[0] = way[1] * side[2] - way[2] * side[1]
     up[1] = way[2] * side[0] - way[0] * side[2]
     up[2] = way[0] * side[1] - way[1] * side[0]
+
+
+@inlined(fastmath={"contract"})
+def _near_parts(start, way, side, up, size, before, length, wavelength, reach, body, near):
+    """Find the parts near a leg: their silhouettes' quadratic forms (part, 6); return how many."""
+    centres, maps, longest = body[0], body[1], body[2]
     count = 0
     x, y, u, v = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for part in range(len(centres)):
@@ -130,6 +153,39 @@ def _near_parts(start, way, size, before, length, wavelength, reach, body, near)
 
 
 @inlined(fastmath={"contract"})
+def _near_faces(start, way, side, up, size, before, length, wavelength, reach, body, flat):
+    """Find the triangles near a leg: the offsets of their corners (face, 3, 2); return how many."""
+    corners, closed = body[3], body[4]
+    count = 0
+    for face in range(len(corners)):
+        own = flat[count]
+        behind = beyond = 0
+        least = np.inf
+        largest = 0.0
+        for i in range(3):
+            corner = corners[face, i]
+            g0, g1, g2 = corner[0] - start[0], corner[1] - start[1], corner[2] - start[2]
+            along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+            behind += along < 0
+            beyond += along > size
+            past = before + min(max(along, 0.0), size)
+            zone = math.sqrt(max(wavelength * past * max(length - past, 0.0) / length, _LEAST_M2))
+            own[i, 0] = (g0 * side[0] + g1 * side[1] + g2 * side[2]) / zone
+            own[i, 1] = (g0 * up[0] + g1 * up[1] + g2 * up[2]) / zone
+            least = min(least, math.hypot(own[i, 0], own[i, 1]))
+            edge0, edge1 = own[i, 0] - own[0, 0], own[i, 1] - own[0, 1]
+            largest = max(largest, math.hypot(edge0, edge1))
+        if behind == 3 or beyond == 3 or least > reach + largest:
+            continue
+        turn = (own[1, 0] - own[0, 0]) * (own[2, 1] - own[0, 1])
+        turn -= (own[1, 1] - own[0, 1]) * (own[2, 0] - own[0, 0])
+        if closed[face] and turn <= 0:
+            continue
+        count += 1
+    return count
+
+
+@inlined(fastmath={"contract"})
 def _mean_root(under, slope):
     """Mean square root over a cell where ``under`` changes by ``slope`` either way; 0 below 0."""
     if slope < 0.1 * under:
@@ -139,11 +195,28 @@ def _mean_root(under, slope):
 
 
 @inlined(fastmath={"contract"})
-def _over_line(cosine, sine, half, near, count, lows, highs):
-    """Find what a line through the leg covers of all silhouettes: disjoint intervals, their number.
+def _merged(low, high, n, lows, highs):
+    """Add an interval to ``n`` disjoint ones, merged with those that it meets; return how many."""
+    low, high = max(low, -_FAR), min(high, _FAR)
+    if low >= high:
+        return n
+    kept = 0
+    for i in range(n):
+        if lows[i] <= high and highs[i] >= low:
+            low, high = min(low, lows[i]), max(high, highs[i])
+        else:
+            lows[kept], highs[kept] = lows[i], highs[i]
+            kept += 1
+    lows[kept], highs[kept] = low, high
+    return kept + 1
 
-    They are merged as they come. A line stands for all in ``half`` an angle about it: chords are
-    their mean there, or those of silhouettes that a line just touches would come out of nothing.
+
+@inlined(fastmath={"contract"})
+def _over_parts(cosine, sine, half, near, count, lows, highs):
+    """Find what a line through the leg covers of all ellipses: disjoint intervals, their number.
+
+    A line stands for all in ``half`` an angle about it: chords are their mean there, or those of
+    silhouettes that a line just touches would come out of nothing.
     """
     both = cosine * cosine, 2 * cosine * sine, sine * sine
     n = 0
@@ -154,21 +227,29 @@ def _over_line(cosine, sine, half, near, count, lows, highs):
         turned = b1 * cosine - b0 * sine
         wider = (a2 - a0) * both[1] + 2 * a1 * (both[0] - both[2])
         under, slope = b * b - a * c, abs(half * (2 * b * turned - wider * c))
-        if under + slope <= 0:
-            continue
-        root = _mean_root(under, slope)
-        low, high = max((b - root) / a, -_FAR), min((b + root) / a, _FAR)
-        if low >= high:
-            continue
-        kept = 0
-        for i in range(n):
-            if lows[i] <= high and highs[i] >= low:
-                low, high = min(low, lows[i]), max(high, highs[i])
-            else:
-                lows[kept], highs[kept] = lows[i], highs[i]
-                kept += 1
-        lows[kept], highs[kept] = low, high
-        n = kept + 1
+        if under + slope > 0:
+            root = _mean_root(under, slope)
+            n = _merged((b - root) / a, (b + root) / a, n, lows, highs)
+    return n
+
+
+@inlined(fastmath={"contract"})
+def _over_faces(cosine, sine, flat, count, n, lows, highs):
+    """Add what a line through the leg covers of triangles to ``n`` intervals; return how many."""
+    for face in range(count):
+        own = flat[face]
+        low, high = np.inf, -np.inf
+        for i in range(3):
+            j = (i + 1) % 3
+            here = own[i, 1] * cosine - own[i, 0] * sine
+            there = own[j, 1] * cosine - own[j, 0] * sine
+            if (here > 0) != (there > 0):
+                part = here / (here - there)
+                x = own[i, 0] + part * (own[j, 0] - own[i, 0])
+                y = own[i, 1] + part * (own[j, 1] - own[i, 1])
+                place = x * cosine + y * sine
+                low, high = min(low, place), max(high, place)
+        n = _merged(low, high, n, lows, highs)
     return n
 
 
@@ -177,16 +258,15 @@ def occluded_fractions(legs, wavelength, body, reach, lines, scales, table, out)
     """Fill in the occluded fraction (leg, node) complex of legs past a posed body.
 
     ``legs`` are starts and ends (leg, 3), the path before the start and that of the whole (leg,)
-    [m]; ``body`` is centres (part, 3), the maps (part, 3, 3) to the axes where each part is the
-    unit sphere, and the largest semi-axes (part,) [m]. Parts are left out that are farther from a
-    leg than ``reach`` Fresnel radii. The integral is taken over ``lines`` lines
-    through each leg; ``scales (node,)`` are frequencies over that of the wavelength, ``table`` is
-    that of `wave_table`.
+    [m]; ``body`` is a `Posed`. Parts are left out that are farther from a leg than ``reach``
+    Fresnel radii. The integral is taken over ``lines`` lines through each leg; ``scales (node,)``
+    are frequencies over that of the wavelength, ``table`` is that of `wave_table`.
     """
     starts, ends, before, length = legs
-    parts = len(body[0])
-    near, lows, highs = np.empty((parts, 6)), np.empty(parts), np.empty(parts)
-    way = np.empty(3)
+    parts, faces = len(body[0]), len(body[3])
+    near, flat = np.empty((parts, 6)), np.empty((faces, 3, 2))
+    lows, highs = np.empty(parts + faces), np.empty(parts + faces)
+    way, side, up = np.empty(3), np.empty(3), np.empty(3)
     cosines, sines = np.empty(lines), np.empty(lines)
     half = 0.5 * math.pi / lines
     for line in range(lines):
@@ -202,13 +282,19 @@ def occluded_fractions(legs, wavelength, body, reach, lines, scales, table, out)
             way[i] /= size
         own = out[leg]
         own[:] = 0
-        count = _near_parts(
-            starts[leg], way, size, before[leg], length[leg], wavelength, reach, body, near
+        _across(way, side, up)
+        # Of the leg, and of the whole path that it belongs to.
+        start, past, whole = starts[leg], before[leg], length[leg]
+        count = _near_parts(start, way, side, up, size, past, whole, wavelength, reach, body, near)
+        count_flat = _near_faces(
+            start, way, side, up, size, past, whole, wavelength, reach, body, flat
         )
-        if count == 0:
+        if count + count_flat == 0:
             continue
         for line in range(lines):
-            n = _over_line(cosines[line], sines[line], half, near, count, lows, highs)
+            cosine, sine = cosines[line], sines[line]
+            n = _over_parts(cosine, sine, half, near, count, lows, highs)
+            n = _over_faces(cosine, sine, flat, count_flat, n, lows, highs)
             for i in range(n):
                 _crossing(highs[i], scales, table, 0.5 / lines, own)
                 _crossing(lows[i], scales, table, -0.5 / lines, own)
@@ -223,6 +309,8 @@ def occluded_fractions_reference(legs, wavelength, body, scales, fade, step=0.01
         side /= np.linalg.norm(side)
         plane = across[:, None, None] * side + across[:, None] * np.cross(way, side)
         covered = np.zeros(plane.shape[:2], dtype=bool)
+        for triangle in body[3]:
+            covered |= _inside(triangle, start, way, side, before, length, wavelength, across).T
         for centre, to_sphere in zip(*body[:2], strict=True):
             x, y = to_sphere @ (centre - start), to_sphere @ way
             past = before + x @ y / (y @ y)
@@ -233,3 +321,16 @@ def occluded_fractions_reference(legs, wavelength, body, scales, fade, step=0.01
         wave = [np.exp((1j - fade) * np.pi * square * scale).sum() * scale for scale in scales]
         found.append((fade - 1j) * step**2 * np.array(wave))
     return np.array(found)
+
+
+def _inside(triangle, start, way, side, before, length, wavelength, across):
+    """Which offsets (y, x) of a grid are inside the silhouette of a triangle."""
+    along = (triangle - start) @ way
+    past = before + np.clip(along, 0, length - before)
+    zone = np.sqrt(np.maximum(wavelength * past * (length - past) / length, _LEAST_M2))
+    x, y = ((triangle - start) @ axis / zone for axis in (side, np.cross(way, side)))
+    right = [
+        (x[j] - x[i]) * (across[:, None] - y[i]) - (y[j] - y[i]) * (across - x[i])
+        for i, j in ((0, 1), (1, 2), (2, 0))
+    ]
+    return np.all(np.array(right) > 0, axis=0) | np.all(np.array(right) < 0, axis=0)

@@ -114,15 +114,21 @@ class ArrayEnds:
         )
 
 
-def shadow_nodes(radar: Radar) -> tuple[Array, Array, Array]:
-    """Return the ends of the lines of Tx and the middles of the lines of Rx (node, 3) [m].
+def shadow_nodes(radar: Radar, along_tx: int = 2, along_rx: int = 1) -> tuple[Array, Array, Array]:
+    """Return places along the lines of Tx and those of Rx (node, 3) [m], and their weights.
 
-    Their weights in each antenna, (tx, node) and (rx, node), follow.
+    One place is the middle of a line, two are its ends; with as many as antennas or more each
+    antenna is one. The weights of the places in each antenna, (tx, node) and (rx, node), follow.
     """
     blocks, found = [], []
-    for antennas, lines, ends in ((radar.tx, radar.tx_lines, 2), (radar.rx, radar.rx_lines, 1)):
+    for antennas, lines, count in (
+        (radar.tx, radar.tx_lines, along_tx),
+        (radar.rx, radar.rx_lines, along_rx),
+    ):
         for line in lines:
-            if ends == 1 or len(line) == 1:
+            if count >= len(line):
+                blocks.append((antennas[line], np.eye(len(line))))
+            elif count == 1:
                 blocks.append((antennas[line].mean(axis=0)[None], np.ones((len(line), 1))))
             else:
                 blocks.append((antennas[line[[0, -1]]], _straight(len(line))))

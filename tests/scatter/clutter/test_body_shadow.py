@@ -4,13 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.body_shadow import MIRROR_FADE, ClutterShadow
+from rtradar.scatter.clutter.body_shadow import ClutterShadow
+from rtradar.scatter.clutter.point_shadow import FADE
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scene import Furniture, Scene, Surface, material, room_walls
+from rtradar.scene import FollowingPath, Furniture, Object, Scene, Surface, material, room_walls
 
 Array = NDArray[np.float64]
 RADAR = Radar(tx_y=3, tx_z=2, rx_y=2, rx_z=2)
@@ -72,8 +74,8 @@ def kirchhoff(offset: float, zone: float, ball: float) -> complex:
         cosine = (radius**2 + offset**2 - ball**2) / (2 * radius * offset)
     arc = 2 * np.arccos(np.clip(cosine, -1, 1))
     # Faded as a beam wide against the zone would.
-    wave = np.exp((1j - MIRROR_FADE) * np.pi * (radius / zone) ** 2)
-    return complex((MIRROR_FADE - 1j) * (arc * wave * radius).sum() * radius[0] * 2 / zone**2)
+    wave = np.exp((1j - FADE) * np.pi * (radius / zone) ** 2)
+    return complex((FADE - 1j) * (arc * wave * radius).sum() * radius[0] * 2 / zone**2)
 
 
 @pytest.mark.parametrize("keyframe", [0, 4, 8, 60])
@@ -105,6 +107,24 @@ def test_a_mirror_path_loses_the_kirchhoff_integral_over_the_ball(
     assert (len(found) > 0) == (keyframe < 60)
 
 
+def test_a_mirror_path_loses_the_kirchhoff_integral_over_a_ball_of_triangles(
+    clutter: Clutter,
+) -> None:
+    away = Ball(place=(30.0, 0.0, 1.0))
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.3)
+    path = FollowingPath(velocity_mps=(0.0, -2.0, 0.0))
+    moving = Object("ball", ball, "metal", position_m=(-1.0, 1.0, 1.0), motion=path)
+    shadow, expected = ClutterShadow(clutter, away, (moving,)), ClutterShadow(clutter, Ball())
+    posed = shadow._posed(700), expected._posed(700)
+    (which, lost), (others, of_ball) = (
+        own._of_mirrors(at) for own, at in zip((shadow, expected), posed, strict=True)
+    )
+    np.testing.assert_array_equal(which, others)
+    assert np.abs(of_ball).max() > 0.2
+    # The mesh is 0.5 % smaller than the ball, and some legs of the path are both hidden.
+    np.testing.assert_allclose(lost, of_ball, rtol=0, atol=0.04)
+
+
 def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> None:
     ball = Ball()
     shadow = ClutterShadow(clutter, ball)
@@ -121,7 +141,7 @@ def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> N
         nearest = gap(antennas[:, None], own.points[0, 0, :, 0], centre)
         inside = (lost.echo >= first) & (lost.echo < last)
         some = lost.echo[inside] - first
-        fraction = lost.fraction[..., inside]
+        fraction = lost.fraction[0][..., inside]
         clear = (nearest[:, some] > ball.radius + 2 * zone).all(axis=0)
         assert np.abs(fraction[..., clear]).max(initial=0) < 0.1
         # Behind its middle there is Poisson's spot, which fades as all far fringes do.
@@ -143,7 +163,7 @@ def test_the_shadow_is_smooth_in_time(clutter: Clutter) -> None:
 def _dense(shadow: ClutterShadow, keyframe: int, clutter: Clutter) -> Array:
     fraction = np.zeros((RADAR.n_tx, RADAR.n_rx, clutter.n_echoes), dtype=np.complex128)
     lost = shadow.at(keyframe)
-    fraction[..., lost.echo] = lost.fraction
+    fraction[..., lost.echo] = lost.fraction[0]
     return fraction
 
 

@@ -1,0 +1,190 @@
+"""The moving shadow in points of the clutter that all antennas share: furniture and rough walls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.scatter.silhouettes import Posed, occluded_fractions, wave_table
+from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
+from rtradar.system.threads import thread_map
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+FADE, REACH = 0.1, 3.0
+"""Damping ``eps`` of the integral, and Fresnel radii beyond which parts are left out: fringes are
+then below 0.5 %."""
+_LEGS_A_THREAD = 256
+
+
+class Precision(NamedTuple):
+    """How the shadow in shared points is computed.
+
+    ``nodes`` are the frequencies; ``along_tx`` and ``along_rx`` the places along each line of
+    antennas; ``lines`` those of the integral, ``fade`` and ``reach`` as `FADE` and `REACH`.
+    ``weak`` is the power of the points seen from the array's middle only, ``faint`` that of those
+    left out, over that of all that the body may come near.
+    """
+
+    nodes: int
+    along_tx: int
+    along_rx: int
+    lines: int
+    fade: float
+    reach: float
+    weak: float
+    faint: float
+
+
+FINE = Precision(3, 99, 2, 40, FADE, REACH, 0.0, 1e-4)
+"""The error is below -25 dB of the change of the samples."""
+MEDIUM = Precision(3, 99, 1, 24, FADE, REACH, 0.0, 0.01)
+"""-8 to -11 dB of the change."""
+COARSE = Precision(1, 2, 1, 12, 0.3, 2.0, 0.03, 2e-3)
+"""As if points were as wide as a Fresnel zone, which sees no far fringes, in six places of the
+paper's array: most of the change, of which it has the size."""
+
+
+class SharedPoints(NamedTuple):
+    """Points ``places (point, 3)`` [m], the ``number`` of each one's echo, and its power [m^2]."""
+
+    places: Array
+    number: Indices
+    power: Array
+
+    def some(self, which: Indices | Bools) -> SharedPoints:
+        """Return some of them."""
+        return SharedPoints(self.places[which], self.number[which], self.power[which])
+
+    def near(self, radar: Radar, poses: Sequence[Posed]) -> Bools:
+        """Which points have something in the Fresnel zone of their legs in any of some poses."""
+        antennas = np.concatenate([radar.tx, radar.rx])
+        middle = antennas.mean(axis=0)
+        extent = float(np.linalg.norm(antennas - middle, axis=1).max())
+        ways = self.places - middle
+        squares = np.maximum((ways**2).sum(axis=1), 1e-30)
+        found = np.zeros(len(ways), dtype=bool)
+        for place, radius in (ball for posed in poses for ball in _balls(posed)):
+            away = place - middle
+            along = ways @ away
+            part = np.clip(along / squares, 0.0, 1.0)
+            gap = away @ away - 2 * part * along + part**2 * squares
+            zone = np.sqrt(radar.wavelength_m * part * (1 - part) * np.sqrt(squares))
+            found |= gap < (radius + extent + zone) ** 2
+        return found
+
+
+def _balls(posed: Posed) -> list[tuple[Array, float]]:
+    """Balls about all ellipsoids and about all triangles: middles [m] and radii [m]."""
+    corners = posed.corners.reshape(-1, 3)
+    found = []
+    for places, longest in ((posed.centres, posed.longest), (corners, np.zeros(len(corners)))):
+        if len(places):
+            middle = (places.max(axis=0) + places.min(axis=0)) / 2
+            radius = (np.linalg.norm(places - middle, axis=1) + longest).max()
+            found.append((middle, float(radius)))
+    return found
+
+
+class PointShadow:
+    """What some points lose, to a precision, without the faintest of them.
+
+    It is computed for the Tx whose numbers are ``tx (tx,)``, or for all.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        points: SharedPoints,
+        precision: Precision,
+        tx: Indices | None = None,
+    ) -> None:
+        self.precision, self._radar, self._count = precision, radar, len(points.power)
+        own = radar, precision.along_tx, precision.along_rx
+        places, tx_weights, rx_weights = shadow_nodes(*own)
+        self._middle = places.mean(axis=0)
+        tx = np.arange(radar.n_tx) if tx is None else tx
+        used = tx_weights[tx].any(axis=0) | rx_weights.any(axis=0)
+        self._antennas, self._rx_of_tx = places[used], radar.rx_of_tx[tx]
+        self._tx_weights, self._rx_weights = tx_weights[tx][:, used], rx_weights[:, used]
+        self._scales = sweep_nodes(radar, precision.nodes) / radar.centre_frequency_hz
+        order = np.argsort(points.power)
+        share = np.cumsum(points.power[order]) / max(points.power.sum(), 1e-300)
+        self._which = np.sort(order[share >= precision.faint])
+        weak = np.ones(self._count, dtype=bool)
+        weak[order[share >= precision.weak]] = False
+        self._points, self._strong = points.some(self._which), ~weak[self._which]
+
+    def at(self, posed: Posed) -> tuple[Indices, Field]:
+        """Which echoes are occluded, and the fraction (node, tx, rx, echo)."""
+        which, fraction = self._find(posed)
+        return self._points.number[which], fraction
+
+    def dense(self, posed: Posed) -> Field:
+        """The fraction of all points, also of those that lose nothing (node, tx, rx, point)."""
+        which, fraction = self._find(posed)
+        out = np.zeros((*fraction.shape[:-1], self._count), dtype=np.complex128)
+        out[..., self._which[which]] = fraction
+        return out
+
+    def _find(self, posed: Posed) -> tuple[Indices, Field]:
+        near = np.flatnonzero(self._points.near(self._radar, [posed]))
+        strong = np.flatnonzero(self._strong[near])
+        lost = np.zeros((len(self._antennas), len(near), len(self._scales)), dtype=np.complex128)
+        if len(strong) < len(near):
+            lost[:] = self._seen_from(self._middle[None], near, posed)
+        lost[:, strong] = self._seen_from(self._antennas, near[strong], posed)
+        some = lost.any(axis=(0, 2))
+        lost, near = lost[:, some], near[some]
+        # Not by BLAS, whose threads cost more than these few numbers.
+        of_tx, of_rx = (
+            1 - np.einsum("an,nef->fae", weights, lost)
+            for weights in (self._tx_weights, self._rx_weights)
+        )
+        return near, 1 - of_tx[:, :, None] * of_rx[:, self._rx_of_tx]
+
+    def _seen_from(self, antennas: Array, which: Indices, posed: Posed) -> Field:
+        """Fraction lost on the legs from places to some points (place, point, node)."""
+        starts = np.repeat(antennas, len(which), axis=0)
+        ends = np.tile(self._points.places[which], (len(antennas), 1))
+        length = np.linalg.norm(ends - starts, axis=1)
+        geometry, own = (starts, ends, np.zeros(len(length)), length), self.precision
+        lost = lost_on_legs(
+            self._radar, geometry, posed, own.reach, own.lines, self._scales, own.fade
+        )
+        return lost.reshape(len(antennas), len(which), len(self._scales))
+
+
+def lost_on_legs(
+    radar: Radar,
+    geometry: tuple[Array, ...],
+    posed: Posed,
+    reach: float,
+    lines: int,
+    scales: Array,
+    fade: float,
+) -> Field:
+    """Fraction of the field that is taken from each leg (leg, node), as `occluded_fractions`."""
+    out = np.zeros((len(geometry[0]), len(scales)), dtype=np.complex128)
+
+    def fill(begin: int) -> None:
+        some = slice(begin, begin + _LEGS_A_THREAD)
+        own = tuple(np.ascontiguousarray(array[some]) for array in geometry)
+        given = radar.wavelength_m, tuple(posed), reach, lines, scales, _table(fade)
+        occluded_fractions(own, *given, out[some])
+
+    thread_map(fill, range(0, len(out), _LEGS_A_THREAD))
+    return out
+
+
+@lru_cache
+def _table(fade: float) -> Field:
+    return np.asarray(wave_table(fade))
