@@ -32,6 +32,7 @@ from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.path_echoes import AT_ONCE, EchoColumns, Met
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
@@ -88,19 +89,12 @@ def path_keyframes(
     and any of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
     points, start, exists = _specular_points(around, columns, poses)
-    legs = [
-        _carry(
-            around,
-            [getattr(around.paths[path], side) for path in columns.path.tolist()],
-            at,
-            points,
-            antenna,
-        )
-        for side, at, antenna in (
-            ("out", around.ends.tx, around.radar.tx_antenna),
-            ("back", around.ends.rx, around.radar.rx_antenna),
-        )
-    ]
+    radar, ends = around.radar, around.ends
+    ways = [path.out for path in around.paths], [path.back for path in around.paths]
+    antennas = (ends.tx, radar.tx_antenna), (ends.rx, radar.rx_antenna)
+    legs = thread_map(
+        lambda side: _carry(around, ways[side], columns.path, points, *antennas[side]), range(2)
+    )
     # Echoes of which the model itself knows how the last sections end.
     known = np.flatnonzero(columns.direct | around.whole_level)
     factors = [
@@ -199,16 +193,21 @@ class _Carried(NamedTuple):
 def _carry(
     around: Surroundings,
     legs: Sequence[Leg],
-    antennas: Array,
+    path: NDArray[np.int64],
     points: Array,
+    antennas: Array,
     antenna: Antenna | None,
 ) -> _Carried:
+    """Carry the fields of antennas over the legs of some paths, each echo by that of its own."""
     shape = (points.shape[0], *antennas.shape[:2], points.shape[2])
     field = np.zeros((len(around.walls.frequency), *shape, 3), dtype=np.complex128)
     arriving, valid = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-    of_leg, sections, all_waves = np.empty(len(legs), dtype=np.int64), [], {}
-    for leg in dict.fromkeys(legs):
-        chosen = np.array([number for number, own in enumerate(legs) if own == leg])
+    of_leg, sections, all_waves = np.empty(len(path), dtype=np.int64), [], {}
+    paths: dict[Leg, list[int]] = {}
+    for number in np.unique(path).tolist():
+        paths.setdefault(legs[number], []).append(number)
+    for leg, numbers in paths.items():
+        chosen = np.flatnonzero(np.isin(path, numbers))
         of_leg[chosen] = np.arange(len(chosen))
         ends = antennas[:, :, None], points[:, :, None, chosen]
         along, extent = around.walls.edges.leg(leg, *ends)
@@ -293,10 +292,8 @@ def _not_occluded(
             still[still] = ~room.blocked(origins[still], targets[still], moments)
             free[..., chosen] = still
         clear.append(free)
-    for keyframe in range(len(seen)):
-        body.pose(poses.centres[keyframe], poses.frames[keyframe])
-        for leg, free in zip(legs, clear, strict=True):
-            _clear_of_body(body, leg, free[keyframe], keyframe, part, known)
+    for leg, free in zip(legs, clear, strict=True):
+        _clear_of_body(body, leg, free, poses, part, known)
     return np.asarray(clear[0][:, :, :, None] & clear[1][:, :, None])
 
 
@@ -304,22 +301,26 @@ def _clear_of_body(
     body: BodyTracer,
     leg: _Carried,
     clear: NDArray[np.bool_],
-    keyframe: int,
+    poses: Poses,
     part: NDArray[np.int64],
     known: NDArray[np.int64],
 ) -> None:
-    """Take out of ``clear (line, end, echo)`` what the posed body occludes.
+    """Take out of ``clear (keyframe, line, end, echo)`` what the body occludes.
 
     Of the last sections of the ``known`` echoes the model knows that itself.
     """
+    keyframes, kinds = len(clear), len(poses.semi_axes) + 1
     rays = []
     for chosen, origins, targets, last in leg.sections:
         asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
-        line, end, echo = np.nonzero(clear[..., chosen] & asked)
+        where = np.nonzero(clear[..., chosen] & asked)
+        echo = chosen[where[-1]]
         # At the specular point the part itself cannot be in the way, before a wall it can.
-        own = part[chosen[echo]] if last else np.full(len(echo), -1)
-        ends = (places[keyframe, line, end, echo] for places in (origins, targets))
-        rays.append((*ends, own, line, end, chosen[echo]))
-    starts, stops, own, *which = (np.concatenate(column) for column in zip(*rays, strict=True))
-    occluded = ~body.sees(starts, stops, own)
+        own = part[echo] if last else np.full(len(echo), kinds - 1)
+        rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
+    starts, stops, group, *which = (np.concatenate(column) for column in zip(*rays, strict=True))
+    # A group for each part at each keyframe, and one for targets on no part.
+    parts = np.tile(np.append(np.arange(kinds - 1), -1), keyframes)
+    pose = np.repeat(np.arange(keyframes), kinds)
+    occluded = ~body.clear(starts, stops, group, parts, pose, poses)
     clear[tuple(index[occluded] for index in which)] = False
