@@ -20,10 +20,11 @@ class PathSummary:
     """What became of the echoes over one path.
 
     ``path`` names its walls in the order in which the wave meets them, ``order`` is the number of
-    reflections at walls. ``power_m2`` is the echo power of all parts, averaged over rx and one
-    chirp every 20 ms [m^2]; ``over_noise_db`` the same over noise, after the gain of samples,
-    cycles and channels [dB], or None without noise or without an echo. ``kept`` and ``dropped`` are
-    the body parts whose echoes were kept and left out, ``why`` the reason for the latter.
+    reflections at walls. ``power_m2`` is the echo power of all parts, averaged over rx and the
+    chirps that are looked at [m^2]; ``over_noise_db`` the same over noise, after the gain of
+    samples, cycles and channels [dB], or None without noise or without an echo. ``kept`` and
+    ``dropped`` are the body parts whose echoes were kept and left out, ``why`` the reason for the
+    latter.
     """
 
     path: str

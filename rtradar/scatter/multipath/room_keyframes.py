@@ -64,6 +64,10 @@ class RoomKeyframes:
         )
         return blend, before, after
 
+    def look_ahead(self, n_chirps: int) -> None:
+        """Compute the keyframes of a capture that stay, many at a time."""
+        self._find(list(range(min(-(-n_chirps // self.step) + 1, self._cache.stay))))
+
     def _find(self, numbers: list[int]) -> dict[int, PathKeyframes]:
         """Keyframes with these numbers, from the cache or many at a time."""
         cache = self._cache

@@ -54,6 +54,10 @@ _ENOUGH, _MOST_NODES = 0.015, 3
 
 _CHIRPS_AT_ONCE = 64
 
+_LOOK_EVERY, _LEAST_LOOKS = 5, 25
+"""One of how many keyframes is looked at to tell which echoes are above the noise, and the least
+number of these."""
+
 
 @runtime_checkable
 class HasFormula(EchoModel, Protocol):
@@ -173,22 +177,27 @@ class RoomModel:
         chirps = np.asarray(chirps, dtype=np.int64)
         return self.optical_echoes(chirps) if self._fast else self._by_paths(chirps)
 
-    def optical_echoes(self, chirps: NDArray[np.int64], *, unseen: bool = False) -> Echoes:
+    def optical_echoes(self, chirps: NDArray[np.int64], *, ghosts: bool = False) -> Echoes:
         """Compute the echoes as `echoes` of a fast model, by geometric optics for any other.
 
-        If ``unseen``, an echo has the length over its specular point also where it is not seen.
+        With ``ghosts`` direct echoes are left empty, and ghosts have the lengths over their
+        specular points also where they are not seen.
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
         at = chirp_poses(self._radar, self._body, chirps)
         blend, before, after = self._keyframes.around(chirps, at.tx_index)
         near = nearby_points(blend, before, after)
-        if unseen:
+        if ghosts:
             near = near._replace(wanted=np.ones_like(near.wanted))
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
         n_direct, n_echoes = at.centres.shape[1], len(columns.part)
+        empty = *at.rx.shape[:2], n_direct
         model, formula = self._conductor, None
         if self._fast and isinstance(model, HasFormula):
             formula = model.conductor_echo
+        if ghosts:
+            found = [(np.zeros(empty), np.zeros(empty))]
+        elif formula is not None:
             found = [formula(Geometry.of(at))]
         else:
             start = near.take(slice(n_direct)).places()
@@ -197,9 +206,9 @@ class RoomModel:
             else:
                 found = [solve_specular_points(at, start=start)[:2]]
         if n_echoes > n_direct:
-            ghosts = slice(n_direct, n_echoes)
-            own = columns.path[ghosts], columns.part[ghosts]
-            found.append(self._legs.echoes(*own, at, near.take(ghosts), formula))
+            others = slice(n_direct, n_echoes)
+            own = columns.path[others], columns.part[others]
+            found.append(self._legs.echoes(*own, at, near.take(others), formula))
         length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
         factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
         if columns.delayed:
@@ -232,7 +241,7 @@ class RoomModel:
 
         After `prune` they are the same ones at every chirp.
         """
-        echoes = self.optical_echoes(np.asarray(chirps, dtype=np.int64), unseen=True)
+        echoes = self.optical_echoes(np.asarray(chirps, dtype=np.int64), ghosts=True)
         return take(echoes, np.flatnonzero(echoes.bounces > 1))
 
     def without_ghosts(self) -> RoomModel:
@@ -293,14 +302,17 @@ class RoomModel:
     def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathSummary, ...]:
         """Leave out echoes over walls that stay below the noise, and summarize each path.
 
-        One chirp every 20 ms of the capture is evaluated, by geometric optics. Left out is an echo
-        whose mean power, after the gain of the samples, cycles and channels of a frame, is more
-        than `MARGIN_DB` below the noise of one IF sample [m^2]; without noise, what is never
-        visible. Window functions, which lose 1.8 dB each (Hann), are not counted: what is left out
-        is weaker than that. Direct echoes always stay.
+        One chirp every 100 ms of the capture is evaluated, by geometric optics; without noise, or
+        if these were too few, one every 20 ms. Left out is an echo whose mean power, after the gain
+        of the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the noise of
+        one IF sample [m^2]; without noise, what is never visible. Window functions, which lose 1.8
+        dB each (Hann), are not counted: what is left out is weaker than that. Direct echoes always
+        stay.
         """
         radar, columns = self._radar, self._columns
         evaluated = np.arange(0, n_chirps, self._keyframes.step)
+        if noise_power_m2 > 0:
+            evaluated = evaluated[:: max(1, min(_LOOK_EVERY, len(evaluated) // _LEAST_LOOKS))]
         power = np.zeros(len(columns))
         for first in range(0, len(evaluated), _CHIRPS_AT_ONCE):
             echoes = self.optical_echoes(evaluated[first : first + _CHIRPS_AT_ONCE])
@@ -331,4 +343,5 @@ class RoomModel:
         # Direct echoes have the first columns.
         worth |= direct[echo] & (np.arange(len(echo)) < len(direct))
         self._keyframes.restrict(worth, keep)
+        self._keyframes.look_ahead(n_chirps)
         return summaries
