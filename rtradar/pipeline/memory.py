@@ -37,7 +37,7 @@ def refuse_large_maps(people: Sequence[Person], radar: Radar, settings: RunSetti
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     asked = settings.duration_s
     interval_s = max(min(left) if asked is None else min(max(left), asked), 0.0)
-    n_bytes = bytes_of_maps(radar, interval_s / radar.chirp_interval_s, sources=True)
+    n_bytes = bytes_of_maps(radar, radar.chirps_in(interval_s), sources=True)
     refuse_large(f"maps of {interval_s:g} s of radar '{radar.name}'", n_bytes, IN_A_FOLDER)
 
 
@@ -47,7 +47,7 @@ def bytes_of_maps(radar: Radar, n_chirps: float, *, sources: bool = False) -> fl
     ``sources`` says whether there is a map of who returned each detection.
     """
     frames = max(n_chirps / radar.n_tx - radar.cycles_per_frame, 0) / radar.hop_cycles + 1
-    steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S
+    steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S + radar.in_frames * frames
     power, mask = np.dtype(np.float32).itemsize, np.dtype(np.uint8).itemsize
     if sources:
         mask += np.dtype(np.int16).itemsize

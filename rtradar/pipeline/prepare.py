@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 import warnings
 from collections.abc import Sequence
@@ -157,7 +156,7 @@ def people_in(scene: Scene, given: Moving) -> tuple[Scene, tuple[Person, ...]]:
 
 def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
     """Return the number of chirps in whole cycles, and the first cycle of each frame."""
-    n_chirps = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12)) * radar.n_tx
+    n_chirps = radar.chirps_in(body.duration_s)
     starts = radar.window_starts(n_chirps)
     if len(starts) == 0:
         raise InputError(

@@ -121,7 +121,6 @@ class Processing:
 def _refuse_unfinished(radar: Radar) -> None:
     """Refuse what a radar can say of itself before it is simulated."""
     unfinished = {
-        "frame_period_s": radar.in_frames,
         "multiplexing = 'bpm'": radar.multiplexing == "bpm",
     }
     for what, is_there in unfinished.items():

@@ -93,7 +93,7 @@ class Simulation:
     @property
     def duration_s(self) -> float:
         """Duration of the capture, whole cycles [s]."""
-        return self._capture.n_chirps * self.radar.chirp_interval_s
+        return self.radar.duration_of(self._capture.n_chirps)
 
     @property
     def shape(self) -> tuple[int, int, int]:

@@ -125,26 +125,33 @@ class Sources:
 
     def _course(self, start_cycle: int) -> tuple[Array, Array, NDArray[np.int64]]:
         """Range [m] and power [m^2] of the echoes (echo, cycle) over a frame, and their owners."""
-        first, last = start_cycle // self._every, (start_cycle + self._cycles - 1) // self._every
-        seen = self._seen(np.arange(first, last + 2))
+        at = self._instants(start_cycle)
+        seen = self._seen(at)
         count = min(len(one.owner) for one in seen)  # more may come while they are asked for
         power = np.array([one.power_m2[:count] for one in seen])
         kept = np.flatnonzero(power.max(axis=0) > max(self._weak_m2, 0.0))
         cycles = np.arange(start_cycle, start_cycle + self._cycles)
-        number, rest = cycles // self._every - first, cycles % self._every / self._every
         range_m = np.empty((len(kept), self._cycles))
         power_m2 = np.empty_like(range_m)
-        apart_s = self._every * self._capture.radar.cycle_duration_s
         for interval, (before, after) in enumerate(pairwise(seen)):
-            inside = number == interval
-            t = rest[inside]
+            apart, last = at[interval + 1] - at[interval], interval == len(at) - 2
+            inside = (at[interval] <= cycles) & (cycles < at[interval + 1] + last)
+            t = (cycles[inside] - at[interval]) / max(apart, 1)
+            apart_s = int(apart) * self._capture.radar.cycle_duration_s
             here, there = before.of(kept), after.of(kept)
             range_m[:, inside] = _cubic(here, there, apart_s, t)
             power_m2[:, inside] = np.outer(here.power_m2, 1 - t) + np.outer(there.power_m2, t)
         return range_m, power_m2, seen[0].owner[kept]
 
+    def _instants(self, start_cycle: int) -> NDArray[np.int64]:
+        """Cycles about a frame at which echoes are looked at; past a gap there is nothing."""
+        end, every = start_cycle + self._cycles, self._every
+        if self._capture.radar.in_frames:
+            return np.append(np.arange(start_cycle, max(end - 1, start_cycle + 1), every), end - 1)
+        return np.arange(start_cycle // every, (end - 1) // every + 2) * every
+
     def _seen(self, numbers: NDArray[np.int64]) -> list[_Echoes]:
-        """Echoes at these multiples of the step between times, found once for all frames."""
+        """Echoes at these cycles, found once for all frames."""
         for old in [number for number in self._kept if number < numbers[0]]:
             del self._kept[old]
         missing = [number for number in numbers.tolist() if number not in self._kept]
@@ -154,8 +161,11 @@ class Sources:
 
     def _look(self, numbers: NDArray[np.int64]) -> list[_Echoes]:
         capture, radar = self._capture, self._capture.radar
-        cycles = numbers[:, None] * self._every + [-_RATE_CYCLES, _RATE_CYCLES]
+        cycles = numbers[:, None] + [-_RATE_CYCLES, _RATE_CYCLES]
         cycles = np.clip(cycles, 0, capture.n_chirps // radar.n_tx - 1)
+        if radar.in_frames:
+            first = numbers[:, None] - numbers[:, None] % self._cycles
+            cycles = np.clip(cycles, first, first + self._cycles - 1)
         middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
         chirps, where = np.unique(cycles * radar.n_tx + middle, return_inverse=True)
         echoes = capture.model.echoes(chirps.astype(np.int64))
@@ -170,7 +180,7 @@ class Sources:
         apart_s = np.diff(cycles, axis=1) * radar.cycle_duration_s
         rate = np.divide(after - before, 2 * apart_s, out=np.zeros_like(before), where=apart_s > 0)
         # At the ends of the capture the times are not in the middle of both cycles.
-        late_s = (numbers * self._every - cycles.mean(axis=1)) * radar.cycle_duration_s
+        late_s = (numbers - cycles.mean(axis=1)) * radar.cycle_duration_s
         range_m = (before + after) / 4 + rate * late_s[:, None]
         mean = np.where(range_m < radar.max_range_m, both.mean(axis=1), 0.0)
         # Objects come after all people.

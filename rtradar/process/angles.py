@@ -309,6 +309,8 @@ def _refine(
     )
     bend = left - 2 * middle + right
     inside = (bend < 0) & (index > 0) & (index < last)
+    # Beside what is no direction, where power is 0, a peak stays where it is, too.
+    inside &= np.minimum(left, right) > math.log(least) + 1
     shift = np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5) * inside
     sine = sines[index] + shift * (sines[1] - sines[0])
     return sine, np.exp(middle - 0.25 * (left - right) * shift)

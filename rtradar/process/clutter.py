@@ -193,7 +193,10 @@ class _Exponential(ClutterRemoval):
     def __init__(self, radar: Radar, time_constant_s: float) -> None:
         super().__init__(radar)
         self._time_constant_s = time_constant_s
-        self._weight = -math.expm1(-radar.cycle_duration_s / time_constant_s)
+        apart_s = radar.cycle_duration_s
+        if radar.frame_period_s is not None:
+            apart_s = radar.frame_period_s / radar.cycles_per_frame
+        self._weight = -math.expm1(-apart_s / time_constant_s)
         self._count = 0  # cycles in the background
         shape = (radar.n_tx, radar.n_rx, radar.samples_per_chirp)
         # In double, because it takes steps of 1e-3 and less.
@@ -225,17 +228,33 @@ class _Mti(ClutterRemoval):
         # The last cycles, as received.
         shape = (0, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
         self._held = np.empty(shape, np.complex64)
+        self._cycles = 0  # that have passed
 
     def description(self, window_cycles: int) -> str:
         return f"MTI canceller of {self._order + 1} pulses"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.zeros_like(cycles)
+        if self._radar.in_frames:
+            return self._frames(cycles, out)
         known = np.concatenate([self._held, cycles])
         self._held = known[-self._order :].copy()  # a view would keep the whole block
         # Little changes from cycle to cycle, so differences of differences hardly round.
         differences = np.diff(known, n=self._order, axis=0)
         out[len(out) - len(differences) :] = differences * known.real.dtype.type(self._gain)
+        return out
+
+    def _frames(
+        self, cycles: NDArray[np.complexfloating], out: NDArray[np.complexfloating]
+    ) -> NDArray[np.complexfloating]:
+        """Cancel frame by frame, for over a gap nothing is the difference of two cycles."""
+        known = np.concatenate([self._held, cycles])
+        held, first = len(self._held), self._cycles
+        within = np.arange(first, first + len(cycles)) % self._radar.cycles_per_frame
+        differences = np.diff(known, n=self._order, axis=0) * known.real.dtype.type(self._gain)
+        some = np.flatnonzero(within >= self._order)
+        out[some] = differences[some + held - self._order]
+        self._held, self._cycles = known[-self._order :].copy(), first + len(cycles)
         return out
 
 

@@ -89,7 +89,9 @@ class ClutterMap:
         check_count("looks", looks)
         check_scale("clutter map", scale)
         self._law, self._given = (radar, float(pfa), int(looks), window_functions), scale
-        hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
+        hops = check_time_constant(time_constant_s) / (
+            radar.frame_period_s or radar.hop_cycles * radar.cycle_duration_s
+        )
         self._weight = -math.expm1(-1 / hops)
         self._memory = math.ceil(min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS))  # of the law
         self._apart = _windows_apart(radar)

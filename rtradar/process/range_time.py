@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import NamedTuple
 
@@ -74,7 +75,8 @@ def _steps(
     rows = _step_cycles(radar, step_s) * radar.n_tx
     begins = np.arange(0, n_chirps, rows)
     ends = np.minimum(begins + rows, n_chirps)
-    centres = (first_chirp + (begins + ends) / 2) * radar.chirp_interval_s
+    places = radar.slots_of(first_chirp + begins) + (ends - begins) / 2
+    centres = places * radar.chirp_interval_s
     return list(zip(begins.tolist(), ends.tolist(), strict=True)), centres
 
 
@@ -119,7 +121,8 @@ class SlidingRangeTime:
     def __init__(self, radar: Radar, removal: ClutterRemoval, *, step_s: float = 5e-3) -> None:
         self._radar, self._by_frames, self._step_s = radar, removal.works_by_windows, step_s
         # Steps in a frame.
-        self._steps = max(1, round(radar.cycles_per_frame / _step_cycles(radar, step_s)))
+        steps = radar.cycles_per_frame / _step_cycles(radar, step_s)
+        self._steps = math.ceil(steps) if radar.in_frames else max(1, round(steps))
         self._frame: deque[_Step] = deque()
         self._waiting: deque[_Step] = deque()  # steps whose frame is not complete yet
         self._sum = np.zeros((radar.n_channels, radar.samples_per_chirp), np.complex128)

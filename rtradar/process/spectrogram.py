@@ -44,9 +44,11 @@ def window_cycles(radar: Radar) -> int:
     -------
     int
         As long as the paper's `WINDOW_CYCLES` of TDM; under Doppler division a multiple of the
-        bands.
+        bands. Where there are gaps between frames, no longer than a frame.
     """
     cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
+    if radar.in_frames:
+        cycles = min(cycles, radar.cycles_per_frame)
     return max(1, round(cycles / radar.n_doppler_bands)) * radar.n_doppler_bands
 
 
@@ -129,7 +131,7 @@ def spectrogram(
     if not np.isfinite(values).all():
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
     values = values.astype(complex_kind(values), copy=False)
-    starts = np.arange(0, len(values) - window + 1, hop)
+    starts = _starts(0, len(values), window, hop, radar)
     power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar), window_functions)
     return Spectrogram(power, _times(starts, radar, tx, window), radar.velocity_mps(window))
 
@@ -210,11 +212,13 @@ class SlidingSpectrogram:
         new = block[(self._tx - self._chirps) % radar.n_tx :: radar.n_tx, self._rx]
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
-        starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
+        starts = _starts(self._start, len(cycles), self._window, self._hop, radar)
         power = _columns(cycles, starts, self._window, radar, *self._own)
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop
+        if radar.in_frames:
+            gone = max(0, len(cycles) - self._window + 1)
         self._start += gone
         self._held = cycles[gone:].copy()  # a view would keep the whole block
         return Spectrogram(power, times, radar.velocity_mps(self._window))
@@ -236,9 +240,23 @@ def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
     return max(1, int(window * (1 - overlap) * (1 + 1e-12)))
 
 
+def _starts(first: int, count: int, window: int, hop: int, radar: Radar) -> NDArray[np.int64]:
+    """Cycles among ``count``, of which the first has that number, with which a window begins.
+
+    Windows lie within one frame where there are gaps between frames, and begin anew with each.
+    """
+    starts = np.arange(0, count - window + 1, 1 if radar.in_frames else hop)
+    if not radar.in_frames:
+        return starts
+    within = (first + starts) % radar.cycles_per_frame
+    return starts[(within % hop == 0) & (within + window <= radar.cycles_per_frame)]
+
+
 def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDArray[np.float64]:
     """Middle of the windows from these cycles on (time,) [s]; they are even about window / 2."""
     own = float(radar.tx_delay_s[tx] + radar.chirp_times(1)[0])
+    if radar.in_frames:
+        return radar.cycle_times(starts) + window / 2 * radar.cycle_duration_s + own
     return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
 
 

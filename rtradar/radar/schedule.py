@@ -5,9 +5,10 @@ Chirps are numbered as they are transmitted, without those that a gap between fr
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,6 +207,11 @@ class Schedule(Array):
         frame_s, numbers = self._in_frame(np.asarray(chirps, dtype=np.int64))
         return np.asarray(frame_s / self.chirp_interval_s + numbers)
 
+    @cached_property
+    def gapless(self) -> Self:
+        """The radar without gaps between its frames, whose chirp n is at place n of `slots_of`."""
+        return dataclasses.replace(self, frame_period_s=None) if self.in_frames else self  # type: ignore[type-var]
+
     def _in_frame(
         self, numbers: NDArray[np.int64], *, cycles: bool = False
     ) -> tuple[NDArray[np.float64] | float, NDArray[np.int64]]:
@@ -228,7 +234,7 @@ class Schedule(Array):
         (cycle,) float64
             Time since the start of the capture [s].
         """
-        frame_s, numbers = self._in_frame(np.asarray(cycles, dtype=np.int64), cycles=True)
+        frame_s, numbers = self._in_frame(np.asarray(cycles), cycles=True)
         return np.asarray(frame_s + numbers * self.cycle_duration_s, dtype=np.float64)
 
     def chirps_in(self, duration_s: float) -> int:

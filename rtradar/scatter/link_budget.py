@@ -13,7 +13,7 @@ from rtradar.conventions import MINIMUM_KA
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
 from rtradar.scatter.inside_people import InsidePeople
 from rtradar.scatter.inside_walls import Inside
@@ -73,7 +73,7 @@ def link_budget(
     within the radar's range. A `ValidityWarning` is
     issued if more than 5 % of the echo power is concerned by a limit, or nobody is visible.
     """
-    chirps = np.arange(0, n_chirps, keyframe_step(radar))
+    chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
     powers, fractions = FileBackedRows(), FileBackedRows()
     solid, others = Inside(scene or Scene(), body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)

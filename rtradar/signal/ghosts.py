@@ -175,7 +175,8 @@ def ghosts_within(
     some = model.ghosts(spread)
     said = {"ghosts": len(some.part), "left_out": 0, "changing": 0}
     exact = said | {"anchors_apart_s": None, "error_m2": 0.0}
-    if len(some.frequency) > MOST_NODES:
+    # A cubic over a gap between frames would be far off.
+    if len(some.frequency) > MOST_NODES or radar.in_frames:
         return None, exact
     level, tilt, curve = (
         (np.abs(own) ** 2).mean(axis=(0, 1)) for own in _over_sweep(some.amplitude, some, radar)

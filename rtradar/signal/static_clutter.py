@@ -15,7 +15,7 @@ from rtradar.kernels.scatter.silhouettes import Shadow
 from rtradar.kernels.still_room import add_blended, cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.signal.synthesis import synthesize
 from rtradar.system.threads import thread_map
 
@@ -150,7 +150,7 @@ class RoomIf:
         if self._shadow is None:
             samples += self._whole[tx]
             return
-        keyframes, rest = np.divmod(chirps, self._shadow.step)
+        keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
             inside = np.flatnonzero(keyframes == keyframe)

@@ -63,7 +63,9 @@ def snapshots(capture: Capture) -> Snapshots:
     frame_starts = capture.frame_starts
     hop_s = radar.frame_hop_s
     if len(frame_starts) > 1:
-        hop_s = float(np.diff(frame_starts).mean()) * radar.cycle_duration_s
+        hop_s = radar.frame_period_s or (
+            float(np.diff(frame_starts).mean()) * radar.cycle_duration_s
+        )
     every = max(math.ceil(len(frame_starts) / MAX_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
     window = np.arange(0, len(frame_starts), every)
     times = np.minimum(radar.window_times(frame_starts[window]), body.duration_s)
@@ -129,6 +131,9 @@ def _observe_block(
 ) -> _Observed:
     middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
     ends = np.clip(cycles[:, None] + [-_RATE_CYCLES, _RATE_CYCLES], 0, n_cycles - 1)
+    if radar.in_frames:
+        first = cycles[:, None] - cycles[:, None] % radar.cycles_per_frame
+        ends = np.clip(ends, first, first + radar.cycles_per_frame - 1)
     chirps, where = np.unique((ends * radar.n_tx + middle).astype(np.int64), return_inverse=True)
     where = where.reshape(ends.shape)
     echoes = model.echoes(chirps)

@@ -36,7 +36,7 @@ def cost(
 ) -> dict[str, Any]:
     """Return time and memory since ``started_s`` of `time.perf_counter`, for so many chirps."""
     wall_s = time.perf_counter() - started_s - warmup_s
-    capture_s = n_chirps * processing.radar.chirp_interval_s
+    capture_s = processing.radar.duration_of(n_chirps)
     return {
         "stages": {name: round(spent, 4) for name, spent in processing.stages.seconds.items()},
         "wall_s": round(wall_s, 4),
@@ -132,7 +132,7 @@ def summary_of_samples(
     radar = processing.radar
     names = set(ProcessingOptions.__annotations__)
     of_processing = {key: value for key, value in settings.parameters().items() if key in names}
-    capture_s = n_chirps * radar.chirp_interval_s
+    capture_s = radar.duration_of(n_chirps)
     return {
         "parameters": of_processing
         | {"duration_s": capture_s, "unit": processing.unit, "radar": dataclasses.asdict(radar)},

@@ -137,11 +137,12 @@ class ClutterShadow:
 
     def _posed(self, chirp: int) -> Posed:
         chirps = np.array([chirp])
-        at = chirp_poses(self._radar, self._body, chirps)
+        radar = self._radar.gapless
+        at = chirp_poses(radar, self._body, chirps)
         maps = np.swapaxes(at.frames[0], 1, 2) / at.semi_axes[:, :, None]
         corners, closed = [np.empty((0, 3, 3))], [np.empty(0, dtype=bool)]
         for own in self._faces:
-            (rotation,), (place,) = own.moving.pose(self._radar.centres_of(chirps))
+            (rotation,), (place,) = own.moving.pose(radar.centres_of(chirps))
             corners.append(own.corners @ rotation.T + place)
             closed.append(np.full(len(own.corners), own.moving.shape.closed))
         return Posed(

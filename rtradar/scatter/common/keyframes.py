@@ -6,6 +6,9 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rtradar.radar import Radar
 
 _Key = TypeVar("_Key", bound=Hashable)
@@ -19,6 +22,23 @@ def keyframe_step(radar: Radar, apart_s: float = 10e-3) -> int:
     that time.
     """
     return max(1, round(apart_s / radar.chirp_interval_s))
+
+
+def keyframe_before(
+    radar: Radar, chirps: NDArray[np.int64], step: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64] | NDArray[np.float64]]:
+    """Number of the keyframe before each chirp, and places from there to it.
+
+    Keyframes follow each other evenly, also in the gaps between frames: keyframe k is in the middle
+    of chirp k times ``step`` of `Radar.gapless`.
+    """
+    numbers, rest = np.divmod(radar.slots_of(chirps), step)
+    return numbers.astype(np.int64), rest
+
+
+def chirps_by_steps(radar: Radar, n_chirps: int, step: int) -> NDArray[np.int64]:
+    """Every chirp that begins a step, and at least one of every frame."""
+    return np.arange(0, n_chirps, min(step, radar.chirps_per_frame) if radar.in_frames else step)
 
 
 class KeyframeCache(Generic[_Key, _Value]):

@@ -22,7 +22,7 @@ from rtradar.kernels.scatter.fresnel_zones import blend_fractions
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import array_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
@@ -91,7 +91,7 @@ class ZoneFractions:
         shape = (len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts))
         out = np.empty(shape, dtype=np.complex128)
         spread = self._nodes.weights[self._radar.tx_of_chirp(chirps)]
-        interval, chirp = np.divmod(chirps, self._step)
+        interval, chirp = keyframe_before(self._radar, chirps, self._step)
         where = chirp / self._step * self._fine
         numbers = np.unique(interval)
         # At a keyframe alone neighbours do not matter.

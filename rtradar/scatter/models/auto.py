@@ -17,7 +17,7 @@ from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import at_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses, owners_of
 from rtradar.scatter.fresnel_zones.keyframes import BEND, ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS
@@ -217,9 +217,8 @@ class Auto(BuiltInModel):
     def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Weights (candidate, chirp, part) of sum at most 1, and parts that others cut (part,)."""
         parts = np.arange(len(self._body.part_names))
-        interval = chirps // self._step
-        fraction = (chirps - interval * self._step) / self._step
-        fraction = smoothstep(fraction)[:, None]
+        interval, rest = keyframe_before(self._radar, chirps, self._step)
+        fraction = smoothstep(rest / self._step)[:, None]
         weights = np.zeros((len(CANDIDATES), len(chirps), len(parts)))
         cut = np.zeros(len(parts), dtype=bool)
         for end, weight in ((interval, 1 - fraction), (interval + 1, fraction)):

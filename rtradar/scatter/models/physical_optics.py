@@ -17,6 +17,7 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
+from rtradar.scatter.common.keyframes import keyframe_before
 from rtradar.scatter.common.poses import (
     BuiltInModel,
     chirp_poses,
@@ -156,9 +157,10 @@ class PhysicalOptics(BuiltInModel):
         at = chirp_poses(self._radar, self._body, chirps)
         length, strength = self._surface.carriers(at)
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
-        intervals, envelope, weights = chirps // self._step, self._envelope, self._fine.weights
+        intervals, rest = keyframe_before(self._radar, chirps, self._step)
+        envelope, weights = self._envelope, self._fine.weights
         # Power is measured at keyframes, where nothing is asked of what comes after.
-        between = set(intervals[chirps % self._step != 0].tolist())
+        between = set(intervals[rest != 0].tolist())
         in_order = sorted(set(intervals.tolist()))
         for _, group in groupby(in_order, key=lambda interval: interval // TOGETHER):
             together = list(group)
@@ -167,7 +169,7 @@ class PhysicalOptics(BuiltInModel):
             for interval in together:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
-                    fraction = chirps[inside] / self._step - interval
+                    fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
                     course = tuple(envelope.course(interval))
                     given = inside, fraction, at.tx_index, weights, course
                     fill_envelope(*given, strength, amplitude)

@@ -17,7 +17,7 @@ from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, owners_of
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
@@ -96,9 +96,9 @@ class Rays(BuiltInModel):
         frequency = self._nodes(orders > 1)
         length = np.zeros((len(at.tx), at.rx.shape[1], orders * parts))
         amplitude = np.zeros((len(frequency), *length.shape), dtype=np.complex128)
-        for index, (chirp, tx) in enumerate(zip(chirps, at.tx_index, strict=True)):
-            before, fraction = divmod(int(chirp), self._step)
-            for place, weight in enumerate(_cubic(fraction / self._step), start=before - 1):
+        places = zip(*keyframe_before(self._radar, chirps, self._step), at.tx_index, strict=True)
+        for index, (before, fraction, tx) in enumerate(places):
+            for place, weight in enumerate(_cubic(fraction / self._step), start=int(before) - 1):
                 if weight != 0:
                     shot = self._shot(max(place, 0) * self._step, int(tx))
                     length[index] += weight * shot.length
@@ -120,7 +120,7 @@ class Rays(BuiltInModel):
     def _shoot(self, chirp: int, tx: int) -> _Shot:
         radar, axes = self._radar, self._body.semi_axes
         if self._posed is None or self._posed[0] != chirp:
-            at = chirp_poses(radar, self._body, np.array([chirp]))
+            at = chirp_poses(radar.gapless, self._body, np.array([chirp]))
             self._posed = chirp, PosedGrid(self._grid, at.centres[0], at.frames[0], axes)
             self._surfaces.pose(at.centres[0], at.frames[0])
         grid, stop_hz = self._posed[1], radar.start_frequency_hz + radar.bandwidth_hz

@@ -67,7 +67,8 @@ class Reference(BuiltInModel):
             named = np.concatenate([at.tx_index[inside, None], rx_index], axis=1)
             views, index = np.unique(named, return_inverse=True)
             antennas = np.concatenate([self._radar.tx, self._radar.rx])[views]
-            time = min((cycle + 0.5) * self._radar.cycle_duration_s, self._body.duration_s)
+            middle_s = float(self._radar.cycle_times(cycle + 0.5))
+            time = min(middle_s, self._body.duration_s)
             middle = self._body.at([time])
             seen = self._surface.seen(middle.centres[0], middle.frames[0], antennas, parts)
             amplitude[:, inside] = self._surface.amplitude(

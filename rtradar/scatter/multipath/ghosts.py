@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -29,12 +30,15 @@ def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
     Each is the mean of its parts, weighted by their power. The azimuth is that from which the last
     leg comes, or that of its antenna's image mirrored back.
     """
-    cycle = round(time_s / radar.cycle_duration_s - _STEP_CYCLES / 2)
-    chirps = (max(cycle, 0) + np.array([0, _STEP_CYCLES])) * radar.n_tx
+    cycle, step = round(time_s / radar.cycle_duration_s - _STEP_CYCLES / 2), _STEP_CYCLES
+    if radar.frame_period_s is not None:
+        step = min(step, max(radar.cycles_per_frame - 1, 1))
+        cycle = math.floor(time_s / radar.frame_period_s) * radar.cycles_per_frame
+    chirps = (max(cycle, 0) + np.array([0, step])) * radar.n_tx
     echoes = model.echoes(chirps)
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
     length = echoes.length.mean(axis=1)
-    rate = (length[1] - length[0]) / (_STEP_CYCLES * radar.cycle_duration_s)
+    rate = (length[1] - length[0]) / (step * radar.cycle_duration_s)
     # The direction follows from the slope of the lengths along the line of receivers.
     line = max(radar.rx_lines, key=lambda own: np.ptp(radar.rx_m[own, 1]))
     places, azimuth = radar.rx[line, 1], np.zeros(len(power))

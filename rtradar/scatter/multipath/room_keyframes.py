@@ -11,7 +11,7 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
 from rtradar.scatter.multipath.path_echoes import EchoColumns
@@ -48,7 +48,7 @@ class RoomKeyframes:
 
         ``tx (chirp,)`` are their transmitters.
         """
-        numbers, rest = np.divmod(chirps, self.step)
+        numbers, rest = keyframe_before(self._around.radar, chirps, self.step)
         starts, interval = np.unique(numbers, return_inverse=True)
         fraction = rest / self.step
         # Where every chirp of an interval is its first, the keyframe after it does not matter.
@@ -76,8 +76,9 @@ class RoomKeyframes:
         for first in range(0, len(missing), _KEYFRAMES_AT_ONCE):
             some = missing[first : first + _KEYFRAMES_AT_ONCE]
             chirps = np.array(some) * self.step
-            times = self._around.radar.centres_of(chirps)
-            poses = Poses(*chirp_poses(self._around.radar, self._body, chirps)[3:])
+            gapless = self._around.radar.gapless
+            times = gapless.centres_of(chirps)
+            poses = Poses(*chirp_poses(gapless, self._body, chirps)[3:])
             keyframes = path_keyframes(self._around, self.columns, poses, times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))

@@ -24,6 +24,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import take, times_factor, together
 from rtradar.scatter.common.interpolation import ArrayEnds
+from rtradar.scatter.common.keyframes import chirps_by_steps
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
@@ -310,7 +311,7 @@ class RoomModel:
         stay.
         """
         radar, columns = self._radar, self._columns
-        evaluated = np.arange(0, n_chirps, self._keyframes.step)
+        evaluated = chirps_by_steps(radar, n_chirps, self._keyframes.step)
         if noise_power_m2 > 0:
             evaluated = evaluated[:: max(1, min(_LOOK_EVERY, len(evaluated) // _LEAST_LOOKS))]
         power = np.zeros(len(columns))

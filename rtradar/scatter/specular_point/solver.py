@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry, Options, solve
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
 from rtradar.system.threads import thread_map
 
@@ -77,15 +77,14 @@ class StartPoints:
 
         They are those of some parts (part,), or of all [m].
         """
-        numbers, place = np.unique(
-            np.asarray(chirps, dtype=np.int64) // self._step, return_inverse=True
-        )
+        before, _ = keyframe_before(self._radar, chirps, self._step)
+        numbers, place = np.unique(before, return_inverse=True)
         found = [self._keyframes.get(n, partial(self._find, n)) for n in numbers.tolist()]
         points = np.stack(found)
         return (points if parts is None else points[:, parts])[place]
 
     def _find(self, number: int) -> NDArray[np.float64]:
-        at = chirp_poses(self._radar, self._body, np.array([number * self._step]))
+        at = chirp_poses(self._radar.gapless, self._body, np.array([number * self._step]))
         return local_points(at._replace(rx=at.rx[:, :1]))[1]
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.elementary import smoothstep
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
 from rtradar.scatter.specular_point.solver import local_points
 from rtradar.trace.body_tracer import BodyTracer
@@ -85,7 +85,7 @@ class SpecularVisibility:
         return Keyframe(visible.reshape(shape), start)
 
     def _trace(self, chirp: int) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-        every_tx = chirp_poses(self._radar, self._body, np.array([chirp]))
+        every_tx = chirp_poses(self._radar.gapless, self._body, np.array([chirp]))
         n_tx = self._radar.n_tx
         at = ChirpPoses(
             np.arange(n_tx),
@@ -112,15 +112,16 @@ class SpecularVisibility:
             parts = np.arange(len(self._body.part_names))
         weight = np.empty((len(chirps), self._radar.n_rx, len(parts)))
         start = np.empty((len(chirps), len(parts), 3))
-        tx, intervals = self._radar.tx_of_chirp(chirps), chirps // self._step
+        tx = self._radar.tx_of_chirp(chirps)
+        intervals, rest = keyframe_before(self._radar, chirps, self._step)
         for interval in np.unique(intervals):
             inside = np.flatnonzero(intervals == interval)
             first = int(interval) * self._step
             before = self._keyframe(first)
             weight[inside] = before.visible[..., parts][tx[inside]]
             start[inside] = before.start[parts]
-            if (chirps[inside] > first).any():
+            if (rest[inside] > 0).any():
                 after = self._keyframe(first + self._step).visible[..., parts][tx[inside]]
-                ramp = smoothstep((chirps[inside] - first) / self._step)[:, None, None]
+                ramp = smoothstep(rest[inside] / self._step)[:, None, None]
                 weight[inside] = (1 - ramp) * weight[inside] + ramp * after
         return weight, start
