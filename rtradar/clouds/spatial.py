@@ -144,7 +144,7 @@ def spatial_points(
         if power is None:
             direction[:, axis] = np.nan
     return SpatialCloud(
-        _in_world(spectra.range_m[cell, None] * direction, radar),
+        _in_world(spectra.range_m[cell, None] * direction, radar, time_s),
         spectra.velocity[cell],
         (y.power[cell, rank] + z.power[cell, rank]) / 2,
         np.full(len(cell), time_s),
@@ -188,7 +188,7 @@ def points_of_sines(
         direction = np.nan_to_num(direction, nan=0.0) @ radar.axes.T
     velocity = radar.velocity_mps(mask.shape[1])
     return SpatialCloud(
-        _in_world(radar.range_m[row[kept], None] * direction, radar),
+        _in_world(radar.range_m[row[kept], None] * direction, radar, time_s),
         velocity[column[kept]],
         power[row[kept], column[kept]] / radar.n_channels,
         np.full(int(kept.sum()), time_s),
@@ -196,15 +196,16 @@ def points_of_sines(
     )
 
 
-def _in_world(places: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
-    """World coordinates (n, 3) of places in the radar's axes.
+def _in_world(places: NDArray[np.float64], radar: Radar, time_s: float) -> NDArray[np.float64]:
+    """World coordinates (n, 3) of places in the radar's axes at a time.
 
     What is not measured is NaN, but where other axes mix it into all coordinates it is taken as 0.
     """
-    if not radar.is_turned:
+    if not (radar.is_turned or radar.is_moving):
         return np.asarray(radar.position_m) + places
-    world = np.nan_to_num(places) @ radar.axes.T + np.asarray(radar.position_m)
-    missing = np.isnan(places).all(axis=0) & (np.abs(np.diag(radar.axes)) > 1 - 1e-12)
+    (axes,), (position,) = radar.poses_at([time_s])
+    world = np.nan_to_num(places) @ axes.T + position
+    missing = np.isnan(places).all(axis=0) & (np.abs(np.diag(axes)) > 1 - 1e-12)
     return np.where(missing, np.nan, world)
 
 

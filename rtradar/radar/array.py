@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar.ambiguity import LinePattern
 from rtradar.radar.waveform import Waveform
@@ -32,6 +32,9 @@ class Array(Waveform):
     yaw_deg: float
     pitch_deg: float
     roll_deg: float
+    path_times_s: tuple[float, ...] | None
+    path_m: Places | None
+    path_angles_deg: Places | None
 
     @property
     def is_cross(self) -> bool:
@@ -127,6 +130,38 @@ class Array(Waveform):
     def is_turned(self) -> bool:
         """Whether the radar's axes differ from the world's."""
         return (self.yaw_deg, self.pitch_deg, self.roll_deg) != (0.0, 0.0, 0.0)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the radar moves."""
+        return self.path_times_s is not None
+
+    def poses_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Give the axes and the position of the radar at some times.
+
+        Parameters
+        ----------
+        times : (time,) float
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        axes : (time, 3, 3) float64
+            Axes as those of `axes`.
+        positions : (time, 3) float64
+            Positions, world [m].
+        """
+        from scipy.spatial.transform import Rotation  # here, because it is slow to import
+
+        at = np.asarray(times, dtype=np.float64)
+        positions, angles = np.empty((2, len(at), 3))
+        positions[:] = self.position_m
+        angles[:] = self.yaw_deg, self.pitch_deg, self.roll_deg
+        for values, path in ((positions, self.path_m), (angles, self.path_angles_deg)):
+            for axis, along in enumerate(() if path is None else zip(*path, strict=True)):
+                values[:, axis] += np.interp(at, self.path_times_s or (), along)
+        turned = Rotation.from_euler("ZYX", angles * [1, -1, 1], degrees=True)
+        return np.asarray(turned.as_matrix()), positions
 
     @cached_property
     def axes(self) -> NDArray[np.float64]:

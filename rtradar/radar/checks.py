@@ -85,9 +85,7 @@ def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
 
 
 def _is_place(value: Any) -> bool:
-    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 3:
-        return False
-    return all(map(_is_number, value)) and max(map(abs, value)) <= _MOST_PLACE_M
+    return _is_triple(value) and max(map(abs, value)) <= _MOST_PLACE_M
 
 
 _PLACES = FieldRule(
@@ -116,6 +114,17 @@ def _if(allows: Callable[[Any], bool], convert: type) -> FieldRule:
     """Convert values of the right kind; whether others are allowed depends on other fields."""
     return FieldRule(lambda _: True, lambda value: convert(value) if allows(value) else value, "")
 
+
+def _is_triple(value: Any) -> bool:
+    triple = isinstance(value, list | tuple | np.ndarray) and len(value) == 3
+    return triple and all(map(_is_number, value))
+
+
+_ANGLES = FieldRule(
+    lambda value: isinstance(value, list | tuple | np.ndarray) and all(map(_is_triple, value)),
+    lambda value: tuple(tuple(map(float, one)) for one in value),
+    "it must be a list of [yaw, pitch, roll] in degrees",
+)
 
 FIELD_RULES: dict[str, FieldRule] = {
     **dict.fromkeys(("start_frequency_hz", "bandwidth_hz", "chirp_duration_s"), _POSITIVE),
@@ -154,6 +163,16 @@ FIELD_RULES: dict[str, FieldRule] = {
         lambda value: tuple(map(float, value)),
         "it must be three finite numbers [m]",
     ),
+    "path_times_s": FieldRule(
+        lambda value: (
+            value is None
+            or (isinstance(value, list | tuple | np.ndarray) and all(map(_is_number, value)))
+        ),
+        lambda value: None if value is None else tuple(map(float, value)),
+        "it must be a list of times [s]",
+    ),
+    "path_m": _PLACES,
+    "path_angles_deg": _or_none(_ANGLES),
     "transmit_power_dbm": _between(-200, 200),
     "noise_figure_db": _between(0, 100),
     "noise_temperature_k": _between(0, 1e6, optional=False),
@@ -189,6 +208,20 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"samples from adc_start_s = {r.adc_start_s:g} on for {r.sampled_duration_s:.4g} s do not "
         f"fit into chirp_duration_s = {r.chirp_duration_s:g}; begin sooner, take fewer "
         "(samples_per_chirp) or take them faster (adc_rate_hz)",
+    )
+    path = tuple(own for own in (r.path_m, r.path_angles_deg) if own is not None)
+    yield (
+        (r.path_times_s is not None) == bool(path),
+        "path_times_s belongs to path_m or path_angles_deg, and they to it; give both, or neither",
+    )
+    yield (
+        not path
+        or (
+            {len(own) for own in path} == {len(r.path_times_s or ())}
+            and bool(np.all(np.diff(r.path_times_s or ()) > 0))
+        ),
+        f"path_times_s = {brief(r.path_times_s)}; it must have as many times as path_m and "
+        "path_angles_deg have entries, ascending",
     )
     yield (
         r.carrier_step_hz is None or r.multiplexing == "fdm",

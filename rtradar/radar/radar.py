@@ -76,6 +76,10 @@ class Radar(Schedule):
     yaw_deg, pitch_deg, roll_deg : float
         How the radar is turned [deg]: yaw turns its boresight from world x to the left, pitch
         raises it, and roll turns the array about it, anticlockwise seen from the front.
+    path_times_s, path_m, path_angles_deg : sequence, optional
+        Motion of the radar: times [s], ascending, how far it is from its position then, (x, y, z)
+        in world axes [m], and how far it is turned from its yaw, pitch and roll [deg]. In between
+        it goes straight and evenly, and before and after it rests. Only in free space.
     channels : {"pairs", "all"}
         ``pairs`` keeps y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper); ``all`` keeps
         every Tx with every Rx (192). With a list every Rx is kept.
@@ -159,6 +163,9 @@ class Radar(Schedule):
     yaw_deg: float = 0.0
     pitch_deg: float = 0.0
     roll_deg: float = 0.0
+    path_times_s: tuple[float, ...] | None = None
+    path_m: Places | None = None
+    path_angles_deg: Places | None = None
     channels: Literal["pairs", "all"] = "pairs"
     frame_duration_s: float = 0.1
     frame_hop_s: float = 0.025

@@ -1,4 +1,4 @@
-"""The world as a radar sees it that is turned: in its own axes, about its own position.
+"""The world as a radar sees it that is turned or moves: in its own axes, about its own position.
 
 Lengths of paths and what bodies return do not depend on the axes, and antennas and polarisation are
 those of the radar. Models therefore compute in axes in which the radar is upright.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,7 @@ from rtradar.scene import Scene
 
 Array = NDArray[np.float64]
 
-_Pose = Callable[[Array], tuple[Array, Array]]
+_Pose = Callable[[ArrayLike], tuple[Array, Array]]
 """Axes (time, 3, 3) and positions (time, 3) [m] of a radar at some times [s]."""
 
 
@@ -65,16 +66,17 @@ def in_radar_axes(radar: Radar, body: Body, scene: Scene) -> tuple[Radar, Body, 
     All three are themselves where the radar is upright. An `InputError` is raised where something
     in the scene cannot be seen in other axes.
     """
-    if not radar.is_turned:
+    if not (radar.is_turned or radar.is_moving):
         return radar, body, scene
-    centre, axes = np.array(radar.position_m), radar.axes
-
-    def pose(times: Array) -> tuple[Array, Array]:
-        count = len(times)
-        return np.broadcast_to(axes, (count, 3, 3)), np.broadcast_to(centre, (count, 3))
-
-    upright = dataclasses.replace(radar, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0)
-    return upright, BodyInRadarAxes(body, pose, centre), _turned(scene, radar)
+    if radar.is_moving and not scene.is_empty:
+        raise InputError(
+            f"scene '{scene.name}': radar '{radar.name}' moves, which is simulated in free space "
+            "only; leave path_times_s out, or the scene"
+        )
+    still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
+    upright = dataclasses.replace(radar, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0, **still)
+    seen = BodyInRadarAxes(body, radar.poses_at, np.array(radar.position_m))
+    return upright, seen, _turned(scene, radar)
 
 
 def _turned(scene: Scene, radar: Radar) -> Scene:
