@@ -4,6 +4,9 @@ within    sweep, slope, sample rate and chirp of each board over the limit of it
 beam      half-power width in azimuth against the 15 degrees that TI states for 8 columns of
           virtual elements (files of its demos, guide SWRU585), within a degree: 2 / 8 radians is
           14.3, and -3 dB is another width
+readback  a point at a known place and speed, through range-Doppler map and angles, each off by at
+          most a tenth of a bin or of the beam at broadside; its samples are the phase of the path
+          of each of them, from the numbers of the file
 radhar    range and velocity bins against those of the recorded points, and, where the recording is
           at hand (RTRADAR_MEASURED), of all of them
 mars      the same: the grid of an FFT of 128 for 80 samples, and the step of the velocities
@@ -13,16 +16,26 @@ mars      the same: the grid of an FFT of 128 for 80 samples, and the step of th
 
 from __future__ import annotations
 
+import itertools
 import os
 import sys
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import rtradar as rt
+from rtradar.process import angle, power_map, range_spectrum
+from rtradar.system.files import shipped_folder
 from rtradar.validate.rows import Row, judged, main
+
+LIGHT = 299_792_458.0
+RANGE_M = 3.1
+DIRECTIONS_DEG = ((0.0, 0.0), (22.0, 6.0), (-35.0, -11.0))
+SPEEDS_MPS = (0.0, 1.3, -2.7)
 
 
 @dataclass(frozen=True)
@@ -76,6 +89,60 @@ def beam_row(name: str, beam_deg: float) -> Row:
     return judged(name, "beam width in azimuth", "deg", width, 1.0, reference=beam_deg, says=says)
 
 
+def samples_of(name: str, way: NDArray[np.float64], speed: float) -> NDArray[np.complex64]:
+    """IF samples of one frame; in its middle the point is in the direction ``way``, a unit."""
+    file = tomllib.loads((shipped_folder("radars") / f"{name}.toml").read_text())
+    rx = np.array(file["rx_positions_m"])
+    order = file.get("tx_order", range(len(file["tx_positions_m"])))
+    slope = file["bandwidth_hz"] / file["chirp_duration_s"]
+    fast = file["adc_start_s"] + np.arange(file["samples_per_chirp"]) / file["adc_rate_hz"]
+    period, chirps = file["chirp_duration_s"] + file["idle_s"], file["chirps_per_frame"]
+    x = np.empty((chirps, len(rx), len(fast)), np.complex64)
+    for chirp in range(chirps):
+        tx = np.array(file["tx_positions_m"][order[chirp % len(order)]])
+        moved = speed * (chirp * period + fast - (chirps - 1) * period / 2 - fast.mean())
+        at = way * (RANGE_M + moved)[:, None]
+        there = np.linalg.norm(at - tx, axis=-1)
+        delay = (there + np.linalg.norm(at - rx[:, None], axis=-1)) / LIGHT
+        # The sweep of now times that of a delay ago, and without the double frequency.
+        phase = file["start_frequency_hz"] * delay + slope * delay * (fast - delay / 2)
+        x[chirp] = np.exp(2j * np.pi * phase)
+    return x
+
+
+def middle(power: NDArray[np.floating]) -> float:
+    """Centroid [bins] of the lobe about the highest bin, on an axis that is cyclic."""
+    bins = power.argmax() + np.arange(-5, 6)
+    weights = power[bins % len(power)]
+    return float(weights @ bins / weights.sum())
+
+
+def readback_rows(name: str, quick: bool) -> Iterator[Row]:
+    radar = rt.Radar.preset(name)
+    cases = itertools.product(DIRECTIONS_DEG, SPEEDS_MPS)
+    for direction, speed in list(cases)[4:5] if quick else cases:
+        azimuth, elevation = np.radians(direction)
+        level = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+        x = samples_of(name, np.array([*level, np.sin(elevation)]), speed)
+        cycles = radar.cycles_per_frame
+        spectra = range_spectrum(x, radar).reshape(cycles, radar.n_tx, radar.n_rx, -1)
+        power = power_map(spectra, radar)
+        seen = angle(x, radar, RANGE_M, speed)
+        beams = radar.azimuth_resolution_deg, radar.elevation_resolution_deg
+        off = {
+            "range [bins]": middle(power.sum(axis=1)) - RANGE_M / radar.range_bin_m,
+            "velocity [bins]": middle(power.sum(axis=0))
+            - cycles // 2
+            - speed / radar.velocity_bin_mps,
+            "azimuth [beams]": (np.degrees(seen[0]) - direction[0]) / beams[0],
+            "elevation [beams]": (np.degrees(seen[1]) - direction[1]) / beams[1],
+        }
+        where = f"{name}, azimuth {direction[0]:+.0f}, elevation {direction[1]:+.0f}"
+        for what, error in off.items():
+            says = f"a point reads back through each preset of a board: {what.split()[0]}"
+            yield judged(f"{where}, {speed:+g} m/s", what, "", abs(float(error)), 0.1, says=says)
+
+
 def data_set_rows() -> Iterator[Row]:
     radhar, mars = rt.Radar.preset("radhar"), rt.Radar.preset("mars")
     says = "bins of the presets of RadHAR and MARS against those of their recorded points"
@@ -118,6 +185,8 @@ def measure(quick: bool) -> list[Row]:
     rows = [row for name, sheet in DATASHEETS.items() for row in within_rows(name, sheet)]
     known = {name: sheet.beam_deg for name, sheet in DATASHEETS.items() if sheet.beam_deg}
     rows += [beam_row(name, beam_deg) for name, beam_deg in known.items()]
+    for name in list(DATASHEETS)[-2:] if quick else (*DATASHEETS, "radhar", "mars"):
+        rows += readback_rows(name, quick)
     return [*rows, *data_set_rows()]
 
 
