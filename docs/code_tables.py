@@ -21,6 +21,7 @@ from rtradar.campaign.spec import DRAWN, RUN_KEYS, Intervals
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.radar import Radar
+from rtradar.receiver import Interferer, Receiver
 from rtradar.scene import (
     MATERIALS,
     Furniture,
@@ -166,7 +167,10 @@ def keys(thing: type) -> str:
     defaults = {field.name: field.default for field in dataclasses.fields(thing)}
     rows = []
     for names, kind, meaning in described(inspect.getdoc(thing) or ""):
-        values = ["" if defaults[name] in (None, ()) else toml(defaults[name]) for name in names]
+        values = [
+            "" if defaults[name] in (None, (), dataclasses.MISSING) else toml(defaults[name])
+            for name in names
+        ]
         rows.append(
             [
                 ", ".join(f"`{name}`" for name in names),
@@ -344,6 +348,8 @@ def drawn() -> str:
 TABLES: dict[str, Callable[[], str]] = {
     "radar-keys": lambda: keys(Radar),
     "antenna-keys": lambda: keys(Antenna),
+    "receiver-keys": lambda: keys(Receiver),
+    "interferer-keys": lambda: keys(Interferer),
     "radar-limits": radar_limits,
     "board-limits": board_limits,
     "scene-keys": scene_keys,

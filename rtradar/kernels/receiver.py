@@ -66,7 +66,7 @@ def high_pass(corners, out):
     """
     n_rx, n_samples, one = out.shape[1], out.shape[2], np.float32(1)
     lanes = np.empty((n_samples, 2 * n_rx), np.float32)
-    state, before = np.empty(2 * n_rx, np.float32), np.empty(2 * n_rx, np.float32)
+    state = np.empty(2 * n_rx, np.float32)
     for row in range(len(out)):
         samples = out[row]
         for receiver in range(n_rx):
@@ -77,19 +77,23 @@ def high_pass(corners, out):
             kept, passed = (one - corner) / (one + corner), one / (one + corner)
             # The filter settles within some of its time constants, 1 / (2 corner) samples each.
             ahead = min(n_samples - 1, int(np.float32(4) / corner) + 1)
+            # A slower one has taken away the mean, and nothing else.
+            state[:] = 0
+            for i in range(ahead + 1):
+                for lane in range(2 * n_rx):
+                    state[lane] -= lanes[i, lane]
             for lane in range(2 * n_rx):
-                state[lane], before[lane] = 0, lanes[ahead, lane]
+                filtered = state[lane] / np.float32(ahead + 1) + lanes[ahead, lane]
+                state[lane] = kept * filtered - passed * lanes[ahead, lane]
             for i in range(ahead - 1, 0, -1):
                 for lane in range(2 * n_rx):
-                    new = lanes[i, lane]
-                    state[lane] = kept * state[lane] + passed * (new - before[lane])
-                    before[lane] = new
+                    new = passed * lanes[i, lane]
+                    state[lane] = kept * (new + state[lane]) - new
             for i in range(n_samples):
                 for lane in range(2 * n_rx):
-                    new = lanes[i, lane]
-                    state[lane] = kept * state[lane] + passed * (new - before[lane])
-                    before[lane] = new
-                    lanes[i, lane] = state[lane]
+                    new = passed * lanes[i, lane]
+                    filtered = new + state[lane]
+                    lanes[i, lane], state[lane] = filtered, kept * filtered - new
         for receiver in range(n_rx):
             for i in range(n_samples):
                 samples[receiver, i] = complex(lanes[i, 2 * receiver], lanes[i, 2 * receiver + 1])
@@ -104,7 +108,9 @@ def high_pass_reference(corners, given):
         ahead = min(given.shape[2] - 1, int(4 / corner) + 1)
         longer = np.concatenate([samples[..., ahead:0:-1], samples], axis=-1)
         ratio = np.array([1, -1]) / (1 + corner), np.array([1, -(1 - corner) / (1 + corner)])
-        samples = lfilter(*ratio, longer - longer[..., :1], axis=-1)[..., ahead:]
+        start = longer[..., :1] - longer[..., : ahead + 1].mean(axis=-1, keepdims=True)
+        filtered, _ = lfilter(*ratio, longer - longer[..., :1], axis=-1, zi=start)
+        samples = filtered[..., ahead:]
     return samples
 
 

@@ -4,7 +4,7 @@ An echo of delay tau is mixed with the noise phi(t) - phi(t - tau), whose spectr
 oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
 x + j (phi(t) - phi(t - tau)) x. Of what is still, (phi(t) - phi(t - tau)) / tau is interpolated
 between some delays, and echoes are summed once for each. Of what moves all echoes have the mean
-delay of their power, chirp by chirp.
+delay of their power, cycle by cycle.
 """
 
 from __future__ import annotations
@@ -132,23 +132,22 @@ class PhaseNoise:
         at_nodes = _residue(half_turn * self._nodes_s[:, None].astype(np.float32))
         scale = self._scale.astype(np.float32)
 
-        def fill_cycle(begin: int) -> None:
+        def fill_cycle(begin: int, filters: NDArray[np.complex64]) -> None:
             bits = np.random.SFC64(stream(self._seed, (first + begin) // radar.n_tx, _STREAM))
             random = np.zeros((self._rows, 1, len(half_turn)), np.complex64)
             state = np.asarray(bits.state["state"]["state"])
             add_noise(state[None], self._rows, np.float32(1), random)
             own = slice(begin, begin + radar.n_tx)
-            delay = moving_s[own].astype(np.float32)
-            filters = np.empty((len(delay), 1 + len(at_nodes), len(half_turn)), np.complex64)
-            filters[:, 0] = _residue(half_turn * delay[:, None])
-            filters[:, 1:] = at_nodes
-            filters *= random * scale
-            # Cycle by cycle, for the FFT of other numbers of rows may round otherwise.
-            out[own] = scipy.fft.irfft(filters, n, axis=-1)
+            filters[0] = _residue(half_turn * np.float32(moving_s[own].mean())) * scale
+            # Cycle by cycle, for the FFT of other numbers of rows may round otherwise. Tx that
+            # transmit at once have one oscillator.
+            out[own] = scipy.fft.irfft(random * filters, n, axis=-1)
 
         def fill(begin: int) -> None:
+            filters = np.empty((1 + len(at_nodes), len(half_turn)), np.complex64)
+            filters[1:] = at_nodes * scale
             for cycle in range(begin, min(begin + at_once, len(out)), radar.n_tx):
-                fill_cycle(cycle)
+                fill_cycle(cycle, filters)
 
         at_once = _CYCLES_AT_ONCE * radar.n_tx
         thread_map(fill, range(0, len(out), at_once))

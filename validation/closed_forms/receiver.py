@@ -1,0 +1,405 @@
+"""What a receiver adds to IF samples, effect by effect, against closed forms.
+
+phase-noise   residual spectrum of still and of moving echoes against L(f) 4 sin^2(pi f tau)
+iq            image of a tone below it against the ratio for an error of gain and of phase
+quantisation  signal to noise of rounding against 6.02 b + 1.76 dB
+clipping      third and fifth harmonic of a clipped tone against their Fourier coefficients
+highpass      response over frequency against the analogue filters of first order
+leakage       place and power against the length of its path and the coupling
+dc            power in range bin 0
+channels      errors given, and deviation of the angle that drawn ones cause
+interferer    place, duration, chirp rate, power and direction of a crossing ramp
+cost          CPU time from motion to cloud with all effects over that without, in one run
+
+    python validation/closed_forms/receiver.py [--quick] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+import time
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.pipeline.prepare import prepare
+from rtradar.pipeline.processing import CloudMaker
+from rtradar.settings import RunSettings
+from rtradar.signal import Expected, ReceiverStage
+from rtradar.validate.rows import Row, judged, main, reported
+
+LIGHT = 299_792_458.0
+POWER_DBM = 12.0
+Samples = NDArray[np.complex64]
+
+
+def radar(n_rx: int = 1, **fields: Any) -> rt.Radar:
+    """One Tx, chirps of 102.4 us and 100 MHz, 1024 samples at 10 MHz."""
+    return rt.Radar(
+        start_frequency_hz=12e9,
+        bandwidth_hz=100e6,
+        chirp_duration_s=102.4e-6,
+        samples_per_chirp=1024,
+        tx_y=1,
+        tx_z=0,
+        rx_y=n_rx,
+        rx_z=0,
+        frame_duration_s=0.01,
+        transmit_power_dbm=POWER_DBM,
+        receiver=rt.Receiver(**fields),
+    )
+
+
+def stage(made: rt.Radar, moving_m2: float = 1.0) -> ReceiverStage:
+    """Everything that the receiver has, for there is no noise."""
+    return ReceiverStage(made, Expected(moving_m2, 1e-8, 0.0, 0.0), n_chirps=100)
+
+
+def received(made: rt.Radar, samples: NDArray[Any]) -> NDArray[np.complex128]:
+    """Samples (row, rx, sample) after the ADC."""
+    out = np.array(samples, dtype=np.complex64)
+    stage(made, float((np.abs(out) ** 2).max())).receive(out, 0)
+    return out.astype(np.complex128)
+
+
+def tone(bins: float, amplitude: float = 1.0) -> NDArray[np.complex128]:
+    return np.asarray(amplitude * np.exp(2j * np.pi * bins * np.arange(1024) / 1024))[None, None]
+
+
+def amplitude_of(made: rt.Radar, power_dbm: float) -> float:
+    """Amplitude [m] of a power at the antenna by the radar equation, isotropic antennas."""
+    wavelength = LIGHT / (made.start_frequency_hz + made.bandwidth_hz / 2)
+    of_one_m2_dbm = POWER_DBM + 10 * math.log10(wavelength**2 / (4 * math.pi) ** 3)
+    return float(10 ** ((power_dbm - of_one_m2_dbm) / 20))
+
+
+def db(ratio: float) -> float:
+    return 20 * math.log10(ratio)
+
+
+# -- effects ---------------------------------------------------------------------------------------
+
+
+def phase_noise_rows(quick: bool) -> Iterator[Row]:
+    says = "residual phase noise against L(f) 4 sin^2(pi f tau), mean error over all offsets"
+    chirps = 400 if quick else 4000
+    offsets, levels = (1e4, 1e6, 5e6), (-80.0, -95.0, -110.0)
+    for length in (3.0, 90.0):
+        made = radar(
+            phase_noise_hz=offsets,
+            phase_noise_dbc_hz=levels,
+            leakage_db=-20.0,
+            leakage_length_m=length,
+        )
+        kept = stage(made)
+        delay = (length + abs(made.tx[0] - made.rx[0]).max()) / LIGHT
+        frequency = np.fft.fftfreq(1024, 1 / 10e6)
+        lines = np.interp(np.log10(np.maximum(np.abs(frequency), 1)), np.log10(offsets), levels)
+        expected = 10 ** (lines / 10) * 4 * np.sin(np.pi * frequency * delay) ** 2
+        echoes = rt.Echoes(
+            length=np.full((chirps, 1, 1), length),
+            amplitude=np.ones((1, chirps, 1, 1), complex),
+            frequency=np.array([12.05e9]),
+            tx=np.zeros(chirps, np.int64),
+            part=np.zeros(1, np.int64),
+            bounces=np.ones(1, np.int64),
+        )
+        phases = kept.phases(echoes, 0)
+        quiet = np.zeros((1, 1, 1024), np.complex64)
+        still = np.zeros((chirps, 1, 1024), np.complex64)
+        kept.transmit(still, phases, 0)
+        pure = stage(radar(leakage_db=-20.0, leakage_length_m=length))
+        pure.transmit(quiet, None, 0)
+        moving = np.ones((chirps, 1, 1024), np.complex64)
+        kept.turn_moving(moving, phases)
+        # Beside zeros of sin^2 the interpolation over delays, to 2 % of the amplitude, is more.
+        loud = np.abs(np.sin(np.pi * frequency * delay)) > 0.2 if length > 50 else frequency != 0
+        for name, turned in (("still", still / quiet), ("moving", moving)):
+            spectrum = np.abs(np.fft.fft(turned[:, 0].astype(np.complex128) - 1)) ** 2
+            found = spectrum.mean(axis=0) / (1024 * 10e6)
+            error = 10 * np.log10(found[loud].mean() / expected[loud].mean())
+            shape = 10 * np.log10(found[loud] / expected[loud])
+            claim = f"a {name} echo, path of {length:g} m"
+            # Each bin is known to 1 / sqrt(chirps); 0.17 dB are the interpolation over delays.
+            bins = 0.17 + 4.34 / math.sqrt(chirps)
+            yield judged(
+                claim, "density, all bins", "dB", error, 0.2, key="phase-noise", says=says,
+                reference=0.0,
+            )  # fmt: skip
+            yield judged(
+                claim, "rms error of a bin", "dB", float(np.sqrt((shape**2).mean())), 1.2 * bins,
+                key="phase-noise", says="the same, rms error of one offset",
+            )  # fmt: skip
+
+
+def iq_rows() -> Iterator[Row]:
+    says = "image of a tone by errors of IQ gain and phase, against the closed ratio"
+    for gain_db, phase_deg in ((0.5, 0.0), (0.0, 3.0), (1.0, 5.0), (-0.2, -1.0)):
+        made = radar(iq_gain_db=gain_db, iq_phase_deg=phase_deg)
+        spectrum = np.abs(np.fft.fft(received(made, tone(37))[0, 0]))
+        g, phi = 10 ** (gain_db / 20), math.radians(phase_deg)
+        ratio = (1 + 2 * g * math.cos(phi) + g**2) / (1 - 2 * g * math.cos(phi) + g**2)
+        # Single precision leaves 1e-7 of the tone, 1e-5 of the image.
+        yield judged(
+            f"{gain_db:g} dB, {phase_deg:g} deg", "image rejection", "dB",
+            db(spectrum[37] / spectrum[-37]), 0.001, reference=10 * math.log10(ratio),
+            key="iq", says=says,
+        )  # fmt: skip
+
+
+def quantisation_rows(quick: bool) -> Iterator[Row]:
+    says = "signal to noise of an ADC that a tone just fills, against 6.02 b + 1.76 dB"
+    rng = np.random.default_rng(0)
+    for bits in (6, 12) if quick else (4, 6, 8, 10, 12, 14):
+        made = radar(adc_bits=bits, adc_full_scale_dbm=-40.0)
+        full = amplitude_of(made, -40.0)
+        # A step below, for the highest code is.
+        size = full * (1 - 2.0 ** (1 - bits))
+        given = np.concatenate([tone(bins, size) for bins in rng.uniform(100, 900, 40)])
+        given = given.astype(np.complex64).astype(np.complex128)
+        noise = (np.abs(received(made, given) - given) ** 2).mean()
+        # The error of few steps is not quite white: 0.2 dB.
+        yield judged(
+            f"{bits} bits", "signal to noise", "dB", 10 * math.log10(full**2 / noise), 0.2,
+            reference=20 * math.log10(2) * bits + 10 * math.log10(1.5),
+            key="quantisation", says=says,
+        )  # fmt: skip
+
+
+def clipping_rows() -> Iterator[Row]:
+    says = "harmonics of a clipped tone against its Fourier coefficients"
+    made = radar(adc_full_scale_dbm=-40.0)
+    full = amplitude_of(made, -40.0)
+    for over_db in (3.0, 12.0):
+        size = full * 10 ** (over_db / 20)
+        spectrum = np.abs(np.fft.fft(received(made, tone(5, size))[0, 0])) / 1024
+        edge = math.acos(full / size)
+        for k, place in ((3, -15), (5, 25)):
+            lost = math.sin((k - 1) * edge) / (2 * (k - 1)) + math.sin((k + 1) * edge) / (
+                2 * (k + 1)
+            )
+            expected = 4 / math.pi * abs(size * lost - full * math.sin(k * edge) / k)
+            # Harmonics past half the sample rate fold back, 0.02 of the fifth.
+            yield judged(
+                f"{over_db:g} dB over full scale", f"harmonic {k}", "dB",
+                db(spectrum[place] / full), 0.2, reference=db(expected / full),
+                key="clipping", says=says,
+            )  # fmt: skip
+
+
+def highpass_rows() -> Iterator[Row]:
+    says = "response of the high-pass filters up to half the sample rate, against analogue ones"
+    window = np.hanning(1025)[:-1]
+    for corners in ((175e3,), (175e3, 350e3), (300e3, 1.4e6)):
+        made = radar(highpass_hz=corners)
+        for f in (100e3, 350e3, 1e6, 4e6, 9.8e6):
+            given = tone(f / 10e6 * 1024)
+            found = abs((received(made, given) * given.conj() * window).sum()) / window.sum()
+            expected = math.prod(f / math.hypot(f, corner) for corner in corners)
+            claim, quantity = f"corners {corners}", f"response at {f / 1e6:g} MHz"
+            values = db(found), db(expected)
+            if f > 5e6:  # as its image would be: where the model ends
+                yield reported(
+                    claim, quantity, "dB", values[0], reference=values[1], key="highpass"
+                )
+                continue
+            # The bilinear transform puts f = infinity at Fs / 2: it passes at 4 MHz what the filter
+            # takes there, 0.5 dB with a corner at 1.4 MHz.
+            yield judged(
+                claim, quantity, "dB", values[0], 0.1 if max(corners) < 1e6 else 0.5,
+                reference=values[1], key="highpass", says=says,
+            )  # fmt: skip
+
+
+def leakage_rows() -> Iterator[Row]:
+    for length in (0.5, 4.0):
+        made = radar(n_rx=2, leakage_db=-35.0, leakage_length_m=length)
+        samples = np.zeros((1, 2, 1024), np.complex64)
+        stage(made).transmit(samples, None, 0)
+        one = samples[0, 1].astype(np.complex128)
+        power_dbm = db(float(np.abs(one).mean()) / amplitude_of(made, 0.0))
+        beat = np.angle((one[1:] * one[:-1].conj()).sum()) / (2 * np.pi) * 10e6
+        path = length + float(np.linalg.norm(made.tx[0] - made.rx[1]))
+        claim = f"lines of {length:g} m"
+        says = "power of leakage against that transmitted and the coupling"
+        yield judged(
+            claim, "power", "dBm", power_dbm, 0.001, reference=POWER_DBM - 35.0,
+            key="leakage", says=says,
+        )  # fmt: skip
+        # Single precision: 1e-7 rad between samples, over 1000 of them.
+        says = "range of leakage against the length of its path"
+        yield judged(
+            claim, "range", "m", beat / (100e6 / 102.4e-6) * LIGHT / 2, 1e-3, reference=path / 2,
+            key="leakage", says=says,
+        )  # fmt: skip
+    made = radar(dc_dbm=-63.0)
+    constant = abs(received(made, np.zeros((1, 1, 1024))).mean())
+    yield judged(
+        "a constant", "power in range bin 0", "dBm", db(constant / amplitude_of(made, 0.0)), 0.001,
+        reference=-63.0, key="dc", says="power of DC",
+    )  # fmt: skip
+
+
+def channel_rows(quick: bool) -> Iterator[Row]:
+    gains, turns = (0.5, -1.0, 0.0, 2.0), (10.0, 0.0, -20.0, 5.0)
+    made = radar(n_rx=4, channel_gain_db=gains, channel_phase_deg=turns)
+    samples = np.ones((1, 4, 1024), np.complex64)
+    stage(made).transmit(samples, None, 0)
+    expected = 10 ** (np.array(gains) / 20) * np.exp(1j * np.radians(turns))
+    error = float(np.abs(samples[0, :, 0] - expected).max())
+    yield judged(
+        "errors given", "largest difference", "1", error, 1e-6, key="channels",
+        says="errors of channels that are given",
+    )  # fmt: skip
+    elements, sigma_deg, seeds = 16, 4.0, 100 if quick else 1000
+    found = []
+    for seed in range(seeds):
+        made = radar(n_rx=elements, channel_phase_deg=sigma_deg, seed=seed)
+        samples = np.ones((1, elements, 1024), np.complex64)
+        stage(made).transmit(samples, None, 0)
+        beam = np.abs(np.fft.fft(samples[0, :, 0], 1 << 14))
+        found.append((int(np.argmax(beam)) + (1 << 13)) % (1 << 14) - (1 << 13))
+    # Sine of the direction of the beam, for elements half a wavelength apart at 12 GHz.
+    wavelengths = 0.5 * 12.05 / 12.0
+    sines = np.array(found) / (1 << 14) / wavelengths
+    # Of one Tx only the Rx differ, which have half of the variance. Skolnik, Radar Handbook:
+    # variance of the slope of a line through phases that are off by sigma each.
+    sigma = math.radians(sigma_deg) / math.sqrt(2)
+    spread = elements * (elements**2 - 1) / 12
+    expected_deg = math.degrees(sigma / (2 * math.pi * wavelengths * math.sqrt(spread)))
+    # A deviation of that many values is known to 1 / sqrt(2 n); five of these.
+    yield judged(
+        f"phases off by {sigma_deg:g} deg, {elements} Rx", "deviation of the angle", "deg",
+        math.degrees(float(sines.std())), expected_deg * 5 / math.sqrt(2 * seeds),
+        reference=expected_deg, key="channels", says="deviation of the angle by errors of phase",
+    )  # fmt: skip
+
+
+def interferer_rows() -> Iterator[Row]:
+    slope, azimuth_deg = 100e6 / 102.4e-6, 25.0
+    for other_slope in (3e12, -2e12):
+        # Its ramp meets ours in the middle of the chirp.
+        middle_s = 51.2e-6
+        start_hz = 12e9 + slope * middle_s - other_slope * middle_s
+        other = rt.Interferer(
+            start_frequency_hz=start_hz,
+            slope_hz_per_s=other_slope,
+            ramp_s=102.4e-6,
+            period_s=1.0,
+            power_dbm=-55.0,
+            azimuth_deg=azimuth_deg,
+        )
+        made = radar(n_rx=2, interferer=other)
+        samples = received(made, np.zeros((1, 2, 1024)))[0]
+        hit = np.flatnonzero(samples[0])
+        claim = f"a ramp of {other_slope / 1e12:g} MHz/us across ours of {slope / 1e12:.2f}"
+        apart = slope - other_slope
+        # The beat goes from 0 to the sample rate: before the crossing where theirs is faster.
+        expected_us = 1e6 * 10e6 / abs(apart)
+        start_us = 51.2 - (expected_us if apart < 0 else 0.0)
+        says = "crossing ramp of another radar: when and how long it is in the band of the IF"
+        for quantity, value, expected in (
+            ("start", hit[0] * 0.1, start_us),
+            ("duration", len(hit) * 0.1, expected_us),
+        ):
+            # A sample takes 0.1 us.
+            yield judged(
+                claim, quantity, "us", value, 0.1001, reference=expected, key="interferer",
+                says=says,
+            )  # fmt: skip
+        inside = samples[:, hit[0] : hit[-1] + 1]
+        power = db(float(np.abs(inside[0]).mean()) / amplitude_of(made, 0.0))
+        says = "crossing ramp of another radar: power"
+        yield judged(
+            claim, "power", "dBm", power, 0.001, reference=-55.0, key="interferer", says=says
+        )
+        steps = inside[0, 1:] * inside[0, :-1].conj()
+        rate = np.angle((steps[1:] * steps[:-1].conj()).mean()) / (2 * np.pi) * 10e6**2
+        says = "crossing ramp of another radar: rate of its beat frequency"
+        # Single precision: 1e-7 rad against 0.2 rad from step to step.
+        yield judged(
+            claim, "rate of the beat", "MHz/us", rate / 1e12, 1e-4, reference=apart / 1e12,
+            key="interferer", says=says,
+        )  # fmt: skip
+        # Rx rise along +y: the wave from the left comes to the second first, and the IF turns back.
+        turned = -np.angle((inside[1] * inside[0].conj()).mean())
+        sine = turned / (2 * np.pi * 0.5 * 12.05 / 12.0)
+        says = "crossing ramp of another radar: direction"
+        yield judged(
+            claim, "azimuth", "deg", math.degrees(math.asin(sine)), 0.001, reference=azimuth_deg,
+            key="interferer", says=says,
+        )  # fmt: skip
+
+
+def cost_rows(quick: bool) -> Iterator[Row]:
+    """Effects so weak that detections stay, but all of them modelled."""
+    ideal = dataclasses.replace(rt.Radar.preset("paper-12ghz"), transmit_power_dbm=POWER_DBM)
+    receiver = rt.Receiver(
+        phase_noise_hz=(1e5, 1e6),
+        phase_noise_dbc_hz=(-90.0, -110.0),
+        iq_gain_db=0.001,
+        iq_phase_deg=0.01,
+        adc_bits=16,
+        adc_full_scale_dbm=-60.0,
+        leakage_db=-200.0,
+        dc_dbm=-200.0,
+        channel_gain_db=0.01,
+        channel_phase_deg=0.1,
+        highpass_hz=(1e3, 2e3),
+        interferer=rt.Interferer(
+            start_frequency_hz=11e9,
+            slope_hz_per_s=9e13,
+            ramp_s=50e-6,
+            period_s=61e-6,
+            power_dbm=-200.0,
+        ),
+    )
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=1.0 if quick else 3.0)
+    for fidelity in ("analytic",) if quick else ("analytic", "specular"):
+        settings = RunSettings(fidelity=fidelity, keep_all=True)
+        spent: dict[bool, float] = {}
+        counts = []
+        for _ in range(3):
+            for all_on in (False, True):
+                its = dataclasses.replace(ideal, receiver=receiver if all_on else None)
+                begin = time.process_time()
+                capture = prepare(motion, its, rt.Scene(), settings)
+                maker = CloudMaker(capture.processing)
+                capture.stream(maker, progress=False)
+                counts.append(len(maker.finish().spatial.points))
+                took = time.process_time() - begin
+                spent[all_on] = min(took, spent.get(all_on, took))
+        yield judged(
+            f"walk of {motion.duration_s:g} s, {fidelity}", "CPU time, all effects over none", "1",
+            spent[True] / spent[False], 1.3, key="receiver-cost",
+            says="CPU time from motion to cloud with everything a receiver adds, over that without",
+        )  # fmt: skip
+        yield reported(
+            f"walk of {motion.duration_s:g} s, {fidelity}", "points in the cloud", "1", counts[1],
+            reference=counts[0], key="receiver-cost",
+        )  # fmt: skip
+
+
+def measure(quick: bool) -> list[Row]:
+    warnings.simplefilter("ignore", rt.ValidityWarning)
+    return [
+        *phase_noise_rows(quick),
+        *iq_rows(),
+        *quantisation_rows(quick),
+        *clipping_rows(),
+        *highpass_rows(),
+        *leakage_rows(),
+        *channel_rows(quick),
+        *interferer_rows(),
+        *cost_rows(quick),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main("What a receiver adds against closed forms", measure))
