@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -37,6 +37,7 @@ _MAT_HEADER = (
 )
 """First text of a MATLAB file. Its date is fixed, so that equal samples give equal files."""
 _MAT_HEADER_BYTES = 512
+_HDF5 = b"\x89HDF\r\n\x1a\n"  # where HDF5 begins
 _COMPLEX = np.dtype([("real", "<f4"), ("imag", "<f4")])
 _OLD_LAYOUT = ("earliest", "v108")  # MATLAB reads no newer layout than that of HDF5 1.8
 _PARTS = {"if_real": "real (I)", "if_imag": "imaginary (Q)"}  # netCDF has no complex numbers
@@ -72,17 +73,38 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
 
 
 def open_mat(path: Path) -> SampleFile:
-    """Open what `write_mat` wrote, or a variable ``if_samples`` of that kind without a radar."""
+    """Open what `write_mat` wrote, or MATLAB's variable ``if_samples``, complex or real.
+
+    Files of MATLAB 7 and older, which are no HDF5, are read all at once.
+    """
+    with open_regular(path) as raw:
+        start = raw.read(_MAT_HEADER_BYTES + len(_HDF5))
+        if _HDF5 not in (start[: len(_HDF5)], start[_MAT_HEADER_BYTES:]):
+            raw.seek(0)
+            return _open_old_mat(path, raw)
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
-        shape = stored(file, "if_samples").shape[::-1]
+        data = stored(file, "if_samples", compressed=True)
+        shape, kind = data.shape[::-1], data.dtype
         text = "".join(map(chr, stored(file, "radar/all")[:].ravel())) if "radar" in file else ""
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
         with open_regular(path) as raw, h5py.File(raw, "r") as file:
-            parts = stored(file, "if_samples")[..., first:last]
-            return np.asarray(parts["real"] + 1j * parts["imag"]).T
+            parts = stored(file, "if_samples", compressed=True)[..., first:last].T
+            return parts if parts.dtype.names is None else parts["real"] + 1j * parts["imag"]
 
-    return _rows(path, shape, read, text)
+    return _rows(path, shape, read, text, kind)
+
+
+def _open_old_mat(path: Path, file: BinaryIO) -> SampleFile:
+    from scipy.io import loadmat  # slow to import
+
+    try:
+        values = loadmat(file, variable_names=["if_samples"])["if_samples"]
+    except KeyError:
+        raise KeyError("there is no variable if_samples") from None
+    except Exception as error:  # it fails in many ways on damaged files
+        raise ValueError(in_short(error)) from None
+    return _rows(path, values.shape, lambda first, last: values[first:last], "", values.dtype)
 
 
 def _rows(
@@ -170,11 +192,12 @@ def _describe(file: Any, data: Any, axes: tuple[str, ...], unit: str, meaning: s
 def open_netcdf(path: Path) -> SampleFile:
     """Open what `write_netcdf` wrote."""
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
-        shape, text = stored(file, "if_real").shape, str(file.attrs.get("radar", ""))
+        shape = stored(file, "if_real", compressed=True).shape
+        text = str(file.attrs.get("radar", ""))
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
         with open_regular(path) as raw, h5py.File(raw, "r") as file:
-            real, imaginary = (stored(file, name)[first:last] for name in _PARTS)
+            real, imaginary = (stored(file, name, compressed=True)[first:last] for name in _PARTS)
         samples = np.empty(real.shape, dtype=np.complex64)
         samples.real, samples.imag = real, imaginary
         return samples

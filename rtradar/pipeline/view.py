@@ -101,7 +101,13 @@ def load_run_view(folder: Path) -> RunView:
 
     InputError if one of them is missing or damaged, or they are not of one run.
     """
-    return run_view_of(folder, *run_summary(folder))
+    summary, radar, windows = run_summary(folder)
+    if "unit" in summary["parameters"]:  # which a simulation does not name
+        raise InputError(
+            f"'{folder}' holds what was found in IF samples, which have no body to show; look at "
+            "its report.html"
+        )
+    return run_view_of(folder, summary, radar, windows)
 
 
 def run_view_of(

@@ -208,6 +208,9 @@ def test_process_gives_the_maps_of_the_run_to_the_step_of_int16(
     noise = 8 * scale**2 / 6 * 1.5**2 / (64 * radar.cycles_per_frame)
     assert np.abs(found - wanted).max() < 6 * np.sqrt(noise)
     assert np.abs(found - wanted).max() > 0
+    capsys.readouterr()
+    assert main(["view", out, "--no-browser"]) == 2
+    assert "which have no body to show; look at its report.html" in capsys.readouterr().err
     assert set(json.loads((tmp_path / "out" / "summary.json").read_text())["files"]) >= {
         *("maps.h5", "cloud_rdt.npz", "cloud_xyz.npz", "report.html", "spectrogram.png")
     }
