@@ -184,8 +184,6 @@ def points_of_sines(
     forward = 1 - np.nansum(sines**2, axis=1)
     kept = forward >= 0
     direction = np.column_stack([np.sqrt(forward[kept]), sines[kept]])
-    if radar.is_turned:
-        direction = np.nan_to_num(direction, nan=0.0) @ radar.axes.T
     velocity = radar.velocity_mps(mask.shape[1])
     return SpatialCloud(
         _in_world(radar.range_m[row[kept], None] * direction, radar, time_s),

@@ -163,7 +163,7 @@ def _figures(folder: _Folder, reference: _Folder) -> dict[str, Any]:
 def _draw(folders: Mapping[str, _Folder], place: Path) -> dict[str, Path]:
     """Draw the pictures, each map in decibels below its own maximum."""
     drawn = {name: place / file for name, file in _PICTURES.items()}
-    levels, spectrograms, shown, heard = {}, {}, [], []
+    levels, spectrograms, shown, strong = {}, {}, [], []
     label, names = "", " and ".join(folders)
     with next(iter(folders.values())).maps() as maps:
         velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
@@ -178,13 +178,13 @@ def _draw(folders: Mapping[str, _Folder], place: Path) -> dict[str, Path]:
             shown.append(above_floor(power))
             power, times = thinned(maps["spectrogram"][:columns], times[:columns])
             spectrograms[name] = _relative(folder, power).level(power.T)
-            heard.append(above_floor(power.T))
+            strong.append(above_floor(power.T))
     axes = (VELOCITY_LABEL, velocity), ("Range [m]", radius)
     title = f"{names}, frame of most detections of each"
     comparison.draw_maps(drawn["Range-Doppler"], levels, label, *axes, title, np.any(shown, axis=0))
     axes = ("Time [s]", times), (VELOCITY_LABEL, slow)
     comparison.draw_maps(
-        drawn["Spectrogram"], spectrograms, label, *axes, names, np.any(heard, axis=0)
+        drawn["Spectrogram"], spectrograms, label, *axes, names, np.any(strong, axis=0)
     )
     clouds = {name: folder.points for name, folder in folders.items()}
     comparison.draw_rdt_clouds(drawn["Range-Doppler-time clouds"], clouds, names)
