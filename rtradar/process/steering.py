@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.angles import Steering
+from rtradar.process.window_functions import taylor
 from rtradar.radar import Radar
 
 Taper = Literal["uniform", "taylor"]
@@ -118,10 +119,8 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
     """Weights of the elements (element,), sum 1, by their positions on the virtual line."""
     if taper == "uniform":
         return np.full(len(line.channels), 1 / len(line.channels))
-    from scipy.signal.windows import taylor  # here, because scipy.signal is slow to import
-
     places, count = line.tx_m + line.rx_m, len(line.channels)
-    window = taylor(count, nbar=_TAYLOR_EQUAL_LOBES, sll=SIDE_LOBE_DB)
+    window = taylor(count, _TAYLOR_EQUAL_LOBES, SIDE_LOBE_DB)
     # A line without gaps gets the window itself.
     weights = np.interp(places, np.linspace(places.min(), places.max(), count), window)
     return np.asarray(weights / weights.sum())

@@ -82,6 +82,24 @@ def hann(n: int) -> NDArray[np.float64]:
     return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
 
 
+def taylor(n: int, equal_lobes: int, side_lobe_db: float) -> NDArray[np.float64]:
+    """Symmetric Taylor window (element,) with so many nearly equal side lobes, without SciPy.
+
+    It is the mean 1 plus cosines, so not of height 1; `scipy.signal` is slow to import.
+    """
+    a = np.arccosh(10 ** (side_lobe_db / 20)) / np.pi
+    dilated = equal_lobes**2 / (a**2 + (equal_lobes - 0.5) ** 2)
+    orders = np.arange(1, equal_lobes)
+    zeros = dilated * (a**2 + (orders - 0.5) ** 2)
+    window = np.ones(n)
+    for order in orders:
+        others = orders[orders != order]
+        height = np.prod(1 - order**2 / zeros) / np.prod(1 - order**2 / others**2)
+        phase = 2 * np.pi * order * (np.arange(n) - (n - 1) / 2) / n
+        window -= (-1.0) ** order * height * np.cos(phase)
+    return window
+
+
 def noise_bandwidth_bins(window: WindowName, n: int) -> float:
     """Compute n sum(w^2) / sum(w)^2, which is 1.5 for ``hann``.
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.signal import get_window
+from scipy.signal import windows as scipy_windows
 
 from rtradar.errors import InputError
 from rtradar.process import (
@@ -26,7 +27,13 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.process.steering import range_walk
-from rtradar.process.window_functions import NAMES, WindowName, noise_bandwidth_bins, weights
+from rtradar.process.window_functions import (
+    NAMES,
+    WindowName,
+    noise_bandwidth_bins,
+    taylor,
+    weights,
+)
 from rtradar.radar import Radar
 
 CYCLES = 40
@@ -258,3 +265,11 @@ def test_a_list_from_a_file_is_a_window() -> None:
     given: object = ["kaiser", 8]
     found = WindowFunctions(range=given)  # type: ignore[arg-type]
     assert found == WindowFunctions(range=("kaiser", 8.0))
+
+
+@pytest.mark.parametrize(
+    ("n", "lobes", "side_lobe_db"), [(2, 4, 30.0), (9, 5, 35.0), (32, 2, 20.0)]
+)
+def test_the_taylor_window_is_that_of_scipy(n: int, lobes: int, side_lobe_db: float) -> None:
+    theirs = scipy_windows.taylor(n, nbar=lobes, sll=side_lobe_db, norm=False)
+    np.testing.assert_allclose(taylor(n, lobes, side_lobe_db), theirs, atol=1e-14)
