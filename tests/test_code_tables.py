@@ -119,6 +119,11 @@ def test_every_name_that_is_drawn_is_on_its_page(tmp_path: Path) -> None:
     assert set(first_column(TABLES["drawn"]())) == keys
 
 
+def without_code(text: str) -> str:
+    """Text of a page without its blocks of code, in which a percent sign is one."""
+    return re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+
+
 def test_no_line_of_a_page_is_taken_for_a_comment() -> None:
     """A line that begins with a percent sign is a comment of MyST, so its sentence is lost."""
     lost = [
