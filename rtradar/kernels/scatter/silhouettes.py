@@ -138,7 +138,10 @@ def _near_parts(start, way, side, up, size, before, length, wavelength, reach, b
         if inside <= 0:
             continue
         inside = min(inside, 1.0)
-        past = before + min(max(nearest, 0.0), size)
+        # The outline's place that is nearest to the leg, if the leg is outside.
+        aside = math.sqrt(max(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - xy * nearest, 1.0))
+        along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+        past = before + min(max(along + (nearest - along) / aside, 0.0), size)
         square = max(wavelength * past * max(length - past, 0.0) / length, _LEAST_M2)
         zone = math.sqrt(square)
         form = near[count]
@@ -313,7 +316,9 @@ def occluded_fractions_reference(legs, wavelength, body, scales, fade, step=0.01
             covered |= _inside(triangle, start, way, side, before, length, wavelength, across).T
         for centre, to_sphere in zip(*body[:2], strict=True):
             x, y = to_sphere @ (centre - start), to_sphere @ way
-            past = before + x @ y / (y @ y)
+            along, nearest = (centre - start) @ way, x @ y / (y @ y)
+            aside = max(np.linalg.norm(x - nearest * y), 1)
+            past = before + along + (nearest - along) / aside
             zone = np.sqrt(wavelength * past * (length - past) / length)
             offset = x - zone * plane @ to_sphere.T
             covered |= (offset**2).sum(axis=-1) - (offset @ y) ** 2 / (y @ y) <= 1

@@ -45,7 +45,7 @@ class Precision(NamedTuple):
 
 
 FINE = Precision(3, 99, 2, 40, FADE, REACH, 0.0, 1e-4)
-"""The error is below -25 dB of the change of the samples."""
+"""Each approximation for itself is below -25 dB of the change of the samples in a walk."""
 MEDIUM = Precision(3, 99, 1, 24, FADE, REACH, 0.0, 0.01)
 """-8 to -11 dB of the change."""
 COARSE = Precision(1, 2, 1, 12, 0.3, 2.0, 0.03, 2e-3)
@@ -78,7 +78,7 @@ class SharedPoints(NamedTuple):
             part = np.clip(along / squares, 0.0, 1.0)
             gap = away @ away - 2 * part * along + part**2 * squares
             zone = np.sqrt(radar.wavelength_m * part * (1 - part) * np.sqrt(squares))
-            found |= gap < (radius + extent + zone) ** 2
+            found |= gap < (radius + extent + REACH * zone) ** 2
         return found
 
 
