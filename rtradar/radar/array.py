@@ -187,7 +187,7 @@ class Array(Waveform):
         return np.asarray((self.tx_m[:, None] + self.rx_m[self.rx_of_tx]).reshape(-1, 3))
 
     @cached_property
-    def _patterns(self) -> tuple[LinePattern, LinePattern]:
+    def patterns(self) -> tuple[LinePattern, LinePattern]:
         """Far field of all virtual elements over the sines of azimuth and of elevation."""
         y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
         return y, z
@@ -199,12 +199,12 @@ class Array(Waveform):
         Of a cross it is asin(lambda / 2d) (:eq:`angle-axis`), of a listed array half the sine of
         the first grating lobe, `LinePattern.grating_sine`.
         """
-        return self._cross_angle_deg if self.is_cross else self._patterns[0].max_angle_deg
+        return self._cross_angle_deg if self.is_cross else self.patterns[0].max_angle_deg
 
     @property
     def max_elevation_deg(self) -> float:
         """Elevation up to which no other direction looks alike [deg]; see `max_azimuth_deg`."""
-        return self._cross_angle_deg if self.is_cross else self._patterns[1].max_angle_deg
+        return self._cross_angle_deg if self.is_cross else self.patterns[1].max_angle_deg
 
     @property
     def max_angle_deg(self) -> float:
@@ -224,7 +224,7 @@ class Array(Waveform):
         """Whether the radar measures azimuth, and whether it measures elevation."""
         if self.is_cross:
             return self.tx_y * self.rx_y > 1, self.tx_z * self.rx_z > 1
-        y, z = self._patterns
+        y, z = self.patterns
         return y.wide, z.wide
 
     @property
@@ -254,7 +254,7 @@ class Array(Waveform):
 
     def _resolution_deg(self, axis: int) -> float:
         if not self.is_cross:
-            return self._patterns[axis].width_deg
+            return self.patterns[axis].width_deg
         return self.angle_resolution_deg if self.measures[axis] else 180.0
 
     @property

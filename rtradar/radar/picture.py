@@ -36,8 +36,7 @@ def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
 
 def _draw_array(radar: Radar, axes: Axes, title: str) -> None:
     theme = theme_of(axes)
-    centre = np.asarray(radar.position_m)
-    tx, rx = (1e3 * (places - centre)[:, 1:] for places in (radar.tx, radar.rx))
+    tx, rx = (1e3 * places[:, 1:] for places in (radar.tx_m, radar.rx_m))
     kept = np.unique(radar.rx_of_tx)
     virtual = (tx[:, None] + rx[radar.rx_of_tx]).reshape(-1, 2)
     blue, orange = theme.cycle[:2]

@@ -113,6 +113,17 @@ class Schedule(Array):
         return max(1.0, self.frame_hop_s / self.cycle_duration_s)
 
     @property
+    def gaps_text(self) -> str:
+        """What is known of time where there are gaps between frames; empty where there are none."""
+        if self.frame_period_s is None:
+            return ""
+        active_s = self.cycles_per_frame * self.cycle_duration_s
+        return (
+            f"frames of {1e3 * active_s:.3g} ms every {1e3 * self.frame_period_s:.3g} ms; "
+            "nothing is measured in between"
+        )
+
+    @property
     def max_velocity_mps(self) -> float:
         """Unambiguous velocity, lambda / (4 cycle) [m/s] (:eq:`doppler-axis`)."""
         return self.wavelength_m / (4 * self.cycle_duration_s)

@@ -87,7 +87,7 @@ def plot_scene(scene: Scene, radar: Radar | Axes | None, ax: Axes | None) -> Axe
     axes = figure_for(height_of_plan(limits)).add_subplot() if ax is None else ax
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
-    draw_radar(axes, (x, y))
+    draw_radar(axes, (x, y), radar)
     # Who are there, whoever may come.
     people = {
         f"{number}: {one.motion.name}": one.position_m
@@ -174,12 +174,14 @@ def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
     axes.set_aspect("equal")
 
 
-def draw_radar(axes: Axes, position_m: Sequence[float]) -> None:
-    """Draw the radar and an arrow along its boresight, +x."""
+def draw_radar(axes: Axes, position_m: Sequence[float], radar: Radar | None) -> None:
+    """Draw the radar and an arrow along its boresight, +x without one."""
     x, y = position_m
+    ahead, left = (1.0, 0.0) if radar is None else radar.axes[:2, 0].tolist()
+    end = x + ahead * _ARROW_M, y + left * _ARROW_M
     colour = theme_of(axes).radar
     arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.5}
-    axes.annotate("", (x + _ARROW_M, y), (x, y), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
+    axes.annotate("", end, (x, y), arrowprops={**arrow, "shrinkA": 0, "shrinkB": 0})
     axes.plot([x], [y], ">", color=colour, markersize=8)
 
 

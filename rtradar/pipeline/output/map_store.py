@@ -117,7 +117,8 @@ class MapStore:
                 options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
             data = self._file.create_dataset(name, (0, *shape), kind.dtype, **options)
             removal = (clutter_removal or {}).get(kind.axes[0], "none")
-            self._describe(data, kind, clutter_removal=removal)
+            said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
+            self._describe(data, kind, clutter_removal=removal, **said)
 
     def _scale(self, name: str, **options: Any) -> None:
         axis = self._file.create_dataset(name, **options)

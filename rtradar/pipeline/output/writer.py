@@ -100,7 +100,8 @@ class RunWriter:
         if len(frame_starts) and removed["time"] != "none":
             self._received = ReceivedFrame(radar, int(frame_starts[len(frame_starts) // 2]))
         left_out = () if source_of is not None else ("source",)
-        self._store = MapStore(file, axes, {"title": title}, removed, left_out, processing.unit)
+        said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
+        self._store = MapStore(file, axes, said, removed, left_out, processing.unit)
 
     def __enter__(self) -> RunWriter:
         return self

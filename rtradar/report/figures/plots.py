@@ -417,6 +417,7 @@ class Plots:
         lines = [what, str(self.maps.attrs.get("title", ""))]
         how = str(data.attrs.get("clutter_removal", "none"))
         lines += [] if how == "none" else [f"static clutter removed: {how}"]
+        lines.append(str(data.attrs.get("gaps", "")))
         return "\n".join(line for line in lines if line)
 
     @cached_property

@@ -85,7 +85,7 @@ def draw_room_plan(
         places = [((1 - at) * first + at * last).tolist() for at in (0.5, 0.35, 0.65, 0.2, 0.8)]
         words = ", ".join(map(str, numbers))
         labels.append(Label(words, [((x, y), (0.0, 0.0)) for x, y in places], colour))
-    draw_radar(axes, place)
+    draw_radar(axes, place, radar)
     labels.append(Label("radar", around((place[0], place[1]), 12.0), theme.radar))
     for name, track in tracks.items():
         axes.plot(*track.T, color=theme.person, linewidth=2.5)

@@ -1,0 +1,118 @@
+"""Radars with antennas in lists, pauses between chirps, turned and moving."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.errors import InputError
+from rtradar.scatter.echo_models import build_model
+
+LAMBDA = 299_792_458.0 / 77e9
+RADAR = rt.Radar(
+    name="board",
+    start_frequency_hz=77e9,
+    bandwidth_hz=3.6e9,
+    chirp_duration_s=60e-6,
+    idle_s=6e-6,
+    adc_start_s=3e-6,
+    adc_rate_hz=5e6,
+    samples_per_chirp=256,
+    tx_positions_m=[[0, 0, 0], [0, -LAMBDA, LAMBDA / 2], [0, -2 * LAMBDA, 0]],
+    rx_positions_m=[[0, -LAMBDA / 2 * number, 0] for number in range(4)],
+    tx_order=[0, 2, 1],
+    chirps_per_frame=48,
+    frame_period_s=1 / 30,
+    position_m=(-3, 0.5, 1.2),
+)
+POSE = {"yaw_deg": 20.0, "pitch_deg": -6.0, "roll_deg": 4.0}
+PATH = {
+    "path_times_s": [0.0, 1.0],
+    "path_m": [[0, 0, 0], [0.5, -0.2, 0.1]],
+    "path_angles_deg": [[0, 0, 0], [20, 5, -3]],
+}
+
+
+def test_times_of_chirps_in_frames() -> None:
+    chirps = np.array([0, 1, 47, 48, 100])
+    slots = np.array([0, 1, 47, 0, 4]) * 66e-6 + np.array([0, 0, 0, 1, 2]) / 30
+    np.testing.assert_allclose(RADAR.centres_of(chirps), slots + 3e-6 + 25.6e-6, rtol=1e-12)
+    np.testing.assert_allclose(RADAR.slots_of(chirps) * 66e-6, slots, atol=1e-12)
+    assert RADAR.window_starts(150).tolist() == [0, 16, 32]
+    assert RADAR.chirps_in(1 / 30 + 48 * 66e-6) == 96
+    assert RADAR.chirps_in(1 / 30 + 47 * 66e-6) == 48
+    assert RADAR.frame_hop_s == RADAR.frame_period_s
+    assert dataclasses.replace(RADAR, frame_period_s=None).gaps_text == ""
+
+
+def test_range_follows_from_the_sampled_part_of_the_sweep() -> None:
+    assert pytest.approx(60e12 * 51.2e-6) == RADAR.sampled_bandwidth_hz
+    assert pytest.approx(299_792_458 / (2 * 60e12 * 51.2e-6)) == RADAR.range_bin_m
+
+
+def test_what_follows_of_a_frame_follows_anew_when_it_is_replaced() -> None:
+    paper = rt.Radar.preset("paper-12ghz")
+    assert dataclasses.replace(paper, frame_duration_s=0.05).chirps_per_frame == 66 * 12
+    assert rt.Radar(**dataclasses.asdict(paper)) == paper
+
+
+def test_tx_transmit_in_their_order() -> None:
+    assert RADAR.tx_positions_m is not None
+    np.testing.assert_array_equal(RADAR.tx_m[1], RADAR.tx_positions_m[2])
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"tx_order": [0, 1]}, "tx_order"),
+        ({"chirps_per_frame": 47}, "multiple of 3"),
+        ({"adc_start_s": 30e-6}, "adc_start_s"),
+        ({"frame_period_s": 1e-3}, "lengthen the period"),
+        ({"tx_positions_m": [[1, 2]]}, "tx_positions_m"),
+        ({"path_m": [[0, 0, 0]]}, "path_times_s"),
+        (PATH | {"path_times_s": [1.0, 0.0]}, "ascending"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused(values: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        dataclasses.replace(RADAR, **values)
+
+
+def test_a_moving_radar_sees_at_each_chirp_what_one_at_its_pose_sees() -> None:
+    body = Body.from_motion(rt.synthetic_motion("walk", duration_s=1.0))
+    moving = dataclasses.replace(RADAR, **POSE, **PATH)
+    chirps = np.array([3, 100, 1000])
+    echoes = build_model("specular", moving, body).echoes(chirps)
+    for place, chirp in enumerate(chirps):
+        part = RADAR.centres_of(chirps[place : place + 1])[0]
+        at = np.array([0.5, -0.2, 0.1]) * part + RADAR.position_m
+        angles = [own + part * by for own, by in zip(POSE.values(), (20, 5, -3), strict=True)]
+        pose = dict(zip(POSE, angles, strict=True))
+        still = dataclasses.replace(RADAR, position_m=tuple(at), **pose)
+        own = build_model("specular", still, body).echoes(np.array([chirp]))
+        np.testing.assert_allclose(echoes.length[place], own.length[0], atol=1e-9)
+        # In the world the antennas are where the turned radar says.
+        centres = body.at([part]).centres[0]
+        tx = still.tx[still.tx_of_chirp(np.array([chirp]))[0]]
+        most = np.linalg.norm(centres - tx, axis=1)
+        most = most + np.linalg.norm(centres - still.rx[0], axis=1)
+        away = most - own.length[0, 0]
+        assert ((away > 0) & (away < 2 * body.semi_axes.max(axis=1) + 1e-6)).all()
+
+
+def test_points_of_a_turned_moving_radar_in_frames_stay_where_the_person_is() -> None:
+    motion = rt.synthetic_motion("walk", duration_s=0.6)
+    options = {"fidelity": "analytic", "duration_s": 0.14, "seed": 1, "snr_db": 30}
+    found = []
+    for own in ({}, POSE | PATH):
+        result = rt.run(motion, dataclasses.replace(RADAR, **own), **options)
+        cloud = result.spatial
+        found.append(np.average(cloud.points, axis=0, weights=cloud.power))
+        assert "nothing is measured in between" in result.maps["spectrogram"].attrs["gaps"]
+        assert len(result.maps["time"]) == 5
+    # Elevation is a third of a beam of 64 degrees off at most; range and azimuth are better.
+    np.testing.assert_allclose(found[1], found[0], atol=0.25)
