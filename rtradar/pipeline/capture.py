@@ -21,9 +21,10 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.signal import Noise, ReceiverStage, receive, synthesize
+from rtradar.signal import Noise, receive, synthesize
 from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
+from rtradar.signal.receiver import ReceiverStage
 from rtradar.system.files import uninterruptible
 
 

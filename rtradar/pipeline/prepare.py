@@ -32,8 +32,9 @@ from rtradar.scatter.validity import warn_of
 from rtradar.scatter.world import World, build_world, model_of_people
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
-from rtradar.signal import Expected, Noise, ReceiverStage
+from rtradar.signal import Noise
 from rtradar.signal.phase_noise import mean_delays
+from rtradar.signal.receiver import Expected, ReceiverStage
 from rtradar.system.checks import brief
 
 Moving = Motion | Person | Sequence[Motion | Person | Object]

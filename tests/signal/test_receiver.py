@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.signal import Expected, ReceiverStage, receive
+from rtradar.signal import receive
+from rtradar.signal.receiver import Expected, ReceiverStage
 
 RAMPS = rt.Interferer(
     start_frequency_hz=12e9, slope_hz_per_s=6.399e13, ramp_s=6.2e-5, period_s=6.25e-5, power_dbm=-60

@@ -31,7 +31,7 @@ import rtradar as rt
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker
 from rtradar.settings import RunSettings
-from rtradar.signal import Expected, ReceiverStage
+from rtradar.signal.receiver import Expected, ReceiverStage
 from rtradar.validate.rows import Row, judged, main, reported
 
 LIGHT = 299_792_458.0
