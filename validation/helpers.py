@@ -53,6 +53,7 @@ class MovingEllipsoid:
     part_names: tuple[str, ...] = ("ellipsoid",)
     names: tuple[str, ...] = ("somebody",)
     material: str = "perfect-conductor"
+    people: tuple[()] = ()  # none of them has a mesh
 
     @property
     def owner(self) -> NDArray[np.int64]:

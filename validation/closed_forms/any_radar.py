@@ -3,7 +3,8 @@
 The IF samples are made here by closed forms from the fields of the radar alone: places of antennas
 in the world, times of chirps, delays, and the phase of the mixed sweep. rtradar reads range and
 velocity from its map, and azimuth and elevation in the cell of the echo. `rows_of_radar` does so
-for one radar; its points are inside the limits that it states. The array without regular spacing
+for one radar; its points are inside the limits that it states. Boards that come along are among
+them. The array without regular spacing
 and the sparse one also have their grating lobes judged, by the angle at which the array factor
 returns to its height.
 
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from rtradar.process import angle, range_doppler
 from rtradar.radar import Radar
+from rtradar.system.registries import BOARDS
 from rtradar.validate.rows import Row, judged, main
 
 Array = NDArray[np.float64]
@@ -226,7 +228,9 @@ def radars() -> dict[str, Radar]:
 
 def measure(quick: bool) -> list[Row]:
     found = radars()
-    rows = [row for radar in found.values() for row in rows_of_radar(radar, quick=quick)]
+    names = ("iwr6843aop", "awr2944") if quick else (*BOARDS, "radhar", "mars")
+    every = (*found.values(), *map(Radar.preset, names))
+    rows = [row for radar in every for row in rows_of_radar(radar, quick=quick)]
     for axis, first in ((1, 1 / 1.5), (2, 1.0)):
         rows += grating_rows(found["sparse"], axis, first)
     return rows
