@@ -387,11 +387,15 @@ def cost_rows(quick: bool) -> Iterator[Row]:
                 counts.append(len(maker.finish().spatial.points))
                 took = time.process_time() - begin
                 spent[all_on] = min(took, spent.get(all_on, took))
-        yield judged(
-            f"walk of {motion.duration_s:g} s, {fidelity}", "CPU time, all effects over none", "1",
-            spent[True] / spent[False], 1.3, key="receiver-cost",
-            says="CPU time from motion to cloud with everything a receiver adds, over that without",
-        )  # fmt: skip
+        ratio = spent[True] / spent[False]
+        row = f"walk of {motion.duration_s:g} s, {fidelity}", "CPU time, all effects over none", "1"
+        says = "CPU time from motion to cloud with everything a receiver adds, over that without"
+        # The limit is that of 3 s: in one second what a run costs once weighs more.
+        yield (
+            reported(*row, ratio, key="receiver-cost", says=says)
+            if quick
+            else judged(*row, ratio, 1.3, key="receiver-cost", says=says)
+        )
         yield reported(
             f"walk of {motion.duration_s:g} s, {fidelity}", "points in the cloud", "1", counts[1],
             reference=counts[0], key="receiver-cost",
