@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -37,6 +38,8 @@ def refuse_large_maps(people: Sequence[Person], radar: Radar, settings: RunSetti
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     asked = settings.duration_s
     interval_s = max(min(left) if asked is None else min(max(left), asked), 0.0)
+    if math.isnan(interval_s):
+        return  # a start or duration that is none is refused where people are placed
     n_bytes = bytes_of_maps(radar, radar.chirps_in(interval_s), sources=True)
     refuse_large(f"maps of {interval_s:g} s of radar '{radar.name}'", n_bytes, IN_A_FOLDER)
 

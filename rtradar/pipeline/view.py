@@ -185,8 +185,11 @@ def run_summary(folder: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
 
 def run_points(folder: Path) -> NDArray[np.float64]:
     """Read the RDT cloud (point, 3) of a folder; InputError if it is missing or damaged."""
-    points: NDArray[np.float64] = _archive(folder / "cloud_rdt.npz", ("points",))["points"]
-    return points.reshape(-1, 3)
+    path = folder / "cloud_rdt.npz"
+    points: NDArray[np.float64] = _archive(path, ("points",))["points"]
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"'{path}' is damaged; {_MEND}")
+    return points
 
 
 @contextmanager
