@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from rtradar.errors import InputError
-from rtradar.radar import PRESETS, Radar
+from rtradar.radar import Radar
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import affordable_models
 
@@ -44,7 +44,7 @@ class Plan:
         the capture holds no frame.
     """
 
-    radars: tuple[str, ...] = tuple(PRESETS.built_in)
+    radars: tuple[str, ...] = ("paper-12ghz", "paper-77ghz")
     fidelities: tuple[str, ...] = tuple(affordable_models(12.0))
     repeats: int = 3
     duration_s: float = 3.0
