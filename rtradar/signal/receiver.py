@@ -203,7 +203,10 @@ class ReceiverStage:
             self._steering[:] = 0
 
     def _set_baseband(self, most: float, profiles: NDArray[np.complex128]) -> None:
-        """Settle what acts on all that one ADC samples, for still samples up to ``most``."""
+        """Settle what acts on all that one ADC samples, for still samples up to ``most``.
+
+        The image of an echo is that of :eq:`image-rejection`.
+        """
         receiver, e = self._receiver, self._expected
         keep = self._keep
         if receiver.iq_gain_db or receiver.iq_phase_deg:

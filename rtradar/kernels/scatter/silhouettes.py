@@ -315,17 +315,23 @@ def occluded_fractions_reference(legs, wavelength, body, scales, fade, step=0.01
         for triangle in body[3]:
             covered |= _inside(triangle, start, way, side, before, length, wavelength, across).T
         for centre, to_sphere in zip(*body[:2], strict=True):
-            x, y = to_sphere @ (centre - start), to_sphere @ way
-            along, nearest = (centre - start) @ way, x @ y / (y @ y)
-            aside = max(np.linalg.norm(x - nearest * y), 1)
-            past = before + along + (nearest - along) / aside
-            zone = np.sqrt(wavelength * past * (length - past) / length)
-            offset = x - zone * plane @ to_sphere.T
-            covered |= (offset**2).sum(axis=-1) - (offset @ y) ** 2 / (y @ y) <= 1
+            away = centre - start
+            covered |= _inside_ellipsoid(away, to_sphere, way, plane, before, length, wavelength)
         square = np.add.outer(across**2, across**2)[covered]
         wave = [np.exp((1j - fade) * np.pi * square * scale).sum() * scale for scale in scales]
         found.append((fade - 1j) * step**2 * np.array(wave))
     return np.array(found)
+
+
+def _inside_ellipsoid(away, to_sphere, way, plane, before, length, wavelength):
+    """Which offsets of a plane are inside the outline of an ellipsoid."""
+    x, y = to_sphere @ away, to_sphere @ way
+    along, nearest = away @ way, x @ y / (y @ y)
+    aside = max(np.linalg.norm(x - nearest * y), 1)
+    past = before + along + (nearest - along) / aside
+    zone = np.sqrt(wavelength * past * (length - past) / length)
+    offset = x - zone * plane @ to_sphere.T
+    return (offset**2).sum(axis=-1) - (offset @ y) ** 2 / (y @ y) <= 1
 
 
 def _inside(triangle, start, way, side, before, length, wavelength, across):
