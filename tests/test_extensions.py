@@ -122,7 +122,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
             "rough",
             "specular, fresnel, physical-optics, rays, reference, auto, points",
         ),
-        ("--radar", "rough", "paper-12ghz, paper-77ghz, lane-60ghz, or the path"),
+        ("--radar", "rough", "radhar, mars, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, ti-oob, threshold"),
         (None, "walk.rough", ".amc, .bvh, .c3d, .npz"),
     ],

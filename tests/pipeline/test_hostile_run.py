@@ -57,6 +57,16 @@ def moments(**changes: Any) -> Snapshots:
         "furniture_vertices": np.zeros((0, 3), dtype=np.float32),
         "furniture_faces": none.reshape(0, 3),
         "furniture_piece": none,
+        "part_person": np.array([0]),
+        "person_names": np.array(["person"]),
+        "person_position": np.ones((2, 1, 3)),
+        "person_speed": np.ones((2, 1)),
+        "object_names": np.array([], dtype=np.str_),
+        **dict.fromkeys(("mesh_source", "mesh_of_vertex", "mesh_part"), none),
+        "mesh_faces": none.reshape(0, 3),
+        "mesh_rows": np.zeros((2, 0, 3), dtype=np.float32),
+        **dict.fromkeys(("blend_vertex", "blend_row"), none),
+        "blend_weight": np.zeros(0, dtype=np.float32),
     }
     return Snapshots(**fields | changes)
 
