@@ -57,7 +57,8 @@ def indoors(
     allowed = 0.0
     if settings.path_tolerance_db is not None:
         allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
-    shadow = ClutterShadow(clutter, body, scene.objects, allowed)
+    # Ghosts may take nearly all of the tolerance: a tenth is left to the shadow.
+    shadow = ClutterShadow(clutter, body, scene.objects, allowed / 10)
     room = RoomIf(radar, clutter.cycle(), shadow)
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
