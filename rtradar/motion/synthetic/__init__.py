@@ -13,7 +13,7 @@ import numpy as np
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
-from rtradar.motion.synthetic.exercises import jumping_jack, kick, punch
+from rtradar.motion.synthetic.exercises import kick, punch
 from rtradar.motion.synthetic.figure import (
     Array,
     Pose,
@@ -25,6 +25,7 @@ from rtradar.motion.synthetic.figure import (
     rotations,
 )
 from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.jacks import jumping_jack
 from rtradar.motion.synthetic.stance import stand
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
@@ -43,6 +44,9 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
 }
 """Activities of the actors, by name."""
 
+STYLES: Mapping[str, tuple[str, ...]] = {}
+"""Ways to do an activity, by its name; without a style a subject has a way of its own."""
+
 
 class Traits(TypedDict, total=False):
     """Size and manner of an actor; `synthetic_motion` says what each trait means."""
@@ -52,6 +56,7 @@ class Traits(TypedDict, total=False):
     build: float
     tempo: float
     side: str
+    style: str
     amplitude: float
     rate_hz: float
     take: int
@@ -79,7 +84,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     Parameters
     ----------
     activity : {"walk", "kick", "punch", "jumping_jack", "stand"}
-        What the person does.
+        What the person does. Traits may follow as text: ``"walk,tempo=0.9,side=right"``.
     seed : int
         Number of the subject, which has its own phase, and a few percent of tempo, amplitude and
         unevenness of the sides.
@@ -93,6 +98,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         - ``tempo``: speed of the movement; 1 is a walk of about 1.2 m/s.
         - ``side``: side of the leg or hand that strikes, or of the foot that steps first, "left" or
           "right"; left.
+        - ``style``: one of the `STYLES` of the activity; by default the subject's own.
         - ``amplitude``: factor of step length, kick height, extension of the arm, width of the
           jumps and sway; 1.
         - ``rate_hz``: number of frames per second of the result [Hz]; 120.
@@ -109,7 +115,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     InputError
         Where an activity is unknown or a value out of range.
     """
-    chosen = _checked(activity, traits)
+    activity, chosen = _checked(activity, traits)
     subject, height_m = _subject(activity, seed, chosen), chosen["height_m"]
     duration_s, rate_hz = chosen["duration_s"], chosen["rate_hz"]
     # Poses are made twice: how far down all must come is not known before the last, and too many
@@ -125,7 +131,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         rotated.append(rotations(pose, height_m))
     bones = offsets(height_m)
     motion = Motion(
-        name=f"synthetic:{activity}",
+        name=f"synthetic:{activity}" + (f",style={subject.style}" if subject.style else ""),
         joints=NODES,
         parents=NODE_PARENTS,
         offsets=np.array([bones[node] for node in NODES]),
@@ -138,18 +144,32 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     return motion.turned(math.pi)
 
 
-def _checked(activity: str, traits: Traits) -> dict[str, Any]:
-    """All traits, those that are not given by their defaults."""
+def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:
+    """The activity, and all its traits, those that are not given by their defaults."""
+    activity, *texts = asked.split(",")
     if activity not in ACTIVITIES:
         raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
     defaults = {name: default for name, (default, _, _) in _RANGES.items()}
-    chosen: dict[str, Any] = {"side": "left", "take": 0, **defaults}
+    chosen: dict[str, Any] = {"side": "left", "style": "", "take": 0, **defaults}
     for name in traits:
         if name not in chosen:
             raise TypeError(f"synthetic_motion() got an unexpected keyword argument {name!r}")
+    for text in texts:
+        name, _, value = text.partition("=")
+        allowed = [known for known in chosen if known not in ("duration_s", "rate_hz")]
+        if name not in allowed or not value:
+            raise InputError(
+                f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(allowed)}"
+            )
+        chosen[name] = value if name in ("side", "style") else _number(asked, name, value)
     chosen |= traits
     if chosen["side"] not in ("left", "right"):
         raise InputError(f"side {chosen['side']!r}; allowed are left and right")
+    styles = STYLES.get(activity, ())
+    if chosen["style"] and chosen["style"] not in styles:
+        raise InputError(
+            f"style {chosen['style']!r} of {activity}; allowed are {', '.join(styles) or 'none'}"
+        )
     take = chosen["take"]
     if isinstance(take, bool) or not isinstance(take, (int, np.integer)) or take < 0:
         raise InputError(f"take {take!r}; it must be a whole number, zero or more")
@@ -160,7 +180,16 @@ def _checked(activity: str, traits: Traits) -> dict[str, Any]:
                 f"synthetic {activity}: {name} = {value}; allowed is "
                 f"{low:g}{'' if low else ', excluded,'} to {high:g}"
             )
-    return chosen
+    return activity, chosen
+
+
+def _number(asked: str, name: str, value: str) -> float:
+    try:
+        return int(value) if name == "take" else float(value)
+    except ValueError:
+        raise InputError(
+            f"{asked!r}: {name} = {value!r} is no number; allowed are numbers"
+        ) from None
 
 
 def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:
@@ -171,6 +200,7 @@ def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:
         side=chosen["side"][0],
         tempo=chosen["tempo"],
         amplitude=chosen["amplitude"],
+        style=chosen["style"],
     )
     if not chosen["take"]:
         return subject

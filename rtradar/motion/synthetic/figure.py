@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 import operator
+import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -53,6 +54,8 @@ class Subject:
 
     The leg or hand of the ``side``, "l" or "r", acts or steps first. ``phase`` is the fraction of a
     step, or of the first rest, at which the movement begins; ``uneven`` is the strength by side.
+    ``style`` is one of the activity's own, or empty. ``manner`` is the seed of all else in which
+    people differ; `drawn` gives it by name.
     """
 
     height_m: float
@@ -61,6 +64,13 @@ class Subject:
     amplitude: float
     phase: float
     uneven: Mapping[str, float]
+    style: str = ""
+    manner: int = 0
+
+    def drawn(self, trait: str, low: float, high: float) -> float:
+        """Draw a trait of this subject, uniform from ``low`` to ``high``, the same at any call."""
+        rng = np.random.default_rng([self.manner, zlib.crc32(trait.encode())])
+        return float(rng.uniform(low, high))
 
     @property
     def other(self) -> str:
@@ -84,7 +94,13 @@ class Subject:
 
 
 def draw_subject(
-    rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float
+    rng: np.random.Generator,
+    *,
+    height_m: float,
+    side: str,
+    tempo: float,
+    amplitude: float,
+    style: str = "",
 ) -> Subject:
     """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
     spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
@@ -95,6 +111,8 @@ def draw_subject(
         amplitude=amplitude * float(spread[1]),
         phase=float(rng.uniform()),
         uneven={"l": float(spread[2]), "r": float(spread[3])},
+        style=style,
+        manner=int(rng.integers(2**32)),
     )
 
 

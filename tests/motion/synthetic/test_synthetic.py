@@ -252,6 +252,12 @@ def test_another_take_of_a_subject_begins_elsewhere_in_the_same_movement() -> No
     assert speeds(first, "l_toe").max() == pytest.approx(speeds(other, "l_toe").max(), rel=0.01)
 
 
+def test_traits_may_follow_the_name_of_the_activity() -> None:
+    text = synthetic_motion("kick,side=right,tempo=0.9,take=2", 3, duration_s=0.5)
+    given = synthetic_motion("kick", 3, side="right", tempo=0.9, take=2, duration_s=0.5)
+    np.testing.assert_array_equal(text.rotations, given.rotations)
+
+
 def test_height_and_build() -> None:
     tall = synthetic_motion("punch", height_m=1.9, build=1.2)
     assert tall.girth == pytest.approx(1.2 * 1.9 / 1.75)
@@ -279,6 +285,9 @@ def test_frames_cover_the_duration() -> None:
         {"amplitude": 3.0},
         {"build": -1.0},
         {"rate_hz": 1.0},
+        {"style": "moonwalk"},
+        {"activity": "walk,speed=3"},
+        {"activity": "walk,tempo=fast"},
     ],
 )
 def test_impossible_actors_are_refused(arguments: dict) -> None:
