@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rtradar.pipeline.capture import Capture
 from rtradar.process import range_spectrum
 from rtradar.process.window_functions import WindowName, weights
+from rtradar.system.threads import thread_map
 
 _INSTANTS = 8
 """Times in a frame at which echoes are looked at."""
@@ -112,14 +113,18 @@ class Sources:
         target = owner[echo] * radar.samples_per_chirp + rows[row]
         order = np.argsort(target, kind="stable")
         echo, row, target = echo[order], row[order], target[order]
-        for first in range(0, len(echo), _AT_ONCE):
+
+        def spectra(first: int) -> tuple[NDArray[np.int64], Array]:
             own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
             away = (_FINE * (bins + self._reach)).astype(np.int32)[:, None] - steps[own]
             signal = self._spread.take(away, mode="clip") * tone[own]
             parts = scipy.fft.fft(signal, axis=1, overwrite_x=True).view(np.float32)
             spectrum = parts[:, ::2] ** 2 + parts[:, 1::2] ** 2
             targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
-            found[targets] += np.add.reduceat(spectrum, begin, axis=0)
+            return targets, np.add.reduceat(spectrum, begin, axis=0)
+
+        for targets, power_m2 in thread_map(spectra, range(0, len(echo), _AT_ONCE)):
+            found[targets] += power_m2
         maps = found.reshape(n_owners, radar.samples_per_chirp, n_cycles)
         return np.asarray(radar.n_channels * np.fft.fftshift(maps, axes=2))
 
