@@ -350,7 +350,9 @@ def samples_lost(
                 else np.ones((len(swept), 1))
             )
             amplitude = of_sweep @ own.amplitude[:, tx, one][:, which - first]
-            turns = np.outer(swept, own.length[tx, one, which - first]) / SPEED_OF_LIGHT_MPS
+            delay = own.length[tx, one, which - first] / SPEED_OF_LIGHT_MPS
+            # The last term, which the paper neglects, turns a delay of 40 ns by 18 degrees.
+            turns = np.outer(swept, delay) - radar.slope_hz_per_s * delay**2 / 2
             wave = amplitude * np.exp(2j * np.pi * turns) * (over_sweep @ lost[which].T)
             found[column] += wave.sum(axis=1)
             first += own.n_echoes
