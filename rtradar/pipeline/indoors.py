@@ -19,6 +19,10 @@ from rtradar.settings import RunSettings
 from rtradar.signal.ghosts import GhostIf, ghosts_within
 from rtradar.signal.static_clutter import RoomIf
 
+_OF_SHADOW = 0.1
+"""Part of the tolerated power of errors that the shadow in the clutter may take; ghosts may take
+the rest."""
+
 
 class Indoors(NamedTuple):
     """The person in the room: the echo model, and the IF of the room itself.
@@ -57,8 +61,7 @@ def indoors(
     allowed = 0.0
     if settings.path_tolerance_db is not None:
         allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
-    # Ghosts may take nearly all of the tolerance: a tenth is left to the shadow.
-    shadow = ClutterShadow(clutter, body, scene.objects, allowed / 10)
+    shadow = ClutterShadow(clutter, body, scene.objects, _OF_SHADOW * allowed)
     room = RoomIf(radar, clutter.cycle(), shadow)
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
@@ -72,10 +75,12 @@ def indoors(
         },
     }
     ghosts = None
-    if settings.path_tolerance_db is not None and person_power_m2 > 0 and model.has_ghost_tones:
-        ghosts, said = ghosts_within(model, radar, n_chirps, allowed)
-        error = said.pop("error_m2") / person_power_m2
-        said["error_db"] = 10 * math.log10(error) if error > 0 else None
+    if settings.path_tolerance_db is not None and person_power_m2 > 0:
+        error, said = shadow.error_m2, dict[str, Any]()
+        if model.has_ghost_tones:
+            ghosts, said = ghosts_within(model, radar, n_chirps, (1 - _OF_SHADOW) * allowed)
+            error += said.pop("error_m2")
+        said["error_db"] = 10 * math.log10(error / person_power_m2) if error > 0 else None
         summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
     # Walls that are not followed over the sweep, where they matter.
     fraction = max(model.not_followed.values(), default=0.0)

@@ -96,10 +96,12 @@ class ClutterShadow:
     """Shadow that a moving body, and ``objects`` that move, cast in the clutter of a room.
 
     What is approximated may be in error by ``allowed_m2``, a mean power of IF samples [m^2], and by
-    `ERROR_DB` of what changes if that is more. ``step`` is the number of chirps between keyframes,
-    ``starts (object + 1,)`` the first echo of each object of the clutter in the count through all,
-    ``mirrors`` the numbers of those that walls reflect; ``frequency (node,)`` are the frequencies
-    of their shadow, ``point_frequency (node,)`` those of the others' [Hz].
+    `ERROR_DB` of what changes if that is more; ``error_m2`` is what it is expected to be.
+
+    ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
+    each object of the clutter in the count through all, ``mirrors`` the numbers of those that walls
+    reflect; ``frequency (node,)`` are the frequencies of their shadow, ``point_frequency (node,)``
+    those of the others' [Hz].
     """
 
     def __init__(
@@ -167,15 +169,16 @@ class ClutterShadow:
         # Not at the ends of a line, where coarse points are exact.
         tx = np.unique([self._radar.n_tx // 4, self._radar.n_tx * 3 // 4])
         fields = _fields(clutter, self.starts, near.number, tx)
-        precision = FINE
+        precision, of_points = FINE, 0.0
         if allowed_m2 > 0:
             some = [[row[i] for i in (0, 5, 6)] for row in poses[_FEW // 2 :: _FEW]]
-            precision = self._enough(near, fields, tx, some, _OF_POINTS * allowed_m2)
+            precision, of_points = self._enough(near, fields, tx, some, _OF_POINTS * allowed_m2)
         self._points = PointShadow(self._radar, near, precision)
         middle = precision._replace(nodes=1, weak=2.0)
         points = PointShadow(self._radar, near, middle, tx[:1])
         lost = [[self._lost(points, fields, own) for own in row] for row in poses]
-        self.step = keyframe_step(self._radar, _apart_s(lost, _OF_KEYFRAMES * allowed_m2))
+        apart_s, of_keyframes = _apart_s(lost, _OF_KEYFRAMES * allowed_m2)
+        self.step, self.error_m2 = keyframe_step(self._radar, apart_s), of_points + of_keyframes
 
     def _enough(
         self,
@@ -184,20 +187,22 @@ class ClutterShadow:
         tx: Indices,
         poses: list[list[Posed]],
         allowed_m2: float,
-    ) -> Precision:
-        """Find the least precision of which the error's change in the samples is small enough."""
+    ) -> tuple[Precision, float]:
+        """Find the least precision whose error changes little enough in the samples.
+
+        What changes of the error beside `FINE` follows, a mean power of samples [m^2].
+        """
 
         def samples(precision: Precision) -> Field:
             points = PointShadow(self._radar, near, precision, tx)
-            return np.array(
-                [[(fields * points.dense(own)).sum(axis=-1) for own in row] for row in poses]
-            )
+            return np.array([[points.samples(fields, own) for own in row] for row in poses])
 
         fine = samples(FINE)
         for precision in (COARSE, MEDIUM):
-            if np.var(samples(precision) - fine, axis=1).mean() <= allowed_m2:
-                return precision
-        return FINE
+            error = float(np.var(samples(precision) - fine, axis=1).mean())
+            if error <= allowed_m2:
+                return precision, error
+        return FINE, 0.0
 
     def _lost(self, points: PointShadow, fields: Field, posed: Posed) -> Field:
         """Samples of what is lost of points, for the array's middle, and of mirrors [m].
@@ -209,7 +214,7 @@ class ClutterShadow:
         lost = self._on_legs(tuple(array[some] for array in legs.geometry), posed, np.ones(1))
         kept = np.ones(len(self.mirrors), dtype=np.complex128)
         np.multiply.at(kept, legs.mirror[some], 1 - lost[:, 0])
-        of_points = (fields * points.dense(posed)[:, :, :1]).sum(axis=-1)
+        of_points = points.samples(fields, posed)
         mean = of_points.ravel() / np.sqrt(of_points.size)
         return np.concatenate([mean, (1 - kept) * self._mirror_m])
 
@@ -229,17 +234,18 @@ class ClutterShadow:
         return lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales, FADE)
 
 
-def _apart_s(lost: list[list[Field]], allowed_m2: float) -> float:
-    """Time between keyframes at which the error is as large as it may be [s]."""
+def _apart_s(lost: list[list[Field]], allowed_m2: float) -> tuple[float, float]:
+    """Time between keyframes at which the error is as large as it may be [s], and that error."""
     error = change = 0.0
     for now, *rest in lost:
         error += float((np.abs(now - cubic_weights([0.5])[0] @ rest[:4]) ** 2).sum()) / len(lost)
         change += float(np.var([now, *rest[4:]], axis=0).sum()) / len(lost)
     if not error > 0:
-        return KEYFRAMES_S
+        return KEYFRAMES_S, 0.0
     goal = max(change * 10 ** (ERROR_DB / 10), allowed_m2)
     apart_s = TRIED_S * (goal / error) ** (1 / _ERROR_POWER)
-    return float(min(KEYFRAMES_S, max(SHORTEST_S, apart_s)))
+    apart_s = float(min(KEYFRAMES_S, max(SHORTEST_S, apart_s)))
+    return apart_s, error * (apart_s / TRIED_S) ** _ERROR_POWER
 
 
 class _Faces(NamedTuple):

@@ -107,7 +107,7 @@ class PointShadow:
         precision: Precision,
         tx: Indices | None = None,
     ) -> None:
-        self.precision, self._radar, self._count = precision, radar, len(points.power)
+        self.precision, self._radar = precision, radar
         own = radar, precision.along_tx, precision.along_rx
         places, tx_weights, rx_weights = shadow_nodes(*own)
         self._middle = places.mean(axis=0)
@@ -119,7 +119,7 @@ class PointShadow:
         order = np.argsort(points.power)
         share = np.cumsum(points.power[order]) / max(points.power.sum(), 1e-300)
         self._which = np.sort(order[share >= precision.faint])
-        weak = np.ones(self._count, dtype=bool)
+        weak = np.ones(len(order), dtype=bool)
         weak[order[share >= precision.weak]] = False
         self._points, self._strong = points.some(self._which), ~weak[self._which]
 
@@ -128,12 +128,13 @@ class PointShadow:
         which, fraction = self._find(posed)
         return self._points.number[which], fraction
 
-    def dense(self, posed: Posed) -> Field:
-        """The fraction of all points, also of those that lose nothing (node, tx, rx, point)."""
+    def samples(self, fields: Field, posed: Posed) -> Field:
+        """Sum what all points lose of ``fields (node, tx, rx, point)``, over the points.
+
+        What is given at one frequency, or for one Tx, is that of all.
+        """
         which, fraction = self._find(posed)
-        out = np.zeros((*fraction.shape[:-1], self._count), dtype=np.complex128)
-        out[..., self._which[which]] = fraction
-        return out
+        return np.asarray((fields[..., self._which[which]] * fraction).sum(axis=-1))
 
     def _find(self, posed: Posed) -> tuple[Indices, Field]:
         near = np.flatnonzero(self._points.near(self._radar, [posed]))
