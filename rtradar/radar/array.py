@@ -151,8 +151,6 @@ class Array(Waveform):
         positions : (time, 3) float64
             Positions, world [m].
         """
-        from scipy.spatial.transform import Rotation  # here, because it is slow to import
-
         at = np.asarray(times, dtype=np.float64)
         positions, angles = np.empty((2, len(at), 3))
         positions[:] = self.position_m
@@ -160,8 +158,7 @@ class Array(Waveform):
         for values, path in ((positions, self.path_m), (angles, self.path_angles_deg)):
             for axis, along in enumerate(() if path is None else zip(*path, strict=True)):
                 values[:, axis] += np.interp(at, self.path_times_s or (), along)
-        turned = Rotation.from_euler("ZYX", angles * [1, -1, 1], degrees=True)
-        return np.asarray(turned.as_matrix()), positions
+        return _rotation(angles), positions
 
     @cached_property
     def axes(self) -> NDArray[np.float64]:
@@ -169,7 +166,7 @@ class Array(Waveform):
 
         A vector of the radar's axes is ``axes @ vector`` in the world's.
         """
-        return rotation(self.yaw_deg, self.pitch_deg, self.roll_deg)
+        return _rotation(np.array([self.yaw_deg, self.pitch_deg, self.roll_deg]))
 
     @cached_property
     def rx_of_tx(self) -> NDArray[np.int64]:
@@ -276,13 +273,15 @@ def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:
     return runs
 
 
-def rotation(yaw_deg: float, pitch_deg: float, roll_deg: float) -> NDArray[np.float64]:
-    """Rotation (3, 3) of the radar's axes: about x by roll, then up by pitch, then left by yaw."""
-    (cy, sy), (cp, sp), (cr, sr) = (
-        (math.cos(angle), math.sin(angle))
-        for angle in map(math.radians, (yaw_deg, pitch_deg, roll_deg))
+def _rotation(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations (..., 3, 3) of the radar's axes by (..., 3) yaw, pitch and roll.
+
+    About x by roll, then up by pitch, then left by yaw.
+    """
+    (cy, cp, cr), (sy, sp, sr) = (
+        np.moveaxis(part(np.radians(angles_deg)), -1, 0) for part in (np.cos, np.sin)
     )
-    yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    pitch = np.array([[cp, 0, -sp], [0, 1, 0], [sp, 0, cp]])
-    roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    return np.asarray(yaw @ pitch @ roll)
+    boresight = [cp * cy, cp * sy, sp]
+    left = [-cr * sy - sr * sp * cy, cr * cy - sr * sp * sy, sr * cp]
+    up = [sr * sy - cr * sp * cy, -sr * cy - cr * sp * sy, cr * cp]
+    return np.stack([np.stack(axis, axis=-1) for axis in (boresight, left, up)], axis=-1)
