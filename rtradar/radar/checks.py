@@ -84,24 +84,6 @@ def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
     )
 
 
-def _is_place(value: Any) -> bool:
-    return _is_triple(value) and max(map(abs, value)) <= _MOST_PLACE_M
-
-
-_PLACES = FieldRule(
-    lambda value: (
-        value is None
-        or (
-            isinstance(value, list | tuple | np.ndarray)
-            and 1 <= len(value) <= _MOST_ANTENNAS
-            and all(map(_is_place, value))
-        )
-    ),
-    lambda value: None if value is None else tuple(tuple(map(float, place)) for place in value),
-    f"it must be a list of 1 to {_MOST_ANTENNAS} places [x, y, z], within {_MOST_PLACE_M:g} m",
-)
-
-
 def _or_none(rule: FieldRule) -> FieldRule:
     return FieldRule(
         lambda value: value is None or rule.allows(value),
@@ -115,16 +97,37 @@ def _if(allows: Callable[[Any], bool], convert: type) -> FieldRule:
     return FieldRule(lambda _: True, lambda value: convert(value) if allows(value) else value, "")
 
 
-def _is_triple(value: Any) -> bool:
-    triple = isinstance(value, list | tuple | np.ndarray) and len(value) == 3
-    return triple and all(map(_is_number, value))
+def _list_of(
+    item: Callable[[Any], bool],
+    convert: Callable[[Any], Any],
+    requirement: str,
+    least: int = 0,
+    most: int = _MOST_CHIRPS,
+) -> FieldRule:
+    return FieldRule(
+        lambda value: (
+            isinstance(value, list | tuple | np.ndarray)
+            and least <= len(value) <= most
+            and all(map(item, value))
+        ),
+        lambda value: tuple(map(convert, value)),
+        requirement,
+    )
 
 
-_ANGLES = FieldRule(
-    lambda value: isinstance(value, list | tuple | np.ndarray) and all(map(_is_triple, value)),
-    lambda value: tuple(tuple(map(float, one)) for one in value),
-    "it must be a list of [yaw, pitch, roll] in degrees",
+_TRIPLE = _list_of(_is_number, float, "it must be three finite numbers [m]", 3, 3)
+_PLACES = _list_of(
+    lambda value: _TRIPLE.allows(value) and max(map(abs, value)) <= _MOST_PLACE_M,
+    _TRIPLE.convert,
+    f"it must be a list of 1 to {_MOST_ANTENNAS} places [x, y, z], within {_MOST_PLACE_M:g} m",
+    1,
+    _MOST_ANTENNAS,
 )
+_ANGLES = _list_of(
+    _TRIPLE.allows, _TRIPLE.convert, "it must be a list of [yaw, pitch, roll] in degrees"
+)
+_ORDER = _list_of(_is_count, int, "it must be a list of whole numbers, each Tx once")
+_TIMES = _list_of(_is_number, float, "it must be a list of times [s]")
 
 FIELD_RULES: dict[str, FieldRule] = {
     **dict.fromkeys(("start_frequency_hz", "bandwidth_hz", "chirp_duration_s"), _POSITIVE),
@@ -140,38 +143,16 @@ FIELD_RULES: dict[str, FieldRule] = {
         lambda value: value if isinstance(value, int | None) else int(value),
         f"it must be a whole number from 1 to {_MOST_CHIRPS}",
     ),
-    **dict.fromkeys(("tx_positions_m", "rx_positions_m"), _PLACES),
-    "tx_order": FieldRule(
-        lambda value: (
-            value is None
-            or (isinstance(value, list | tuple | np.ndarray) and all(map(_is_count, value)))
-        ),
-        lambda value: None if value is None else tuple(map(int, value)),
-        "it must be a list of whole numbers, each Tx once",
-    ),
+    **dict.fromkeys(("tx_positions_m", "rx_positions_m"), _or_none(_PLACES)),
+    "tx_order": _or_none(_ORDER),
     **dict.fromkeys(("yaw_deg", "pitch_deg", "roll_deg"), _between(-360, 360, optional=False)),
     **dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), _count(0)),
     "channels": _choice("pairs", "all"),
     "polarization": _choice("v", "h"),
     "multiplexing": _choice("tdm", "fdm", "ddm", "bpm"),
-    "position_m": FieldRule(
-        lambda value: (
-            isinstance(value, list | tuple | np.ndarray)
-            and len(value) == 3
-            and all(map(_is_number, value))
-        ),
-        lambda value: tuple(map(float, value)),
-        "it must be three finite numbers [m]",
-    ),
-    "path_times_s": FieldRule(
-        lambda value: (
-            value is None
-            or (isinstance(value, list | tuple | np.ndarray) and all(map(_is_number, value)))
-        ),
-        lambda value: None if value is None else tuple(map(float, value)),
-        "it must be a list of times [s]",
-    ),
-    "path_m": _PLACES,
+    "position_m": _TRIPLE,
+    "path_times_s": _or_none(_TIMES),
+    "path_m": _or_none(_PLACES),
     "path_angles_deg": _or_none(_ANGLES),
     "transmit_power_dbm": _between(-200, 200),
     "noise_figure_db": _between(0, 100),
@@ -209,6 +190,37 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"fit into chirp_duration_s = {r.chirp_duration_s:g}; begin sooner, take fewer "
         "(samples_per_chirp) or take them faster (adc_rate_hz)",
     )
+    yield from _path_rules(r)
+    yield from _multiplexing_rules(r)
+    yield (
+        r.cycles_per_frame >= 1,
+        f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} cycle of "
+        f"{r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or shorten the chirp",
+    )
+    yield from _receiver_rules(r)
+    chirps = r.cycles_per_frame * r.n_tx
+    yield (
+        isinstance(r.chirps_per_frame, FollowingCount | None) or r.chirps_per_frame == chirps,
+        f"chirps_per_frame = {r.chirps_per_frame}; it must be a multiple of "
+        f"{r.n_tx * r.n_doppler_bands}, the Tx{' times doppler_bands' * (r.n_doppler_bands > 1)}",
+    )
+    active_s = r.cycles_per_frame * r.cycle_duration_s
+    yield (
+        r.frame_period_s is None or active_s <= r.frame_period_s * (1 + 1e-12),
+        f"frame_period_s = {r.frame_period_s}; the {chirps} chirps of one frame take "
+        f"{active_s:.4g} s: lengthen the period, or take fewer (chirps_per_frame, or "
+        "frame_duration_s)",
+    )
+    samples = chirps * r.n_rx * r.samples_per_chirp
+    yield (
+        samples <= _MOST_SAMPLES_PER_FRAME,
+        f"frame_duration_s = {r.frame_duration_s} holds {samples:.2g} samples, more than "
+        f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps",
+    )
+
+
+def _path_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+    """Yield the rules of a radar that moves, as `_rules` does."""
     path = tuple(own for own in (r.path_m, r.path_angles_deg) if own is not None)
     yield (
         (r.path_times_s is not None) == bool(path),
@@ -223,6 +235,10 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"path_times_s = {brief(r.path_times_s)}; it must have as many times as path_m and "
         "path_angles_deg have entries, ascending",
     )
+
+
+def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+    """Yield the rules that fit the Tx to how they are told apart, as `_rules` does."""
     yield (
         r.carrier_step_hz is None or r.multiplexing == "fdm",
         "carrier_step_hz belongs to multiplexing = 'fdm'; leave it out",
@@ -253,31 +269,6 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         r.multiplexing != "ddm" or r.channels == "all" or not (r.is_cross and r.tx_y and r.tx_z),
         "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx on "
         "one line",
-    )
-    yield (
-        r.cycles_per_frame >= 1,
-        f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} cycle of "
-        f"{r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or shorten the chirp",
-    )
-    yield from _receiver_rules(r)
-    chirps = r.cycles_per_frame * r.n_tx
-    yield (
-        isinstance(r.chirps_per_frame, FollowingCount | None) or r.chirps_per_frame == chirps,
-        f"chirps_per_frame = {r.chirps_per_frame}; it must be a multiple of "
-        f"{r.n_tx * r.n_doppler_bands}, the Tx{' times doppler_bands' * (r.n_doppler_bands > 1)}",
-    )
-    active_s = r.cycles_per_frame * r.cycle_duration_s
-    yield (
-        r.frame_period_s is None or active_s <= r.frame_period_s * (1 + 1e-12),
-        f"frame_period_s = {r.frame_period_s}; the {chirps} chirps of one frame take "
-        f"{active_s:.4g} s: lengthen the period, or take fewer (chirps_per_frame, or "
-        "frame_duration_s)",
-    )
-    samples = chirps * r.n_rx * r.samples_per_chirp
-    yield (
-        samples <= _MOST_SAMPLES_PER_FRAME,
-        f"frame_duration_s = {r.frame_duration_s} holds {samples:.2g} samples, more than "
-        f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps",
     )
 
 
