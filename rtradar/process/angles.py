@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.angles import add_interpolated, beam_power, highest_maxima
-from rtradar.process.beams import cuts_through_highest
+from rtradar.process.beams import cuts_through_highest, refine
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,
@@ -266,7 +266,7 @@ def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> floa
         return 0.0
     if not power.max() > 0:
         raise InputError("angle: the cell holds no echo at all; choose one that was detected")
-    return float(_refine(sines, power, power.argmax(axis=1)[:, None])[0][0, 0])
+    return float(refine(sines, power, power.argmax(axis=1)[:, None])[0][0, 0])
 
 
 @dataclass(frozen=True)
@@ -289,31 +289,7 @@ def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     below, above = (np.float32(10 ** (db / 10)) for db in (-BELOW_HIGHEST_DB, ABOVE_MEDIAN_DB))
     highest_maxima(power, below, above, index, count)
     real = np.arange(MOST_PEAKS) < count[:, None]
-    return Peaks(*_refine(sines, power, index), real)
-
-
-def _refine(
-    sines: NDArray[np.float64], power: NDArray[np.float32], index: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sine and power (cell, peak) of maxima, by the parabola through three logarithms of power.
-
-    ``index (cell, peak)`` is where the maxima of ``power (cell, sine)`` are on the grid; at its
-    ends they are left there.
-    """
-    last = len(sines) - 1
-    around = (np.clip(index + step, 0, last) for step in (-1, 0, 1))
-    least = np.finfo(np.float32).tiny
-    left, middle, right = (
-        np.log(np.maximum(np.take_along_axis(power, at, axis=1), least, dtype=np.float64))
-        for at in around
-    )
-    bend = left - 2 * middle + right
-    inside = (bend < 0) & (index > 0) & (index < last)
-    # Beside what is no direction, where power is 0, a peak stays where it is, too.
-    inside &= np.minimum(left, right) > math.log(least) + 1
-    shift = np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5) * inside
-    sine = sines[index] + shift * (sines[1] - sines[0])
-    return sine, np.exp(middle - 0.25 * (left - right) * shift)
+    return Peaks(*refine(sines, power, index), real)
 
 
 # -- maps over range and angle ---------------------------------------------------------------------

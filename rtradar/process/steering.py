@@ -19,6 +19,8 @@ from rtradar.kernels.angles import Steering
 from rtradar.process.window_functions import taylor
 from rtradar.radar import Radar
 
+_Reals = NDArray[np.float64]
+
 Taper = Literal["uniform", "taylor"]
 """Weights of the elements of a line."""
 
@@ -30,18 +32,12 @@ _MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.4 
 _TAYLOR_EQUAL_LOBES = 4
 
 
-_NO_LINE = (
-    "angle: radar '{}' has no line of at least 2 channels; give a Tx and 2 Rx (or 2 Tx and an Rx) "
-    "along y or z"
-)
-
-
 @dataclass(frozen=True)
 class Line:
-    """One virtual line: the channels whose Tx and Rx both lie on it, along world axis 1 or 2.
+    """One virtual line: the channels whose Tx and Rx both lie on it, along axis 1 or 2.
 
     ``channels (element,)`` are tx * n_rx + rx, ``tx_m`` and ``rx_m (element,)`` the positions of
-    each element's Tx and Rx along the line, about the radar [m].
+    each element's Tx and Rx along the line, in the radar's axes [m].
     """
 
     axis: int
@@ -72,11 +68,11 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     neither. An array of antennas in lists has no lines; `beams` steers it.
     """
     if not any(radar.measures):
-        raise InputError(_NO_LINE.format(radar.name))
-    lines = (_line(radar, 1), _line(radar, 2)) if radar.is_cross else (None, None)
-    if lines == (None, None) and radar.is_cross:
-        raise InputError(_NO_LINE.format(radar.name))
-    return lines
+        raise InputError(
+            f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx "
+            "(or 2 Tx and an Rx) along y or z"
+        )
+    return (_line(radar, 1), _line(radar, 2)) if radar.is_cross else (None, None)
 
 
 def _line(radar: Radar, axis: int) -> Line | None:
@@ -87,9 +83,7 @@ def _line(radar: Radar, axis: int) -> Line | None:
     tx, slot = np.nonzero(tx_there[:, None] & rx_there[radar.rx_of_tx])
     if len(tx) < 2:
         return None
-    centre = 0.0 if radar.is_turned else radar.position_m[axis]
-    tx_m, rx_m = (radar.tx_m, radar.rx_m) if radar.is_turned else (radar.tx, radar.rx)
-    places = tx_m[tx, axis] - centre, rx_m[radar.rx_of_tx[tx, slot], axis] - centre
+    places = radar.tx_m[tx, axis], radar.rx_m[radar.rx_of_tx[tx, slot], axis]
     return Line(axis, np.asarray(tx * radar.n_rx + slot, dtype=np.int64), *places)
 
 
@@ -161,15 +155,28 @@ def steering(
     runs = []
     for place in range(count):
         range_m = None if range_bins is None else radar.range_bin_m * int(range_bins[place])
-        excess = line.excess_m(sines, range_m)
-        steps = np.rint(excess / (2 * radar.range_bin_m)) * (range_m is not None)
-        offsets = np.clip(steps, -walk, walk).astype(np.int64)
-        # From one range bin to the next the phase also turns by half a turn, because the window
-        # function is even about the middle of the chirp.
-        turns = excess * (carrier / SPEED_OF_LIGHT_MPS) - offsets / 2
-        weights[place] = (np.exp(-2j * np.pi * turns) * own).T
+        phases, offsets = phases_of(
+            line.excess_m(sines, range_m), carrier, radar, 0 if range_m is None else walk
+        )
+        weights[place] = (phases * own).T
         runs.append(_runs(offsets.T + walk))
     return Steering(weights, np.concatenate(runs), np.cumsum([0, *map(len, runs)]))
+
+
+def phases_of(
+    excess_m: _Reals, carrier_hz: _Reals, radar: Radar, walk: int
+) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
+    """Phases (..., element) that bring elements into step, and the bins in which to read each.
+
+    ``excess_m (..., element)`` is the path over each less twice the range; bins are counted from
+    that of the cell, at most ``walk`` to either side.
+    """
+    steps = np.rint(excess_m / (2 * radar.range_bin_m))
+    offsets = np.clip(steps, -walk, walk).astype(np.int64)
+    # From one range bin to the next the phase also turns by half a turn, because the window
+    # function is even about the middle of the chirp.
+    turns = excess_m * (carrier_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
+    return np.exp(-2j * np.pi * turns), offsets
 
 
 # Both lines of two radars; 20 MB each, computed at once, so that memory does not grow with motion.
