@@ -255,9 +255,7 @@ def _starts(first: int, count: int, window: int, hop: int, radar: Radar) -> NDAr
 def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDArray[np.float64]:
     """Middle of the windows from these cycles on (time,) [s]; they are even about window / 2."""
     own = float(radar.tx_delay_s[tx] + radar.chirp_times(1)[0])
-    if radar.in_frames:
-        return radar.cycle_times(starts) + window / 2 * radar.cycle_duration_s + own
-    return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
+    return radar.cycle_times(starts) + window / 2 * radar.cycle_duration_s + own
 
 
 def _columns(
