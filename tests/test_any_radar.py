@@ -12,18 +12,8 @@ from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.scatter.echo_models import build_model
 
-LAMBDA = 299_792_458.0 / 77e9
-RADAR = rt.Radar(
-    name="board",
-    start_frequency_hz=77e9,
-    bandwidth_hz=3.6e9,
-    chirp_duration_s=60e-6,
-    idle_s=6e-6,
-    adc_start_s=3e-6,
-    adc_rate_hz=5e6,
-    samples_per_chirp=256,
-    tx_positions_m=[[0, 0, 0], [0, -LAMBDA, LAMBDA / 2], [0, -2 * LAMBDA, 0]],
-    rx_positions_m=[[0, -LAMBDA / 2 * number, 0] for number in range(4)],
+RADAR = dataclasses.replace(
+    rt.Radar.preset("iwr1843"),
     tx_order=[0, 2, 1],
     chirps_per_frame=48,
     frame_period_s=1 / 30,
@@ -39,19 +29,19 @@ PATH = {
 
 def test_times_of_chirps_in_frames() -> None:
     chirps = np.array([0, 1, 47, 48, 100])
-    slots = np.array([0, 1, 47, 0, 4]) * 66e-6 + np.array([0, 0, 0, 1, 2]) / 30
-    np.testing.assert_allclose(RADAR.centres_of(chirps), slots + 3e-6 + 25.6e-6, rtol=1e-12)
-    np.testing.assert_allclose(RADAR.slots_of(chirps) * 66e-6, slots, atol=1e-12)
+    slots = np.array([0, 1, 47, 0, 4]) * 53e-6 + np.array([0, 0, 0, 1, 2]) / 30
+    np.testing.assert_allclose(RADAR.centres_of(chirps), slots + 5.5e-6 + 128 / 6.5e6, rtol=1e-12)
+    np.testing.assert_allclose(RADAR.slots_of(chirps) * 53e-6, slots, atol=1e-12)
     assert RADAR.window_starts(150).tolist() == [0, 16, 32]
-    assert RADAR.chirps_in(1 / 30 + 48 * 66e-6) == 96
-    assert RADAR.chirps_in(1 / 30 + 47 * 66e-6) == 48
+    assert RADAR.chirps_in(1 / 30 + 48 * 53e-6) == 96
+    assert RADAR.chirps_in(1 / 30 + 47 * 53e-6) == 48
     assert RADAR.frame_hop_s == RADAR.frame_period_s
     assert dataclasses.replace(RADAR, frame_period_s=None).gaps_text == ""
 
 
 def test_range_follows_from_the_sampled_part_of_the_sweep() -> None:
-    assert pytest.approx(60e12 * 51.2e-6) == RADAR.sampled_bandwidth_hz
-    assert pytest.approx(299_792_458 / (2 * 60e12 * 51.2e-6)) == RADAR.range_bin_m
+    assert pytest.approx(80e12 * 256 / 6.5e6) == RADAR.sampled_bandwidth_hz
+    assert pytest.approx(299_792_458 / (2 * 80e12 * 256 / 6.5e6)) == RADAR.range_bin_m
 
 
 def test_what_follows_of_a_frame_follows_anew_when_it_is_replaced() -> None:

@@ -3,10 +3,9 @@
 The IF samples are made here by closed forms from the fields of the radar alone: places of antennas
 in the world, times of chirps, delays, and the phase of the mixed sweep. rtradar reads range and
 velocity from its map, and azimuth and elevation in the cell of the echo. `rows_of_radar` does so
-for one radar; its points are inside the limits that it states. Boards that come along are among
-them. The array without regular spacing
-and the sparse one also have their grating lobes judged, by the angle at which the array factor
-returns to its height.
+for one radar; its points are inside the limits that it states. All boards are among them. The
+sparse array also has its grating lobes judged, by the angle at which the array factor returns to
+its height.
 
     python validation/closed_forms/any_radar.py [--quick] [--json FILE]
 """
