@@ -114,10 +114,11 @@ def _export_samples(
         if suffix != ".bin":
             raise InputError(f"'{target}': a file of a DCA1000 is named .bin; give such a name")
         return about | int16_files.write_int16(target, recording, dca1000)
-    if recording.radar.multiplexing == "ddm" and suffix in _BY_TX:
+    if recording.radar.receives_sums and suffix in _BY_TX:
         raise InputError(
-            f"'{recording.name}' holds the sum of all Tx, as Doppler division receives it, "
-            "which has no tx axis; export it as .npy, .zarr or for a DCA1000"
+            f"'{recording.name}' holds the sum of all Tx, as multiplexing = "
+            f"'{recording.radar.multiplexing}' receives it, which has no tx axis; export it as "
+            ".npy, .zarr or for a DCA1000"
         )
     return about | IF_FORMATS[suffix][0](target, recording)
 

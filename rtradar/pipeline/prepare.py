@@ -24,6 +24,7 @@ from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_process
 from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
+from rtradar.scatter.binary_phase import BinaryPhaseModel
 from rtradar.scatter.link_budget import LinkBudget, link_budget
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.radar_axes import in_radar_axes
@@ -58,6 +59,11 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
             f"radar '{radar.name}' has a [receiver], whose levels need the loss with distance; "
             "leave out --no-spreading (spreading=False)"
         )
+    if radar.multiplexing == "bpm" and (scene.walls or scene.furniture):
+        raise InputError(
+            f"scene '{scene.name}': radar '{radar.name}' has multiplexing = 'bpm', which is "
+            "simulated in free space only; take 'tdm', or leave the scene out"
+        )
     with stage_line("preparing"):
         with processing_compiled_beside():
             with processing.stages.time("motion"):
@@ -91,6 +97,8 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
     inside, tones = None, model
+    if radar.multiplexing == "bpm":
+        tones = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
     if isinstance(around, RoomModel):
         with processing.stages.time("room"):
             powers = budget.power, noise.power

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, points_of_sines, spatial_points
 from rtradar.clouds.rdt import UniformSample
-from rtradar.errors import InputError
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,
@@ -88,7 +87,6 @@ class Processing:
     @classmethod
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
         """Build the processing that these settings name; InputError if a name is unknown."""
-        _refuse_unfinished(radar)
         window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
         return cls(
             radar,
@@ -116,16 +114,6 @@ class Processing:
                 return range_spectrum(separated, radar, window_functions=windows, out=filled[:n])
 
         return range_spectra
-
-
-def _refuse_unfinished(radar: Radar) -> None:
-    """Refuse what a radar can say of itself before it is simulated."""
-    unfinished = {
-        "multiplexing = 'bpm'": radar.multiplexing == "bpm",
-    }
-    for what, is_there in unfinished.items():
-        if is_there:
-            raise InputError(f"radar '{radar.name}': {what} is not simulated yet; leave it out")
 
 
 def block_chirps(radar: Radar) -> int:

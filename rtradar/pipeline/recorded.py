@@ -254,8 +254,8 @@ class _Blocks:
 
 def _rows(samples: Any, radar: Radar) -> Any:
     """Return samples as rows (chirp, rx, sample), one for each cycle under DDM."""
-    ddm = radar.multiplexing == "ddm"
-    allowed = _DIMENSIONS[:1] if ddm else _DIMENSIONS
+    sums = radar.receives_sums
+    allowed = _DIMENSIONS[:1] if sums else _DIMENSIONS
     if hasattr(samples, "dims"):
         order = next((names for names in allowed if set(names) == set(samples.dims)), None)
         if order is None:
@@ -269,13 +269,13 @@ def _rows(samples: Any, radar: Radar) -> Any:
     if kind.kind != "c":
         raise InputError(f"IF samples are of type {kind}; they must be complex numbers")
     end = radar.n_rx, radar.samples_per_chirp
-    if len(shape) == 4 and not ddm and shape[1:] == (radar.n_tx, *end):
+    if len(shape) == 4 and not sums and shape[1:] == (radar.n_tx, *end):
         return np.asarray(samples).reshape(-1, *end)
     if len(shape) != 3 or shape[1:] != end:
         whole = f" or (cycle, tx, rx, sample) = (any, {radar.n_tx}, {end[0]}, {end[1]})"
         raise InputError(
             f"IF samples have shape {shape}; radar '{radar.name}' needs "
-            f"(chirp, rx, sample) = (any, {end[0]}, {end[1]}){'' if ddm else whole}"
+            f"(chirp, rx, sample) = (any, {end[0]}, {end[1]}){'' if sums else whole}"
         )
     return samples
 

@@ -174,7 +174,7 @@ def if_samples(values: NDArray[np.complex64], radar: Radar, first: int = 0) -> x
             {"units": "s", "long_name": "time since the start of the chirp"},
         ),
     }
-    if together == 1:
+    if not radar.receives_sums:
         text = {"long_name": "transmitter of the chirp"}
         coordinates["tx"] = ("chirp", rows % radar.n_tx, text)
     described = {"units": "m", "long_name": "IF samples", "multiplexing": radar.multiplexing}

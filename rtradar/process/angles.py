@@ -38,6 +38,7 @@ from rtradar.process.steering import (
 )
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import tell_apart
 from rtradar.system.threads import thread_map
 
 MOST_PEAKS = 3
@@ -132,6 +133,11 @@ def angle_spectra(
     turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
     samples = cells.astype(np.complex64, copy=False)
     still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
+    if radar.multiplexing == "bpm":
+        turned = np.moveaxis(samples * still[:, None], 1, -1)
+        parted = tell_apart(turned.reshape(len(cells), radar.n_tx, radar.n_rx, -1), radar)
+        samples = np.moveaxis(parted.reshape(turned.shape), -1, 1).copy()
+        still = np.ones_like(still)
 
     if not radar.is_cross:
         known_bins = bins if focus else None

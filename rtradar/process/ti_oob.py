@@ -19,6 +19,7 @@ from scipy.ndimage import maximum_filter
 from rtradar.errors import InputError
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import tell_apart
 
 ANGLE_BINS = 64
 """Bins of the azimuth FFT, which lie evenly over the sine from -1 to 1."""
@@ -83,6 +84,10 @@ def ti_oob(
     n_cycles = len(cube)
     window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)
+    velocity = np.fft.ifftshift(radar.velocity_mps(n_cycles))
+    turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
+    still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
+    spectra = tell_apart(spectra * still[:, :, None, None], radar)
     level_db = _heat_map(spectra)
     detected = level_db > threshold_db + np.maximum(_beside(level_db), _along_range(level_db))
     # Peak grouping; the Doppler axis is a circle, and beyond the range axis there is nothing.
@@ -95,7 +100,7 @@ def ti_oob(
     mask[row, column] = True
     order = np.lexsort((column, row))
     values = spectra[doppler[order], :, :, row[order]]
-    return mask, _sines(values, radar, radar.velocity_mps(n_cycles)[column[order]])
+    return mask, _sines(values, radar)
 
 
 def _heat_map(spectra: NDArray[np.complexfloating]) -> _Reals:
@@ -135,12 +140,9 @@ def _along_range(level_db: _Reals) -> _Reals:
     return np.asarray(means.min(axis=0))
 
 
-def _sines(values: NDArray[np.complexfloating], radar: Radar, velocity: _Reals) -> _Reals:
-    """Sines of direction (cell, 2) of cells (cell, tx, rx) that move at so many m/s."""
-    turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
-    still = (values * np.exp(-2j * np.pi * turns)[:, :, None]).reshape(
-        len(values), radar.n_channels
-    )
+def _sines(values: NDArray[np.complexfloating], radar: Radar) -> _Reals:
+    """Sines of direction (cell, 2) of cells (cell, tx, rx) without their motion in a cycle."""
+    still = values.reshape(len(values), radar.n_channels)
     y, z = radar.virtual_m.T[1:] / radar.wavelength_m
     row = np.unique(np.rint(z / _SAME_ROW), return_inverse=True)[1]
     rows = [np.flatnonzero(row == number) for number in range(row.max() + 1)]

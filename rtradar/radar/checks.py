@@ -266,9 +266,13 @@ def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
         "number of Tx",
     )
     yield (
-        r.multiplexing != "ddm" or r.channels == "all" or not (r.is_cross and r.tx_y and r.tx_z),
-        "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx on "
-        "one line",
+        not r.receives_sums or r.channels == "all" or not (r.is_cross and r.tx_y and r.tx_z),
+        f"under multiplexing = '{r.multiplexing}' every Rx receives all Tx; set channels = 'all', "
+        "or give Tx on one line",
+    )
+    yield (
+        r.multiplexing != "bpm" or r.n_tx.bit_count() == 1,
+        f"multiplexing = 'bpm' needs 2, 4, 8 ... Tx, here {r.n_tx}; leave some out",
     )
 
 
@@ -286,6 +290,10 @@ def _receiver_rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"receiver: {' and '.join(r.receiver.in_baseband)} acts on all bands of FDM at once, for "
         "one ADC samples them together, and samples here are those of each band; leave it out, or "
         "take multiplexing = 'tdm' or 'ddm'",
+    )
+    yield (
+        r.multiplexing != "bpm",
+        "receiver: it is not simulated under multiplexing = 'bpm'; leave it out, or take 'tdm'",
     )
     for key in ("channel_gain_db", "channel_phase_deg"):
         value = getattr(r.receiver, key)

@@ -44,7 +44,7 @@ def settings_rows(radar: Radar) -> dict[str, str]:
     )
     names = {"tdm": "TDM, one Tx after the other", "fdm": "FDM, all Tx at once"}
     names["ddm"] = f"DDM, all Tx at once in {radar.n_doppler_bands} Doppler bands"
-    names["bpm"] = "BPM, Tx at once, told apart by the signs of their chirps"
+    names["bpm"] = "BPM, all Tx at once, told apart by the signs of their chirps"
     idle = f", idle {quantity(radar.idle_s, 's')}" if radar.idle_s else ""
     return {
         "Sweep": f"{quantity(radar.start_frequency_hz, 'Hz')} to {quantity(stop_hz, 'Hz')}, "

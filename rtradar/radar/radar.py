@@ -41,7 +41,7 @@ class Radar(Schedule):
     Antennas of a cross are numbered along the y-line first, then along the z-line; the index rises
     with y or z. Chirp m comes from Tx ``m mod n_tx``. Under TDM the Tx transmit one after the
     other, chirp by chirp. Under FDM and DDM all of them transmit at once: chirps 0 to ``n_tx - 1``
-    are those that are transmitted together first, and so on.
+    are those that are transmitted together first, and so on. Under BPM each chirp is one of all Tx.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ class Radar(Schedule):
         What tells the Tx apart: their time (TDM), their carrier (FDM: the sweep of Tx k lies
         ``tx_offset_hz[k]`` higher), or their Doppler (DDM: the IF of Tx k is multiplied by exp(j 2
         pi k p / D) at chirp p, which shifts it up by k of the D bands of the Doppler axis; some
-        bands stay empty and show where the axis begins), or their sign (BPM: groups of Tx transmit
-        at once, each with a row of a Hadamard matrix as the signs of its chirps).
+        bands stay empty and show where the axis begins), or their sign (BPM: 2, 4, 8 ... Tx
+        transmit at once, each with a row of a Hadamard matrix as the signs of its chirps).
     carrier_step_hz : float, optional
         Spacing of the carriers of FDM [Hz]; by default the sample rate, the least that keeps the
         bands apart.

@@ -46,12 +46,17 @@ class Schedule(Array):
 
     @property
     def at_once(self) -> bool:
-        """Whether all Tx transmit at once."""
-        return self.multiplexing != "tdm"
+        """Whether each chirp is one of all Tx, which are told apart within it or by Doppler."""
+        return self.multiplexing in ("fdm", "ddm")
+
+    @property
+    def receives_sums(self) -> bool:
+        """Whether what a receiver gets in one chirp is the sum over all Tx, as DDM and BPM have."""
+        return self.multiplexing in ("ddm", "bpm")
 
     @property
     def cycle_duration_s(self) -> float:
-        """Time until the same Tx transmits again [s]: all chirps of a cycle under TDM, else one."""
+        """Time until the Tx transmit as before [s]: n_tx chirps under TDM and BPM, else one."""
         return self.chirp_period_s if self.at_once else self.n_tx * self.chirp_period_s
 
     @property
@@ -61,9 +66,15 @@ class Schedule(Array):
 
     @cached_property
     def tx_delay_s(self) -> NDArray[np.float64]:
-        """Delay of each Tx after the first Tx of a cycle, (tx,) [s]."""
+        """Delay of each Tx after the first of a cycle, (tx,) [s]; under BPM of each chirp."""
         step_s = 0.0 if self.at_once else self.chirp_period_s
         return np.arange(self.n_tx, dtype=np.float64) * step_s
+
+    @cached_property
+    def tx_signs(self) -> NDArray[np.int64]:
+        """Sign of each Tx in each chirp of a cycle under BPM, (chirp, tx) (:eq:`bpm`)."""
+        numbers = range(self.n_tx)
+        return np.array([[(-1) ** (chirp & tx).bit_count() for tx in numbers] for chirp in numbers])
 
     @cached_property
     def tx_offset_hz(self) -> NDArray[np.float64]:

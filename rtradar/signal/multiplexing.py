@@ -7,9 +7,16 @@ bands of FDM. Under DDM (Doppler division; Sun, Petropulu and Poor, IEEE Signal 
 `separate` rotates the sum back by the code of one Tx after the other. In the row of a Tx its own
 echoes then lie at their Doppler frequency and those of the others whole bands away from it, where
 `rtradar.process.power_map` removes them.
+
+Under BPM a row is a chirp of all Tx, which have signs in it; the echoes that make it are summed
+already. What moves turns its phase from chirp to chirp, so that `tell_apart` can part the Tx only
+in a range-Doppler cell. Its matrix is unitary: the power of a cell is the same before.
 """
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,10 +78,24 @@ def separate(
     Returns
     -------
     (chirp, rx, sample) complex
-        ``received`` itself; under DDM ``n_tx`` rows for each row, rotated back by each Tx's code.
+        ``received`` itself; under DDM ``n_tx`` rows for each row, rotated back by each Tx's code;
+        under BPM over sqrt(n_tx), so that powers are those of one Tx.
     """
+    if radar.multiplexing == "bpm":
+        return np.asarray(received / math.sqrt(radar.n_tx), dtype=received.dtype)
     if radar.multiplexing != "ddm":
         return received
     back = codes(radar, first_chirp, len(received) * radar.n_tx).conj()
     rows = back[:, :, None, None] * received[:, None]
     return np.asarray(rows.reshape(-1, *received.shape[1:]), dtype=received.dtype)
+
+
+def tell_apart(values: NDArray[Any], radar: Radar) -> NDArray[np.complexfloating]:
+    """Part the Tx of cells (cell, chirp, rx, ...) of chirps from `separate`, under BPM (:eq:`bpm`).
+
+    The phase that motion adds from chirp to chirp has been removed.
+    """
+    if radar.multiplexing != "bpm":
+        return values
+    signs = (radar.tx_signs / math.sqrt(radar.n_tx)).astype(values.real.dtype)
+    return np.asarray(np.einsum("ct,ic...->it...", signs, values, optimize=False))

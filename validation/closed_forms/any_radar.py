@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.process import angle, range_doppler
 from rtradar.radar import Radar
+from rtradar.signal import separate
 from rtradar.system.registries import BOARDS
 from rtradar.validate.rows import Row, judged, main
 
@@ -30,6 +31,7 @@ LIGHT = 299_792_458.0
 SHARE = 0.1  # of a bin or a beam: what a reading may be off, far below what a map can tell apart
 PLACES = ((0.0, 0.0, 0.3), (0.5, 0.4, 0.4), (-0.4, -0.5, 0.6))  # of largest angles and of range
 SPEEDS = (0.0, 0.45, -0.3)  # of the largest velocity
+HADAMARD_2 = np.array([[1.0, 1.0], [1.0, -1.0]])
 _FRAMES = (0, 2)  # the second of them lies after two gaps
 _STEP_S = 1e-6  # over which a range rate is measured
 
@@ -83,14 +85,17 @@ def samples_of(radar: Radar, times: Array, place: Array, velocity: Array, middle
     )
     fast = radar.adc_start_s + np.arange(radar.samples_per_chirp) / rate
     slope = radar.bandwidth_hz / radar.chirp_duration_s
+    # What each Tx (column) transmits in each chirp of a cycle: one by itself, or all with signs.
+    sent = HADAMARD_2 if radar.multiplexing == "bpm" else np.eye(len(tx))
     samples = np.empty((len(times), len(rx), len(fast)), np.complex128)
     for number, time in enumerate(times):
         axes, position = pose(radar, time)
         point = axes.T @ (place + velocity * (time - middle) - position)
-        path = np.linalg.norm(point - tx[number % len(tx)]) + np.linalg.norm(point - rx, axis=1)
-        delay = path[:, None] / LIGHT
+        there, back = (np.linalg.norm(point - places, axis=1) for places in (tx, rx))
+        path = there[:, None] + back
+        delay = path[..., None] / LIGHT
         turns = (radar.start_frequency_hz + slope * fast) * delay - slope * delay**2 / 2
-        samples[number] = np.exp(2j * np.pi * turns)
+        samples[number] = np.tensordot(sent[number % len(tx)], np.exp(2j * np.pi * turns), 1)
     return samples
 
 
@@ -116,7 +121,7 @@ def centroid(power: Array) -> float:
 
 
 def rows_of_radar(radar: Radar, *, quick: bool = False) -> Iterator[Row]:
-    """Rows for one radar under TDM: points in two frames, at several places and speeds."""
+    """Rows for one radar under TDM, or BPM with two Tx: points at several places and speeds."""
     beams = beam_deg(radar, 1), beam_deg(radar, 2)
     measured = tuple(beam < 180 for beam in beams)
     count = radar.chirps_per_frame
@@ -151,7 +156,8 @@ def _read(
     direction: tuple[float, float],
     beams: tuple[float, float],
 ) -> Iterator[Row]:
-    found = range_doppler(samples, radar)
+    parted = separate(samples, radar, 0)
+    found = range_doppler(parted, radar)
     power = (np.abs(found.values) ** 2).sum(axis=2)
     cycles, says = power.shape[1], "a point reads back through any array, schedule and pose: "
     read = centroid(power.sum(axis=1)), centroid(power.sum(axis=0)) - cycles // 2
@@ -164,7 +170,7 @@ def _read(
     for name, ours, true, width in zip(("range", "velocity"), read, truth, bins, strict=True):
         details = {"reference": true / width, "key": "any-radar", "says": says + name}
         yield judged(claim, name, "bins", ours, SHARE, **details)
-    angles = angle(samples.astype(np.complex64), radar, *truth)
+    angles = angle(parted.astype(np.complex64), radar, *truth)
     names = "azimuth", "elevation"
     for name, ours, true, beam in zip(names, angles, direction, beams, strict=True):
         if beam < 180:
@@ -215,11 +221,13 @@ def radars() -> dict[str, Radar]:
     }
     wide = [[0, -1.5 * unit * number, 0] for number in range(4)]
     sparse = {"tx_positions_m": [[0, 0, 0], [0, 0, unit], [0, 0, 2 * unit]], "rx_positions_m": wide}
+    two = {"tx_positions_m": [[0, 0, 0], [0, -2 * unit, 0]], "tx_order": None}
     kinds = {
         "two rows": {},
         "turned": turned,
         "with gaps": gaps,
         "moving": turned | gaps | moves,
+        "two Tx by their signs": two | turned | gaps | {"multiplexing": "bpm"},
         "sparse": sparse | gaps | {"tx_order": None},
     }
     return {name: dataclasses.replace(plain, name=name, **own) for name, own in kinds.items()}
