@@ -17,7 +17,8 @@ from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
 from rtradar.body import Person
-from rtradar.campaign.spec import DRAWN, RUN_KEYS, Intervals
+from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
+from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.radar import Radar
@@ -96,6 +97,16 @@ DATA_SET_KEYS = {
         ),
         "hop_s": ("step from one interval to the next [s]", "one interval"),
         "end_s": ("time by which the last interval must end [s]", "the end of the recording"),
+        "place": (
+            "`regular`: one every `hop_s`; `random`: anywhere; `strike`: such that a hand or a "
+            "foot is fastest somewhere in the middle half of it",
+            None,
+        ),
+        "count": (
+            "largest number of intervals of a recording that are `random` or round a `strike`; "
+            "they do not overlap",
+            None,
+        ),
     },
     "[each]": {
         "radar": ("list of presets or TOML files", None),
@@ -137,7 +148,7 @@ DATA_SET_KEYS = {
         "subject": ("who moves", "as in `file`, or `unknown`"),
         "licence": ("terms of the recording", "`unknown`"),
         **dict.fromkeys(
-            ("start_s", "duration_s", "hop_s", "end_s"),
+            INTERVAL_KEYS,
             ("in place of that of `[windows]`", "that of `[windows]`"),
         ),
     },

@@ -9,7 +9,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -133,7 +133,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     hide = None if spec.recordings else True
     for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
         motion = read(recorded.path, skeleton=recorded.skeleton)
-        count = len(intervals) + recorded.intervals.count(motion.duration_s)
+        count = len(intervals) + recorded.intervals.most(motion.duration_s)
         check_samples(count, len(spec.combinations))
         intervals += _intervals(spec, recorded, motion)
     run = asdict(spec.run)
@@ -187,14 +187,18 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
             **{key: drawn[key] for key in ("tempo", "amplitude", *_BODY)},
             "seed": seed,
         }
-        for start_s, duration_s in spec.intervals.of(name, take_s):
+        made = partial(_actor_motion, actor.label, motion)
+        for start_s, duration_s in spec.intervals.of(name, take_s, seed, made):
             parameters = {**motion, "start_s": start_s, "duration_s": duration_s}
             yield _Interval(actor.label, parameters, drawn, None)
 
 
 def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Interval]:
     content = digest([path for path in (recorded.path, recorded.skeleton) if path is not None])
-    for start_s, duration_s in recorded.intervals.of(recorded.name, motion.duration_s):
+    places_seed = _seed(spec.run.seed, content)
+    for start_s, duration_s in recorded.intervals.of(
+        recorded.name, motion.duration_s, places_seed, lambda: motion
+    ):
         seed = _seed(spec.run.seed, content, start_s)
         parameters = {
             "recording": recorded.name,
@@ -304,12 +308,7 @@ def make_sample(plan: SamplePlan) -> Made:
     began = time.perf_counter()
     motion, values = plan.motion, plan.parameters
     if motion is None:
-        # The whole take is made, because the path of a walk depends on its length.
-        keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
-        actor = {key: values[key] for key in keys}
-        motion = synthetic_motion(
-            plan.label, seed=values["subject_seed"], duration_s=values["take_s"], **actor
-        )
+        motion = _actor_motion(plan.label, values)
     settings: Any = vars(plan.run_settings())
     people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
     with warnings.catch_warnings(record=True) as caught:
@@ -336,6 +335,15 @@ def make_sample(plan: SamplePlan) -> Made:
         maps["spatial_source"] = clouds.spatial.source[kept]
     sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
     return Made(sample, places[kept], time.perf_counter() - began - warmup_s, maps)
+
+
+def _actor_motion(label: str, values: Mapping[str, Any]) -> Motion:
+    """Make the whole take, because the path of a walk depends on its length."""
+    keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
+    traits: dict[str, Any] = {key: values[key] for key in keys}
+    return synthetic_motion(
+        label, seed=values["subject_seed"], duration_s=values["take_s"], **traits
+    )
 
 
 def _others(others: Sequence[Mapping[str, Any]], settings: Mapping[str, Any]) -> list[Person]:

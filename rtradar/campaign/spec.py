@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rtradar.campaign.intervals import Intervals
 from rtradar.campaign.kept import sizes
 from rtradar.errors import InputError
 from rtradar.process import CLUTTER_REMOVALS, DETECTORS, measured_angles
@@ -15,7 +14,6 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.system.checks import check_number
 
 DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "heading_deg": ((0.0, 0.0), -360.0, 360.0),
@@ -32,9 +30,6 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 MOST_SAMPLES = 1_000_000
 """Largest number of samples of a data set, all of whose plans are in memory."""
 
-INTERVAL_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
-"""Keys of the intervals in files."""
-
 NAMED = {
     "clutter_removal": CLUTTER_REMOVALS,
     "detector": DETECTORS,
@@ -44,74 +39,6 @@ WINDOWS = ("range_window", "doppler_window")
 SWITCHES = ("keep_all", "spreading")
 RUN_KEYS = ("pfa", *NAMED, *WINDOWS, "order", *SWITCHES)
 """Settings of a run that a file may give for all samples."""
-
-_SLACK_S = 1e-6  # by which rounding may shorten a recording
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """Intervals of ``duration_s`` from ``start_s`` on, one every ``hop_s``, all before ``end_s``.
-
-    Without ``duration_s`` there is one interval to the end, without ``hop_s`` a single one, and
-    without ``end_s`` the recording ends them.
-    """
-
-    start_s: float = 0.0
-    duration_s: float | None = None
-    hop_s: float | None = None
-    end_s: float | None = None
-
-    @classmethod
-    def read(cls, where: str, table: Mapping[str, Any]) -> Intervals:
-        """Read the intervals from a table whose keys are known; InputError for invalid values."""
-        least = {"start_s": 0.0, "duration_s": 1e-3, "hop_s": 1e-3, "end_s": 1e-3}
-        given = {
-            key: check_number(where, key, table[key], least[key], 1e5)
-            for key in INTERVAL_KEYS
-            if key in table
-        }
-        found = cls(**given)
-        if found.hop_s is not None and found.duration_s is None:
-            raise InputError(f"{where}: hop_s needs duration_s; give both")
-        needed = found.start_s + (found.duration_s or 1e-3) - _SLACK_S
-        if found.end_s is not None and found.end_s < needed:
-            raise InputError(
-                f"{where}: end_s = {found.end_s:g} leaves no room for one interval "
-                f"from {found.start_s:g} s on"
-            )
-        return found
-
-    @property
-    def needed_s(self) -> float | None:
-        """Length of a recording that all intervals need [s]; None if not known in advance."""
-        if self.end_s is not None:
-            return self.end_s
-        return None if self.duration_s is None else self.start_s + self.duration_s
-
-    def count(self, length_s: float | None = None) -> int:
-        """Count the intervals of a recording of this length [s]; a lower bound for None."""
-        end = length_s if self.end_s is None else self.end_s
-        if self.hop_s is None or self.duration_s is None or end is None:
-            return 1
-        return 1 + math.floor((end - self.start_s - self.duration_s + _SLACK_S) / self.hop_s)
-
-    def of(self, name: str, length_s: float) -> list[tuple[float, float]]:
-        """Return start and duration [s] of each interval of a recording of this length [s].
-
-        InputError if the recording is too short for one.
-        """
-        end = length_s if self.end_s is None else self.end_s
-        needed = self.start_s + (self.duration_s or 1e-3)
-        if max(end, needed) > length_s + _SLACK_S:
-            raise InputError(
-                f"recording '{name}' has {length_s:.6g} s, "
-                f"too short for an interval from {self.start_s:g} to "
-                f"{max(end, needed):.6g} s; shorten it (start_s, duration_s, end_s)"
-            )
-        if self.duration_s is None:
-            return [(self.start_s, round(end - self.start_s, 6))]
-        hop_s, count = self.hop_s or 0.0, self.count(length_s)
-        return [(round(self.start_s + k * hop_s, 6), self.duration_s) for k in range(count)]
 
 
 class Actor(NamedTuple):

@@ -14,11 +14,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.kept import KEPT
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (
     DRAWN,
-    INTERVAL_KEYS,
     MOST_OTHERS,
     NAMED,
     OTHERS,
@@ -27,7 +27,6 @@ from rtradar.campaign.spec import (
     WINDOWS,
     Actor,
     Combination,
-    Intervals,
     Others,
     Recorded,
     Spec,
@@ -144,8 +143,8 @@ def _spec(table: Table, folder: Path) -> Spec:
     assert intervals is not None  # for else there are complaints
     assert run is not None
     takes = sum(len(actor.seeds) for actor in actors)
-    count = takes * intervals.count(intervals.needed_s)
-    count += sum(recorded.intervals.count() for recorded in recordings)
+    count = takes * intervals.most(intervals.needed_s)
+    count += sum(recorded.intervals.most() for recorded in recordings)
     check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
     combinations = _combinations(lists)
     if keep:

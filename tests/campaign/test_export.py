@@ -12,8 +12,9 @@ import xarray as xr
 import zarr
 
 from rtradar.campaign import build_dataset, export_dataset, write_template
+from rtradar.campaign.intervals import INTERVAL_KEYS
 from rtradar.campaign.samples import Made, SamplePlan
-from rtradar.campaign.spec import DRAWN, INTERVAL_KEYS, RUN_KEYS
+from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, read_spec
 from rtradar.cli import main
 from rtradar.clouds import Collection, Sample

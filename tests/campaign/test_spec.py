@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 import time
 import tracemalloc
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rtradar.campaign.intervals import Intervals, strike_times
 from rtradar.campaign.patterns import matching_files
-from rtradar.campaign.spec import Intervals
 from rtradar.campaign.spec_file import _spec, read_spec
 from rtradar.errors import InputError, InputErrors
+from rtradar.motion import synthetic_motion
 
 SMALL = """
 [windows]
@@ -464,6 +467,44 @@ def test_intervals_fill_the_recording(
     windows: Intervals, length_s: float, expected: list[tuple[float, float]]
 ) -> None:
     assert windows.of("walk", length_s) == expected
+
+
+def test_intervals_lie_round_strikes_or_anywhere_and_never_overlap() -> None:
+    actor = synthetic_motion("punch", seed=3, duration_s=8.0)
+    strikes = strike_times(actor)
+    assert 4 <= len(strikes) <= 16  # about one strike, and one recoil of it, a second
+    for place in ("strike", "random"):
+        windows = Intervals(0.5, 1.2, end_s=8.0, place=place, count=4)
+        several = [windows.of("punch", 8.0, seed, lambda: actor) for seed in range(20)]
+        assert several[0] == windows.of("punch", 8.0, 0, lambda: actor) != several[1]
+        for found in several:
+            starts = np.array([start for start, _ in found])
+            assert 1 <= len(starts) <= 4
+            assert np.all(np.diff(starts) >= 1.2)
+            assert starts[0] >= 0.5
+            assert starts[-1] + 1.2 <= 8.0
+            if place == "strike":
+                into = (strikes[:, None] - starts) / 1.2
+                inside = ((into > 0.249) & (into < 0.751)).any(axis=0)
+                assert np.all(inside | (starts == 0.5) | (starts == 6.8))  # or at an end
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ('place = "middle"', "place = 'middle'; allowed: regular, random, strike"),
+        ('place = "random"\ncount = 0', "count = 0; it must be a whole number from 1 to 10000"),
+        ('place = "random"\nhop_s = 1.0', "hop_s has no use where place is 'random'"),
+        ("count = 2", "count has no use where place is 'regular'"),
+    ],
+)
+def test_a_place_of_windows_that_is_not_possible_is_refused(
+    tmp_path: Path, more: str, why: str
+) -> None:
+    text = f"[windows]\nduration_s = 1.0\n{more}\n[[synthetic]]\nlabel = 'walk'\ncount = 1\n"
+    (tmp_path / "set.toml").write_text(text)
+    with pytest.raises(InputError, match=re.escape(why)):
+        read_spec(tmp_path / "set.toml")
 
 
 @pytest.mark.parametrize(

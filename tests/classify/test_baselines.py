@@ -11,6 +11,7 @@ import pytest
 
 from rtradar.classify.baselines import (
     BASELINES,
+    axis_features,
     evaluate_baselines,
     metadata_features,
     rdt_features,
@@ -53,6 +54,21 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
     # deviations.
     assert mean["random forest, metadata alone"] < 0.6
     assert mean["random forest, spatial cloud"] < 0.6
+
+
+def test_one_axis_alone_tells_only_what_it_shows(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=4)
+    points = clouds.points(0)
+    for axis in range(3):
+        features = axis_features(clouds, axis)
+        assert features.shape == (len(clouds), 17)
+        assert np.all(np.diff(features) >= 0)
+        moved = points + np.array([0.3, 5.0, 0.7])
+        clouds.points = [points, moved, points[:0], *[points] * len(clouds)].__getitem__
+        change = axis_features(clouds, axis)
+        assert change[1] - change[0] == pytest.approx([0.3, 0.0, 0.7][axis])
+        assert not change[2].any()
+        clouds = made_up(per_class=4)
 
 
 def test_other_clouds_are_refused(made_up: Callable[..., Any]) -> None:

@@ -1,0 +1,166 @@
+"""Intervals of recordings and takes: at equal steps, at random, or round the strikes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.motion import Motion
+from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.system.checks import brief, check_number
+from rtradar.system.seeds import stream
+
+_NUMBERS = {"start_s": 0.0, "duration_s": 1e-3, "hop_s": 1e-3, "end_s": 1e-3}
+INTERVAL_KEYS = (*_NUMBERS, "place", "count")
+"""Keys of the intervals in files."""
+
+PLACES = ("regular", "random", "strike")
+"""Ways of placing intervals in a recording."""
+
+_SLACK_S = 1e-6  # by which rounding may shorten a recording
+_PLACES_STREAM = 4  # differs from the random streams of what else a seed draws
+_STEP_S, _SMOOTHING_S = 1 / 60, 0.04  # of the speeds in which strikes are sought
+_LEAST_STRIKE = 0.5  # of the fastest one
+_MIDDLE = (0.25, 0.75)  # part of an interval in which its strike lies
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Intervals of ``duration_s`` from ``start_s`` on, one every ``hop_s``, all before ``end_s``.
+
+    Without ``duration_s`` there is one interval to the end, without ``hop_s`` a single one, and
+    without ``end_s`` the recording ends them. Where ``place`` is ``random`` or ``strike``, there
+    are at most ``count`` intervals, which do not overlap: anywhere, or with an instant at which a
+    hand or a foot is fastest somewhere in their middle half. Then the time at which a movement
+    begins does not give its kind away.
+    """
+
+    start_s: float = 0.0
+    duration_s: float | None = None
+    hop_s: float | None = None
+    end_s: float | None = None
+    place: str = "regular"
+    count: int = 1
+
+    @classmethod
+    def read(cls, where: str, table: Mapping[str, Any]) -> Intervals:
+        """Read the intervals from a table whose keys are known; InputError for invalid values."""
+        given: dict[str, Any] = {
+            key: check_number(where, key, table[key], least, 1e5)
+            for key, least in _NUMBERS.items()
+            if key in table
+        }
+        given |= {key: table[key] for key in ("place", "count") if key in table}
+        found = cls(**given)
+        if found.place not in PLACES:
+            raise InputError(f"{where}: place = {brief(found.place)}; allowed: {', '.join(PLACES)}")
+        count = found.count
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10_000:
+            raise InputError(
+                f"{where}: count = {brief(count)}; it must be a whole number from 1 to 10000"
+            )
+        unfit = ("hop_s",) if found.place != "regular" else ("count",)
+        if wrong := [key for key in unfit if key in table]:
+            raise InputError(f"{where}: {wrong[0]} has no use where place is '{found.place}'")
+        if found.duration_s is None and (found.hop_s is not None or found.place != "regular"):
+            key = "hop_s" if found.hop_s is not None else f"place = '{found.place}'"
+            raise InputError(f"{where}: {key} needs duration_s; give both")
+        needed = found.start_s + (found.duration_s or 1e-3) - _SLACK_S
+        if found.end_s is not None and found.end_s < needed:
+            raise InputError(
+                f"{where}: end_s = {found.end_s:g} leaves no room for one interval "
+                f"from {found.start_s:g} s on"
+            )
+        return found
+
+    @property
+    def needed_s(self) -> float | None:
+        """Length of a recording that all intervals need [s]; None if not known in advance."""
+        if self.end_s is not None:
+            return self.end_s
+        return None if self.duration_s is None else self.start_s + self.duration_s
+
+    def most(self, length_s: float | None = None) -> int:
+        """Return the largest number of intervals of a recording of this length [s].
+
+        Without a length it is a lower bound.
+        """
+        if self.place != "regular":
+            return self.count
+        end = length_s if self.end_s is None else self.end_s
+        if self.hop_s is None or self.duration_s is None or end is None:
+            return 1
+        return 1 + math.floor((end - self.start_s - self.duration_s + _SLACK_S) / self.hop_s)
+
+    def of(
+        self, name: str, length_s: float, seed: int = 0, motion: Callable[[], Motion] | None = None
+    ) -> list[tuple[float, float]]:
+        """Return start and duration [s] of each interval of a recording of this length [s].
+
+        ``seed`` is that of their places, and ``motion`` makes what strikes are sought in. An
+        InputError is raised if the recording is too short for one interval.
+        """
+        end = length_s if self.end_s is None else self.end_s
+        needed = self.start_s + (self.duration_s or 1e-3)
+        if max(end, needed) > length_s + _SLACK_S:
+            raise InputError(
+                f"recording '{name}' has {length_s:.6g} s, "
+                f"too short for an interval from {self.start_s:g} to "
+                f"{max(end, needed):.6g} s; shorten it (start_s, duration_s, end_s)"
+            )
+        if self.duration_s is None:
+            return [(self.start_s, round(end - self.start_s, 6))]
+        if self.place == "regular":
+            hop_s, count = self.hop_s or 0.0, self.most(length_s)
+            starts = [self.start_s + k * hop_s for k in range(count)]
+        else:
+            random = np.random.default_rng(stream(seed, _PLACES_STREAM))
+            strikes = strike_times(motion()) if self.place == "strike" and motion else None
+            starts = self._drawn(end, random, strikes)
+        return [(round(start, 6), self.duration_s) for start in starts]
+
+    def _drawn(
+        self, end: float, random: np.random.Generator, strikes: NDArray[np.float64] | None
+    ) -> list[float]:
+        """Draw starts of intervals that do not overlap, ascending."""
+        assert self.duration_s is not None  # as was checked
+        last = max(end - self.duration_s, self.start_s)
+        if strikes is None:
+            # As many equal parts as there are intervals, one anywhere in each of them.
+            count = max(1, min(self.count, int((end - self.start_s) / self.duration_s)))
+            free = (last + self.duration_s - self.start_s) / count - self.duration_s
+            slots = self.start_s + np.arange(count) * (free + self.duration_s)
+            return sorted(np.minimum(slots + max(free, 0.0) * random.random(count), last).tolist())
+        inside = strikes[(strikes >= self.start_s) & (strikes <= end)]
+        wanted = random.permutation(inside) - self.duration_s * random.uniform(
+            *_MIDDLE, size=len(inside)
+        )
+        starts: list[float] = []
+        for start in np.clip(wanted, self.start_s, last).tolist():
+            if all(abs(start - other) >= self.duration_s for other in starts):
+                starts.append(start)
+        return sorted(starts[: self.count]) or self._drawn(end, random, None)
+
+
+def strike_times(motion: Motion) -> NDArray[np.float64]:
+    """Return the times [s] at which a hand or a foot is fastest relative to the hips, (strike,).
+
+    They are the maxima of the largest of the four speeds that reach at least half of the greatest.
+    """
+    from scipy.ndimage import gaussian_filter1d
+    from scipy.signal import find_peaks
+
+    nodes = to_nodes(motion)
+    times = np.arange(0.0, nodes.duration_s, _STEP_S)
+    positions = nodes.at(times)[0]
+    limbs = [NODES.index(f"{side}_{end}") for side in "lr" for end in ("wrist", "ankle")]
+    relative = positions[:, limbs] - positions[:, :1]
+    speeds = np.linalg.norm(np.gradient(relative, _STEP_S, axis=0), axis=2).max(axis=1)
+    speed = gaussian_filter1d(speeds, _SMOOTHING_S / _STEP_S)
+    return np.asarray(times[find_peaks(speed, height=_LEAST_STRIKE * speed.max())[0]])
