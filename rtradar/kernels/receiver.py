@@ -8,7 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from rtradar.kernels.elementary import phasor
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.jit import compiled, inlined
+
+_ONE = np.float32(1)
+_LANES = 32
+"""Receivers of several rows that are filtered side by side, at least."""
+_UNROLLED = 4
+"""Samples that are added to a state at once, for the state is stored every time."""
 
 
 @compiled(fastmath={"contract"})
@@ -61,42 +67,60 @@ def high_pass(corners, out):
     """Apply high-pass filters of first order to ``out (row, rx, sample)``, one after the other.
 
     ``corners (filter,)`` float32 are pi f_c / Fs (bilinear transform, right at low frequencies).
-    Before the first sample come those after it, mirrored, until the filter has settled. All
-    receivers of a row go side by side, in vector lanes.
+    Before the first sample come those after it, mirrored, until the filter has settled. Receivers
+    and rows go side by side, in vector lanes.
     """
-    n_rx, n_samples, one = out.shape[1], out.shape[2], np.float32(1)
-    lanes = np.empty((n_samples, 2 * n_rx), np.float32)
-    state = np.empty(2 * n_rx, np.float32)
-    for row in range(len(out)):
-        samples = out[row]
-        for receiver in range(n_rx):
-            for i in range(n_samples):
-                lanes[i, 2 * receiver] = samples[receiver, i].real
-                lanes[i, 2 * receiver + 1] = samples[receiver, i].imag
-        for corner in corners:
-            kept, passed = (one - corner) / (one + corner), one / (one + corner)
-            # The filter settles within some of its time constants, 1 / (2 corner) samples each.
-            ahead = min(n_samples - 1, int(np.float32(4) / corner) + 1)
-            # A slower one has taken away the mean, and nothing else.
+    n_rx, n_samples = out.shape[1:]
+    padded = -(-n_samples // _UNROLLED) * _UNROLLED
+    together = max(1, _LANES // n_rx)
+    n_lanes = 2 * n_rx * together
+    lanes = np.zeros((padded, n_lanes), np.float32)
+    pairs, state = lanes.view(np.complex64), np.empty(n_lanes, np.float32)
+    weights = np.zeros((len(corners), padded), np.float32)
+    for number, corner in enumerate(corners):
+        _settle(corner, n_samples, weights[number])
+    for first in range(0, len(out), together):
+        rows = out[first : first + together]
+        for row in range(len(rows)):
+            for receiver in range(n_rx):
+                for i in range(n_samples):
+                    pairs[i, row * n_rx + receiver] = rows[row, receiver, i]
+        for number, corner in enumerate(corners):
+            kept, passed = (_ONE - corner) / (_ONE + corner), _ONE / (_ONE + corner)
+            weight = weights[number]
             state[:] = 0
-            for i in range(ahead + 1):
-                for lane in range(2 * n_rx):
-                    state[lane] -= lanes[i, lane]
-            for lane in range(2 * n_rx):
-                filtered = state[lane] / np.float32(ahead + 1) + lanes[ahead, lane]
-                state[lane] = kept * filtered - passed * lanes[ahead, lane]
-            for i in range(ahead - 1, 0, -1):
-                for lane in range(2 * n_rx):
-                    new = passed * lanes[i, lane]
-                    state[lane] = kept * (new + state[lane]) - new
+            for i in range(0, padded, _UNROLLED):
+                for lane in range(n_lanes):
+                    pair = weight[i] * lanes[i, lane] + weight[i + 1] * lanes[i + 1, lane]
+                    next_pair = (
+                        weight[i + 2] * lanes[i + 2, lane] + weight[i + 3] * lanes[i + 3, lane]
+                    )
+                    state[lane] += pair + next_pair
             for i in range(n_samples):
-                for lane in range(2 * n_rx):
+                for lane in range(n_lanes):
                     new = passed * lanes[i, lane]
                     filtered = new + state[lane]
                     lanes[i, lane], state[lane] = filtered, kept * filtered - new
-        for receiver in range(n_rx):
-            for i in range(n_samples):
-                samples[receiver, i] = complex(lanes[i, 2 * receiver], lanes[i, 2 * receiver + 1])
+        for row in range(len(rows)):
+            for receiver in range(n_rx):
+                for i in range(n_samples):
+                    rows[row, receiver, i] = pairs[i, row * n_rx + receiver]
+
+
+@inlined()
+def _settle(corner, n_samples, weight):
+    """Set the weights of samples in the state of a filter that has settled on them, mirrored."""
+    kept, passed = (1 - float(corner)) / (1 + float(corner)), 1 / (1 + float(corner))
+    # The filter settles within some of its time constants, 1 / (2 corner) samples each.
+    ahead = min(n_samples - 1, int(np.float32(4) / corner) + 1)
+    left = 1.0
+    for i in range(1, ahead):
+        weight[i] = passed * (kept - 1) * left
+        left *= kept
+    weight[ahead] = (kept - passed) * left
+    # A slower one has taken away the mean, and nothing else.
+    for i in range(ahead + 1):
+        weight[i] -= kept * left / (ahead + 1)
 
 
 def high_pass_reference(corners, given):
