@@ -35,8 +35,14 @@ _STREAM = 7
 _TOLERANCE = 0.02
 """Error of the interpolation over delays, as a fraction of the noise's amplitude: 0.2 dB."""
 
-_CYCLES_AT_ONCE = 16
+_CYCLES_AT_ONCE = 8
 """Cycles of one task of a thread, because a return to Python waits for the other threads there."""
+
+_CYCLES_A_SEED = 16
+"""Cycles whose random streams come from one seed, which takes longer to make than their noise."""
+
+_LANES = 16
+"""Most rows that an FFT takes at once, in vector lanes."""
 
 _MOST_RAD = 0.3
 """Largest deviation of a phase whose square is left out."""
@@ -66,7 +72,7 @@ class PhaseNoise:
         n, rate = radar.samples_per_chirp, radar.sample_rate_hz
         self._frequency: _Array = np.arange(n // 2 + 1, dtype=np.float64) * (rate / n)
         self._density = density_of(receiver, self._frequency)
-        self._scale = np.sqrt(n * rate * self._density / 2)
+        self._scale = np.sqrt(n * rate * self._density / 2).astype(np.float32)
         self._still = still
         longest = max((one.length.max() for one in still if one.length.size), default=0.0)
         self._longest_s = longest / SPEED_OF_LIGHT_MPS
@@ -127,31 +133,44 @@ class PhaseNoise:
         the nodes.
         """
         radar, n = self._radar, self._radar.samples_per_chirp
-        out = np.empty((len(moving_s), 1 + len(self._nodes_s), n), np.float32)
+        n_tx, n_nodes = radar.n_tx, len(self._nodes_s)
+        out = np.empty((len(moving_s) // n_tx, n_tx, 1 + n_nodes, n), np.float32)
         half_turn = (np.pi * self._frequency).astype(np.float32)
         at_nodes = _residue(half_turn * self._nodes_s[:, None].astype(np.float32))
-        scale = self._scale.astype(np.float32)
-
-        def fill_cycle(begin: int, filters: NDArray[np.complex64]) -> None:
-            bits = np.random.SFC64(stream(self._seed, (first + begin) // radar.n_tx, _STREAM))
-            random = np.zeros((self._rows, 1, len(half_turn)), np.complex64)
-            state = np.asarray(bits.state["state"]["state"])
-            add_noise(state[None], self._rows, np.float32(1), random)
-            own = slice(begin, begin + radar.n_tx)
-            filters[0] = _residue(half_turn * np.float32(moving_s[own].mean())) * scale
-            # Cycle by cycle, for the FFT of other numbers of rows may round otherwise. Tx that
-            # transmit at once have one oscillator.
-            out[own] = scipy.fft.irfft(random * filters, n, axis=-1)
+        of_moving = moving_s.reshape(-1, n_tx).mean(axis=1).astype(np.float32)
+        states = self._states(first // n_tx, len(out))
 
         def fill(begin: int) -> None:
-            filters = np.empty((1 + len(at_nodes), len(half_turn)), np.complex64)
-            filters[1:] = at_nodes * scale
-            for cycle in range(begin, min(begin + at_once, len(out)), radar.n_tx):
-                fill_cycle(cycle, filters)
+            own = slice(begin, begin + _CYCLES_AT_ONCE)
+            cycles, bins = len(out[own]), len(half_turn)
+            filters = np.empty((cycles, 1, 1 + n_nodes, bins), np.complex64)
+            filters[:, 0, 0] = _residue(of_moving[own, None] * half_turn)
+            filters[:, 0, 1:] = at_nodes
+            random = np.zeros((cycles * self._rows, 1, bins), np.complex64)
+            add_noise(states[own], self._rows, np.float32(1), random)
+            random *= self._scale
+            # Rows go through the FFT in vector lanes; those left over may round otherwise.
+            count = len(random) * (1 + n_nodes)
+            spectra = np.zeros((-(-count // _LANES) * _LANES, bins), np.complex64)
+            product = spectra[:count].reshape(cycles, self._rows, 1 + n_nodes, bins)
+            np.multiply(random.reshape(cycles, -1, 1, bins), filters, out=product)
+            phases = scipy.fft.irfft(spectra, n, axis=-1)[:count]
+            # Tx that transmit at once have one oscillator.
+            out[own] = phases.reshape(*product.shape[:3], n)
 
-        at_once = _CYCLES_AT_ONCE * radar.n_tx
-        thread_map(fill, range(0, len(out), at_once))
-        return out
+        thread_map(fill, range(0, len(out), _CYCLES_AT_ONCE))
+        return out.reshape(len(moving_s), 1 + n_nodes, n)
+
+    def _states(self, first: int, count: int) -> NDArray[np.uint64]:
+        """States (cycle, 4) of the random bits of some cycles, from a seed for each few of them."""
+        groups = range(first // _CYCLES_A_SEED, (first + count - 1) // _CYCLES_A_SEED + 1)
+        seeds = [
+            stream(self._seed, group, _STREAM).generate_state(3 * _CYCLES_A_SEED, np.uint64)
+            for group in groups
+        ]
+        # Of SFC64 three words are random, and the last counts.
+        words = np.reshape(seeds, (-1, 3))[first - groups.start * _CYCLES_A_SEED :][:count]
+        return np.insert(words, 3, 1, axis=1)
 
 
 def _residue(half: NDArray[np.float32]) -> NDArray[np.complex64]:

@@ -116,6 +116,9 @@ def test_seeds_make_other_phase_noise_and_other_channels() -> None:
     its = radar(**FULL)
     ours, other = (received(stage(its, seed=seed), its, 0, 4) for seed in (0, 1))
     assert (ours != other).any()
+    phases = stage(its).phases(one_echo(its, 0, 80), 0)
+    assert phases is not None
+    assert len(np.unique(phases[:, 0, 0])) == 80  # no cycle repeats another
     channels = [radar(channel_phase_deg=5.0, seed=seed) for seed in (0, 1)]
     ours, other = (received(stage(its), its, 0, 4) for its in channels)
     assert (ours != other).any()
