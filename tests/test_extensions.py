@@ -81,9 +81,10 @@ def forget() -> None:
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
-    path = tmp_path_factory.mktemp("recording") / "walk.npz"
+    path = tmp_path_factory.mktemp("recording") / "walk.angles"
     fields = ("joints", "parents", "offsets", "root_positions", "rotations", "rate_hz")
-    np.savez(path, **{field: np.asarray(getattr(motion, field)) for field in fields})
+    with path.open("wb") as file:
+        np.savez(file, **{field: np.asarray(getattr(motion, field)) for field in fields})
     return path
 
 
@@ -124,7 +125,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
         ),
         ("--radar", "rough", "radhar, mars, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, ti-oob, threshold"),
-        (None, "walk.rough", ".amc, .bvh, .c3d, .npz"),
+        (None, "walk.rough", ".amc, .bvh, .c3d, .npz, .angles"),
     ],
 )
 def test_an_unknown_name_is_answered_with_all_that_there_are(
@@ -189,7 +190,7 @@ def test_a_broken_package_is_one_line(
 PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     # The name, the function, and the words that ask for it.
     "model": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
-    "reader": ("npz", "read(path)", ()),
+    "reader": ("angles", "read(path)", ()),
     "radar": ("lane-60ghz", "lane()", USED[2:4]),
     "detector": (
         "threshold",

@@ -31,6 +31,7 @@ READERS = Registry(
         "amc": "rtradar.motion.formats.acclaim:load_amc",
         "bvh": "rtradar.motion.formats.bvh:load_bvh",
         "c3d": "rtradar.motion.formats.c3d:load_c3d",
+        "npz": "rtradar.motion.formats.joints:load_npz",
     },
 )
 """Readers of motion files, by the ending of the file without the dot."""

@@ -134,7 +134,7 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
     )
     frames = {"thorax": thorax}
     for name, end in (("pelvis", "WT"), ("head", "HD")):
-        frames[name] = _level(
+        frames[name] = level_axes(
             middle(f"LF{end}", f"LB{end}") - middle(f"RF{end}", f"RB{end}"),
             middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
         )
@@ -184,7 +184,7 @@ def _axes(*, up: Array, forward: Array) -> Array:
     return np.stack([np.cross(y, z), y, z], axis=2)
 
 
-def _level(left: Array, forward: Array) -> Array:
+def level_axes(left: Array, forward: Array) -> Array:
     """Axes with this left, and forward as near to ``forward`` as that allows."""
     y = _unit(left)
     z = _unit(np.cross(forward, y))
