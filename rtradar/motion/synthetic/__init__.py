@@ -25,6 +25,7 @@ from rtradar.motion.synthetic.figure import (
     rotations,
 )
 from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.gait_styles import GAITS
 from rtradar.motion.synthetic.jacks import jumping_jack
 from rtradar.motion.synthetic.stance import stand
 from rtradar.system.row_files import FileBackedRows, in_blocks
@@ -44,7 +45,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
 }
 """Activities of the actors, by name."""
 
-STYLES: Mapping[str, tuple[str, ...]] = {}
+STYLES: Mapping[str, tuple[str, ...]] = {"walk": tuple(GAITS)}
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 
 

@@ -12,7 +12,6 @@ above the sole.
 
 from __future__ import annotations
 
-import math
 import operator
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -76,21 +75,6 @@ class Subject:
     def other(self) -> str:
         """The side that does not act."""
         return "r" if self.side == "l" else "l"
-
-    @property
-    def cycle_s(self) -> float:
-        """Duration of two steps [s], 1.1 s at 1.75 m; it grows with the root of the height."""
-        return 1.1 * math.sqrt(self.height_m / 1.75) / self.tempo
-
-    @property
-    def step_m(self) -> float:
-        """One step of a walk [m]."""
-        return 0.375 * self.height_m * self.amplitude
-
-    @property
-    def track_m(self) -> float:
-        """Distance of the footprints from the middle line [m]."""
-        return 0.038 * self.height_m
 
 
 def draw_subject(

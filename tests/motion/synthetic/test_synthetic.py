@@ -9,6 +9,7 @@ from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
 from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton import NODES
+from rtradar.motion.synthetic import STYLES
 from rtradar.motion.synthetic.figure import (
     ANKLE,
     HEEL_X,
@@ -31,7 +32,12 @@ def speeds(motion: Motion, node: str) -> np.ndarray:
 
 subjects = st.fixed_dictionaries(
     {
-        "activity": st.sampled_from(list(ACTIVITIES)),
+        "activity": st.sampled_from(
+            [
+                *ACTIVITIES,
+                *(f"{activity},style={style}" for activity in STYLES for style in STYLES[activity]),
+            ]
+        ),
         "seed": st.integers(0, 1000),
         "duration_s": st.floats(0.5, 9.0),
         "height_m": st.floats(1.2, 2.1),
@@ -112,6 +118,36 @@ def test_walk_looks_like_walking(seed: int) -> None:
     leg = motion.positions[:, NODE("l_ankle"), 0] - root[:, 0]
     arm = motion.positions[:, NODE("l_wrist"), 0] - root[:, 0]
     assert np.corrcoef(leg, arm)[0, 1] < -0.6
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_lame_side_of_gaits(side: str) -> None:
+    """What each gait is known by happens on the lame side, and not on the other."""
+    lame, sound = ("l", "r") if side == "left" else ("r", "l")
+
+    def gait(style: str) -> dict[str, np.ndarray]:
+        motion = synthetic_motion("walk", 1, style=style, side=side, duration_s=6.0)
+        nodes = {node: motion.positions[:, NODE(node)] for node in NODES}
+        # Toward the radar is -x, and the left then -y.
+        return {node: places * [-1, -1, 1] for node, places in nodes.items()}
+
+    def ahead(nodes: dict[str, np.ndarray], one: str, other: str) -> np.ndarray:
+        return nodes[f"{one}_ankle"][:, 0] - nodes[f"{other}_ankle"][:, 0]
+
+    limps = gait("antalgic")
+    assert ahead(limps, lame, sound).max() < 0.6 * ahead(limps, sound, lame).max()
+    stiff = gait("stiff_legged")
+    outward = {one: np.abs(stiff[f"{one}_ankle"][:, 1] - stiff["root"][:, 1]).max() for one in "lr"}
+    assert outward[lame] > outward[sound] + 0.1
+    steppage = gait("steppage")
+    assert steppage[f"{lame}_knee"][:, 2].max() > steppage[f"{sound}_knee"][:, 2].max() + 0.06
+    lurches = gait("lurch")
+    back = lurches["root"][:, 0] - lurches["thorax"][:, 0]
+    landing = ahead(lurches, lame, sound) > 0.9 * ahead(lurches, lame, sound).max()
+    assert back[landing].mean() > back[~landing].mean() + 0.03
+    drops = gait("trendelenburg")
+    other_hip_up = drops[f"{sound}_hip"][:, 2] - drops[f"{lame}_hip"][:, 2]
+    assert -other_hip_up.min() > other_hip_up.max() + 0.005
 
 
 def test_long_walk_turns_round() -> None:
