@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene import Scene
+from rtradar.scene import Furniture, Object, Scene
 
 Array = NDArray[np.float64]
 
@@ -60,37 +61,67 @@ class BodyInRadarAxes(Body):
         return np.asarray(np.einsum("tji,tvj->tvi", axes, vertices) + self._centre)
 
 
+@dataclass(frozen=True)
+class _FurnitureInRadarAxes(Furniture):
+    """Furniture whose own axes have any directions in those of a radar."""
+
+    turned: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def axes(self) -> Array:
+        """Rotation (3, 3) from the mesh's own axes to those of the radar."""
+        return np.array(self.turned)
+
+
+class _ObjectInRadarAxes(Object):
+    """An object that moves, as a radar sees it about a ``centre`` (3,) [m]."""
+
+    _seen: Object
+    _pose: _Pose
+    _centre: Array
+
+    @classmethod
+    def of(cls, moving: Object, pose: _Pose, centre: Array) -> Object:
+        """Return the object as it is seen from these poses; its mesh is read once."""
+        made = cls.__new__(cls)
+        known = {"shape": moving.shape, "_seen": moving, "_pose": pose, "_centre": centre}
+        vars(made).update(vars(moving) | known)
+        return made
+
+    def pose(self, times: ArrayLike) -> tuple[Array, Array]:
+        """Compute the pose in the axes of the radar; see `Object.pose`."""
+        rotation, place = self._seen.pose(times)
+        axes, origin = self._pose(np.atleast_1d(np.asarray(times, np.float64)))
+        seen = np.einsum("tji,tj->ti", axes, place - origin) + self._centre
+        return np.einsum("tji,tjk->tik", axes, rotation), seen
+
+
 def in_radar_axes(radar: Radar, body: Body, scene: Scene) -> tuple[Radar, Body, Scene]:
     """Give a radar that is upright, and a body and a scene as the given radar sees them.
 
-    All three are themselves where the radar is upright. An `InputError` is raised where something
-    in the scene cannot be seen in other axes.
+    All three are themselves where the radar is upright. An `InputError` is raised where a radar
+    that moves cannot be simulated in the scene.
     """
     if not (radar.is_turned or radar.is_moving):
         return radar, body, scene
-    if radar.is_moving and not scene.is_empty:
+    if radar.is_moving and (scene.walls or scene.furniture):
         raise InputError(
-            f"scene '{scene.name}': radar '{radar.name}' moves, which is simulated in free space "
-            "only; leave path_times_s out, or the scene"
+            f"scene '{scene.name}': radar '{radar.name}' moves, which is simulated without walls "
+            "and furniture only; leave path_times_s out, or the scene"
         )
     still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
     upright = dataclasses.replace(radar, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0, **still)
-    seen = BodyInRadarAxes(body, radar.poses_at, np.array(radar.position_m))
-    return upright, seen, _turned(scene, radar)
+    centre = np.array(radar.position_m)
+    seen = BodyInRadarAxes(body, radar.poses_at, centre)
+    return upright, seen, _seen_by(radar, scene, radar.axes, centre)
 
 
-def _turned(scene: Scene, radar: Radar) -> Scene:
-    centre, axes = np.array(radar.position_m), radar.axes
-    tilted = radar.pitch_deg != 0 or radar.roll_deg != 0
-    if scene.objects or (scene.furniture and tilted):
-        what = "objects that move" if scene.objects else "furniture and pitch_deg or roll_deg"
-        raise InputError(
-            f"scene '{scene.name}': a radar that is turned is not simulated with {what}; leave "
-            "them out, or the turn"
-        )
+def _seen_by(radar: Radar, scene: Scene, axes: Array, origin: Array) -> Scene:
+    """A scene in the axes (3, 3) of a radar that is at an origin, which is its position then."""
+    centre = np.array(radar.position_m)
 
     def place(point: ArrayLike) -> tuple[float, float, float]:
-        x, y, z = ((np.asarray(point) - centre) @ axes + centre).tolist()
+        x, y, z = ((np.asarray(point) - origin) @ axes + centre).tolist()
         return x, y, z
 
     def along(vector: ArrayLike) -> tuple[float, float, float]:
@@ -107,14 +138,16 @@ def _turned(scene: Scene, radar: Radar) -> Scene:
         for wall in scene.walls
     )
     furniture = tuple(
-        dataclasses.replace(
-            piece, position_m=place(piece.position_m), yaw_deg=_degrees(piece.yaw_deg, radar)
+        _FurnitureInRadarAxes(
+            **{field.name: getattr(piece, field.name) for field in dataclasses.fields(piece)}
+            | {
+                "position_m": place(piece.position_m),
+                "turned": tuple(map(tuple, (axes.T @ piece.axes).tolist())),
+            }
         )
         for piece in scene.furniture
     )
-    return dataclasses.replace(scene, walls=walls, furniture=furniture)
-
-
-def _degrees(yaw_deg: float, radar: Radar) -> float:
-    """Yaw in the radar's axes, from -180 to 180 degrees."""
-    return (yaw_deg - radar.yaw_deg + 180) % 360 - 180
+    objects = tuple(
+        _ObjectInRadarAxes.of(moving, radar.poses_at, centre) for moving in scene.objects
+    )
+    return dataclasses.replace(scene, walls=walls, furniture=furniture, objects=objects)

@@ -344,7 +344,7 @@ class Object(Furniture):
         """
         at = np.atleast_1d(np.asarray(times, dtype=np.float64))
         rotation, shift = (self.motion or RigidMotion()).pose(at)
-        return self.yaw @ rotation, np.array(self.position_m) + shift
+        return self.axes @ rotation, np.array(self.position_m) + shift
 
     def triangles(self, time_s: float = 0.0) -> Triangles:
         """Return the mesh where it is at a time since the start of the capture [s].

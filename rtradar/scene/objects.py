@@ -380,7 +380,7 @@ class Furniture:
         return shipped_folder("meshes") / f"{self.mesh}.ply" if self._built_in else Path(self.mesh)
 
     @property
-    def yaw(self) -> NDArray[np.float64]:
+    def axes(self) -> NDArray[np.float64]:
         """Rotation (3, 3) about the vertical from the mesh's own axes to the world's."""
         cosine, sine = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
         return np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
@@ -400,7 +400,7 @@ class Furniture:
             impossible size.
         """
         own = self._own_triangles()
-        vertices = own.vertices @ self.yaw.T + np.array(self.position_m)
+        vertices = own.vertices @ self.axes.T + np.array(self.position_m)
         vertices.setflags(write=False)
         return Triangles(vertices, own.faces, own.closed)
 

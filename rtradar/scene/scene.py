@@ -125,7 +125,12 @@ class Scene:
         for key, kind in (("walls", Wall), ("furniture", Furniture), ("objects", Object)):
             given = getattr(self, key)
             pieces = tuple(given) if isinstance(given, Iterable) else ()
-            if not isinstance(given, Iterable) or not all(type(piece) is kind for piece in pieces):
+            # An object is a piece of furniture that moves, and has a list of its own.
+            fits = [
+                isinstance(piece, kind) and isinstance(piece, Object) == (kind is Object)
+                for piece in pieces
+            ]
+            if not isinstance(given, Iterable) or not all(fits):
                 raise InputError(f"{where}: {key} must be a tuple of {kind.__name__}")
             names = [piece.name for piece in pieces]
             twice = sorted({name for name in names if names.count(name) > 1})

@@ -141,7 +141,7 @@ def faces_of(piece: Furniture) -> Iterator[SolidFace]:
     found.sort(key=lambda own: -own["fraction"] * own.pop("area"))
     count = Counter[str]()
     for own in found:
-        looks = piece.yaw.T @ np.cross(own["edge_u_m"], own["edge_v_m"])
+        looks = piece.axes.T @ np.cross(own["edge_u_m"], own["edge_v_m"])
         axis = int(np.abs(looks).argmax())
         side = _SIDES[axis][int(looks[axis] < 0)]
         count[side] += 1

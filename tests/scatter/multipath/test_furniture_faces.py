@@ -26,7 +26,7 @@ def test_a_turned_block_has_six_faces_where_its_sides_are(tmp_path: Path) -> Non
     size, yaw, place = np.array([0.4, 1.0, 2.0]), 30.0, np.array([1.0, 2.0, 1.0])
     piece = block(tmp_path, tuple(size), yaw_deg=yaw, position_m=tuple(place))
     faces = {face.name: face for face in faces_of(piece)}
-    turn = piece.yaw
+    turn = piece.axes
     for axis, (plus, minus) in enumerate((("front", "back"), ("left", "right"), ("top", "bottom"))):
         for sign, side in ((1, plus), (-1, minus)):
             face = faces.pop(f"block {side}")
