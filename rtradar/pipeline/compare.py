@@ -189,22 +189,15 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
     power = _total_db(result) - _total_db(reference)
-    maps, overlap, spectrogram = map_agreement(_maps_of(result), _maps_of(reference))
-    bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     hidden = _budget(result).hidden_at
     of_parts = hidden.mean(axis=0).tolist()
     return {
         "power_mean_db": _finite(float(power.mean())),
         "power_rms_db": _finite(float(np.sqrt((power**2).mean()))),
         "hidden_share": float(hidden.mean()),
-        "range_doppler_correlation": _finite(maps.correlation),
-        "range_doppler_mean_db": _finite(maps.mean_db),
-        "range_doppler_rms_db": _finite(maps.rms_db),
+        **map_figures(_maps_of(result), _maps_of(reference)),
         "detections": summary["detections"],
-        "detection_overlap": overlap,
-        "spectrogram_correlation": _finite(spectrogram.correlation),
-        "spectrogram_rms_db": _finite(spectrogram.rms_db),
-        "rdt_chamfer_bins": _finite(chamfer(result.points, reference.points, bins)),
+        "rdt_chamfer_bins": chamfer_bins(result.points, reference.points, radar),
         "scatter_s": stages["scatter"] + stages["survey"],
         "wall_s": summary["wall_s"],
         **{
@@ -333,9 +326,15 @@ def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: A
     return float(there.mean() + back.mean()) / 2
 
 
-def map_agreement(
-    ours: Path, reference: Path, *, gain: bool = False
-) -> tuple[LevelAgreement, float, LevelAgreement]:
+def chamfer_bins(
+    points: NDArray[np.float64], reference: NDArray[np.float64], radar: Radar
+) -> float | None:
+    """Compute the Chamfer distance of range-Doppler-time clouds [bins]; None if it is infinite."""
+    bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
+    return _finite(chamfer(points, reference, bins))
+
+
+def map_figures(ours: Path, reference: Path, *, gain: bool = False) -> dict[str, float | None]:
     """Compare range-Doppler maps over cells that either detects, detections, and spectrograms.
 
     Of captures of other lengths the frames at the start count. With a ``gain`` between both, root
@@ -356,12 +355,19 @@ def map_agreement(
             for maps in (first, second)
         )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
-        if gain:
-            levels, alike = (
-                one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
-                for one in (levels, alike)
-            )
-        return levels, both / either if either else 1.0, alike
+    if gain:
+        levels, alike = (
+            one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
+            for one in (levels, alike)
+        )
+    return {
+        "range_doppler_correlation": _finite(levels.correlation),
+        "range_doppler_mean_db": _finite(levels.mean_db),
+        "range_doppler_rms_db": _finite(levels.rms_db),
+        "detection_overlap": both / either if either else 1.0,
+        "spectrogram_correlation": _finite(alike.correlation),
+        "spectrogram_rms_db": _finite(alike.rms_db),
+    }
 
 
 def _total_db(result: Result) -> NDArray[np.float64]:

@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.pipeline.compare import MEASURES, Comparison, chamfer, comparison_rows, map_agreement
+from rtradar.pipeline.compare import (
+    MEASURES,
+    Comparison,
+    chamfer_bins,
+    comparison_rows,
+    map_figures,
+)
 from rtradar.pipeline.output.writer import files_of_runs
 from rtradar.pipeline.view import run_maps, run_points, run_summary
 from rtradar.radar import Radar
@@ -138,22 +144,11 @@ def _check_axes(folder: _Folder, reference: _Folder) -> None:
 
 def _figures(folder: _Folder, reference: _Folder) -> dict[str, Any]:
     """Return the figures of one folder; differences of the reference from itself are zero."""
-    levels, overlap, spectrogram = map_agreement(
-        folder.path / "maps.h5", reference.path / "maps.h5", gain=folder.unit != reference.unit
-    )
-    radar, summary = reference.radar, folder.summary
-    bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
-    figures = {
-        "range_doppler_correlation": levels.correlation,
-        "range_doppler_mean_db": levels.mean_db,
-        "range_doppler_rms_db": levels.rms_db,
-        "spectrogram_correlation": spectrogram.correlation,
-        "spectrogram_rms_db": spectrogram.rms_db,
-        "rdt_chamfer_bins": chamfer(folder.points, reference.points, bins),
-        "detection_overlap": overlap,
-    }
+    maps, its_maps = folder.path / "maps.h5", reference.path / "maps.h5"
+    summary = folder.summary
     return {
-        **{name: value if np.isfinite(value) else None for name, value in figures.items()},
+        **map_figures(maps, its_maps, gain=folder.unit != reference.unit),
+        "rdt_chamfer_bins": chamfer_bins(folder.points, reference.points, reference.radar),
         **{name: summary.get(name) for name in ("detections", "windows", "xyz_points")},
         "unit": folder.unit,
         "parameters": summary["parameters"],

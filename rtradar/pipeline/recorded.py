@@ -70,10 +70,9 @@ def process_samples(
     samples : (chirp, rx, sample) complex, or iterable of such blocks
         IF samples from the first Tx of a cycle on, as an array of NumPy, or as a DataArray whose
         dimensions have these names, in any order, or as another array whose rows are read when they
-        are needed, such as one of Zarr. Frames of whole cycles, (cycle, tx, rx, sample), will do as
-        well, and so will blocks of any length, one after another. Precision is single
-        inside. Chirps after the last whole cycle are left out. Under Doppler division a chirp is a
-        whole cycle.
+        are needed, such as one of Zarr. Whole cycles, (cycle, tx, rx, sample), will do as well, and
+        so will blocks of any length, one after another. Chirps after the last whole cycle are left
+        out. Under Doppler division a chirp is a whole cycle.
     radar : Radar
         Radar that has received the samples, at its position.
     out : path, optional
@@ -96,9 +95,8 @@ def process_samples(
     Raises
     ------
     InputError
-        If a value is invalid, the samples are of another shape or type than the radar gives, one is
-        not finite, they hold no whole frame, or the maps are too large for memory and ``out`` is
-        left out; nothing is written then.
+        If a value is invalid, samples are of another shape or type than the radar gives, are not
+        finite or hold no whole frame, or maps are too large for memory; nothing is written then.
 
     Examples
     --------
@@ -117,14 +115,14 @@ def process_samples(
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
     processing = replace(Processing.of(radar, settings), unit=unit)
-    maps = None
+    maps, file = None, BytesIO()
     if out is None:
-        file = BytesIO()
         clouds = _stream(blocks, processing, file)
         with processing.stages.time("write"), open_maps(file) as maps:
             maps.load()
-        summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-        summary = finished(summary)
+        summary = finished(
+            summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
+        )
     else:
         with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
             clouds, summary = _write(folder, blocks, processing, settings, started)

@@ -232,7 +232,9 @@ class Schedule(Array):
     @cached_property
     def gapless(self) -> Self:
         """The radar without gaps between its frames, whose chirp n is at place n of `slots_of`."""
-        return dataclasses.replace(self, frame_period_s=None) if self.in_frames else self  # type: ignore[type-var]
+        if not self.in_frames:
+            return self
+        return dataclasses.replace(self, frame_period_s=None)  # type: ignore[type-var]
 
     def _in_frame(
         self, numbers: NDArray[np.int64], *, cycles: bool = False
