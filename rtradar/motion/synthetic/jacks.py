@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -31,15 +32,66 @@ from rtradar.motion.synthetic.figure import (
 )
 
 GRAVITY_MPS2 = 9.81
-HOP_S, FLIGHT_S = 0.53, 0.22
-"""Times from take-off to take-off, and in the air [s]; a jack of two hops lasts 1.1 s in CMU 13
-and 14."""
 
 ROLL = 0.29
 """The heels lift and come down in this part of a contact, before take-off and after landing."""
 
-SET, REST_S = 5, 0.7
-"""Number of jacks between rests, and the duration of a rest [s]."""
+
+@dataclass(frozen=True, kw_only=True)
+class _Manner:
+    """How somebody does jacks; lengths are fractions of the height, angles in degrees."""
+
+    hop_s: float
+    """Time from take-off to take-off at tempo 1."""
+    flight_s: float
+    jacks: float
+    """Number of jacks between rests."""
+    rest_s: float
+    uneven: float
+    """Deviation of the times of single hops."""
+    wide: float
+    """Feet beyond the hip joints, where they are apart."""
+    close: float
+    """Feet relative to the hip joints, where they are together."""
+    toes_out: float
+    heels: float
+    lift: float
+    highest: float
+    lowest: float
+    late_s: float
+    """How much longer the arms move than in one hop."""
+    elbow: float
+    elbow_swing: float
+    forward: float
+    lean: float
+    crouch: float
+    """Further lean where the root is a tenth of the height lower than in standing."""
+    turn: float
+    shrug: float
+
+
+_RANGES = {
+    "hop_s": (0.5, 0.64),
+    "flight_s": (0.14, 0.265),
+    "jacks": (6.0, 20.0),
+    "rest_s": (0.1, 0.4),
+    "uneven": (0.004, 0.014),
+    "wide": (0.09, 0.23),
+    "close": (0.75, 1.3),
+    "toes_out": (4.0, 20.0),
+    "heels": (24.0, 36.0),
+    "lift": (0.007, 0.016),
+    "highest": (112.0, 144.0),
+    "lowest": (8.0, 20.0),
+    "late_s": (0.04, 0.16),
+    "elbow": (6.0, 30.0),
+    "elbow_swing": (0.0, 16.0),
+    "forward": (0.0, 14.0),
+    "lean": (1.0, 9.5),
+    "crouch": (1.0, 9.0),
+    "turn": (2.0, 10.0),
+    "shrug": (12.0, 26.0),
+}
 
 
 class _Flight(NamedTuple):
@@ -50,19 +102,23 @@ class _Flight(NamedTuple):
     apart: bool
 
 
-def _sets(subject: Subject, until_s: float) -> list[list[_Flight]]:
-    """Sets of flights; each set begins and ends standing."""
-    hop = HOP_S / subject.tempo
+def _sets(subject: Subject, manner: _Manner, until_s: float) -> list[list[_Flight]]:
+    """Sets of flights; each set begins and ends standing, the first one before 0."""
+    hop = manner.hop_s / subject.tempo
     # A hop of the same height takes as long at any tempo; only where contact would get too short it
     # must be lower.
-    flight = min(FLIGHT_S * math.sqrt(subject.amplitude), 0.55 * hop)
-    begin = 0.15 + 0.3 * subject.phase
+    flight = min(manner.flight_s * math.sqrt(subject.amplitude), 0.55 * hop)
+    number = 2 * round(manner.jacks)
+    begin = -hop * (1 + subject.phase * (number - 2))
+    uneven = np.random.default_rng(subject.manner)
     sets: list[list[_Flight]] = []
     while begin < until_s:
-        first = begin + 0.8 * hop
-        begins = [first + k * hop for k in range(2 * SET)]
-        sets.append([_Flight(at, at + flight, k % 2 == 0) for k, at in enumerate(begins)])
-        begin = sets[-1][-1].end + 0.8 * hop + REST_S / subject.tempo
+        late = hop * manner.uneven * np.clip(uneven.standard_normal(number), -2.0, 2.0)
+        begins = begin + 0.8 * hop + hop * np.arange(number) + late
+        sets.append(
+            [_Flight(float(at), float(at) + flight, k % 2 == 0) for k, at in enumerate(begins)]
+        )
+        begin = sets[-1][-1].end + 0.8 * hop + manner.rest_s / subject.tempo
     return sets
 
 
@@ -95,12 +151,13 @@ def _height(
 
 def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
     """Jumping jacks, facing +x."""
-    return partial(_jump, subject, _sets(subject, duration_s))
+    manner = _Manner(**{name: subject.drawn(name, *some) for name, some in _RANGES.items()})
+    return partial(_jump, subject, manner, _sets(subject, manner, duration_s))
 
 
-def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
+def _jump(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
-    hop_s = HOP_S / subject.tempo
+    hop_s = manner.hop_s / subject.tempo
     # A jumper does not move before the first hop of a set and after the last: further sets do not
     # matter.
     sets = [one for one in all_sets if one[0].begin - hop_s < t[-1] and one[-1].end + hop_s > t[0]]
@@ -114,23 +171,23 @@ def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
         reached = np.repeat([values[int(hop.apart)] for hop in hops], 2)
         return keyed(t, times, [values[0], *reached[:-1]])
 
-    close, wide = 0.9 * HIP_Y * height, (HIP_Y + 0.10 * amplitude) * height
+    span = all_sets[0][0].end - all_sets[0][0].begin
+    contact = hop_s - span
     # The feet move sideways while they are well off the floor.
-    apart = between((0.0, 1.0), -0.12 * FLIGHT_S, -0.12 * FLIGHT_S)
+    apart = between((0.0, 1.0), -0.05 * span, -0.05 * span)
     # Heels lift before take-off and come down after landing, so that the legs need not be straight
     # there.
-    contact = hop_s - (all_sets[0][0].end - all_sets[0][0].begin) if all_sets else hop_s - FLIGHT_S
-    roll_s = ROLL * contact
+    roll_s, heels = ROLL * contact, math.radians(manner.heels)
     lift, roll = np.zeros(len(t)), np.zeros(len(t))
     for hop in hops:
         lift += bump((t - hop.begin) / (hop.end - hop.begin))
         roll += bump((t - hop.begin + roll_s) / (hop.end - hop.begin + 2 * roll_s))
-    pitch = math.radians(34) * roll
+    pitch = heels * roll
     ankle = rolled(pitch, height)
-    ankle[:, 2] += height * (ANKLE + 0.010 * lift)
+    ankle[:, 2] += height * (ANKLE + manner.lift * lift)
 
-    span = hop_s - contact
-    heel = rolled(math.radians(34) * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
+    close, wide = manner.close * HIP_Y * height, (HIP_Y + manner.wide * amplitude) * height
+    heel = rolled(heels * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
     leg = 0.97 * (THIGH + SHANK) * height
     low, high = (
         ANKLE * height
@@ -140,33 +197,47 @@ def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
         for track in (wide, close)
     )
     z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))
-    lowest, highest = math.radians(12), math.radians(134) * amplitude**0.5
-    raised = between((lowest, highest), 0.51 * contact, 0.48 * contact)
+    lowest, highest = (
+        math.radians(manner.lowest),
+        math.radians(manner.highest) * amplitude**0.5,
+    )
+    # Two moves of the arms that overlap are one that lasts longer.
+    raised = sum(
+        0.5 * between((lowest, highest), 0.48 * contact + late, 0.45 * contact - late)
+        for late in (-manner.late_s / 2, manner.late_s / 2)
+    )
     moving = np.sin(np.pi * (raised - lowest) / (highest - lowest)) ** 2
-    thorax = about(y=np.radians(3 + 3 * (height * ROOT - z) / (0.1 * height)))
+    lean = np.radians(manner.lean + manner.crouch * (height * ROOT - z) / (0.1 * height))
+    # Nobody faces exactly the same way all the time.
+    swings = [
+        np.sin(
+            2 * np.pi * (rate * subject.tempo * t / manner.hop_s + subject.drawn(name, 0.0, 1.0))
+        )
+        for rate, name in ((0.5, "turn of a jack"), (0.31, "slow turn"))
+    ]
+    turn = 0.5 * math.radians(manner.turn) * (swings[0] + swings[1])
+    thorax = about(z=-turn, x=0.4 * turn, y=lean)
     ankles, feet, arms = {}, {}, {}
     for side, sign in SIDES.items():
-        outward = about(z=sign * math.radians(12) * apart)
+        outward = about(z=sign * math.radians(manner.toes_out) * apart)
         across = sign * (close + (wide - close) * apart)
         ankles[side] = outward.apply(ankle) + across[:, None] * LEFT
         feet[side] = outward * about(y=pitch)
         arms[side] = swing_arm(
             thorax,
             side,
-            forward=math.radians(4),
+            forward=math.radians(manner.forward) - lean,
             outward=subject.uneven[side] * raised,
-            elbow=np.radians(14 + 44 * moving),
+            elbow=np.radians(manner.elbow + manner.elbow_swing * moving),
             wrist=0.05,
         )
-    root, upright = xyz(0.03 * height * roll, 0.0, z), about(y=math.radians(3))
-    shrug = math.radians(22) * apart
     return Pose(
-        root=root,
-        pelvis=upright,
+        root=xyz(0.03 * height * roll, 0.0, z),
+        pelvis=about(z=turn, y=0.5 * lean),
         thorax=thorax,
-        head=upright,
+        head=about(y=0.5 * lean),
         ankles=ankles,
         feet=feet,
         arms=arms,
-        shrug=shrug,
+        shrug=math.radians(manner.shrug) * apart,
     )

@@ -239,14 +239,16 @@ def test_jumping_jack_flies_freely(seed: int) -> None:
     acceleration = np.diff(z, 2) * 120**2
     toes = motion.positions[1:-1, [NODE("l_toe"), NODE("r_toe")], 2].min(axis=1)
     flying = toes > TOE_HEIGHT * 1.75 + 2e-3
-    assert 0.15 < flying.mean() < 0.5
+    assert 0.1 < flying.mean() < 0.5
     np.testing.assert_allclose(acceleration[flying], -9.81, atol=0.01)
     width = np.abs(motion.positions[:, NODE("l_toe"), 1] - motion.positions[:, NODE("r_toe"), 1])
     hands = motion.positions[:, NODE("l_hand"), 2]
     assert width.max() > 0.4
     assert width.min() < 0.3
-    assert hands.max() > 1.75
+    assert hands.max() > 0.818 * 1.75  # above the shoulders
     assert np.corrcoef(width, hands)[0, 1] > 0.7
+    # Nobody stands still first.
+    assert speeds(motion, "l_hand")[:60].max() > 1
     assert 3.5 < speeds(motion, "l_hand").max() < 7.5
 
 
