@@ -13,7 +13,8 @@ import numpy as np
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
-from rtradar.motion.synthetic.exercises import kick, punch
+from rtradar.motion.synthetic import kick as kicks
+from rtradar.motion.synthetic.exercises import punch
 from rtradar.motion.synthetic.figure import (
     Array,
     Pose,
@@ -38,14 +39,14 @@ def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subj
 
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
-    "kick": _repeating(kick),
+    "kick": kicks.kick,
     "punch": _repeating(punch),
     "jumping_jack": jumping_jack,
     "stand": _repeating(stand),
 }
 """Activities of the actors, by name."""
 
-STYLES: Mapping[str, tuple[str, ...]] = {"walk": tuple(GAITS)}
+STYLES: Mapping[str, tuple[str, ...]] = {"walk": tuple(GAITS), "kick": kicks.STYLES}
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 
 

@@ -115,7 +115,7 @@ class Pose:
     ``root (n, 3)`` is its position [m]; pelvis, thorax and head are orientations in world axes, n
     each. For each side ``ankles`` are the positions (n, 3) that the knees must allow [m], ``feet``
     the orientations and ``arms`` the rotations of the bones. The knees bend about ``left``,
-    roughly, and ``shrug`` raises both shoulders [rad].
+    roughly, where each side may have its own; ``shrug`` raises both shoulders [rad].
     """
 
     root: Array
@@ -125,7 +125,7 @@ class Pose:
     ankles: Mapping[str, Array]
     feet: Mapping[str, Rotation]
     arms: Mapping[str, Arm]
-    left: Array = field(default_factory=lambda: LEFT)
+    left: Array | Mapping[str, Array] = field(default_factory=lambda: LEFT)
     shrug: Array | float = 0.0
 
 
@@ -208,9 +208,11 @@ def swing_arm(
     return Arm(upper, fore, fore * about(y=-wrist))
 
 
-def reach_arm(thorax: Rotation, side: str, reach: Array, height_m: float, elbow_out: float) -> Arm:
+def reach_arm(
+    thorax: Rotation, side: str, reach: Array, height_m: float, elbow_out: Array | float
+) -> Arm:
     """An arm with its wrist at ``reach`` (n, 3) from the shoulder, world; elbow out by [rad]."""
-    hinge = thorax.apply([0.0, np.cos(elbow_out), SIDES[side] * np.sin(elbow_out)])
+    hinge = thorax.apply(xyz(0.0, np.cos(elbow_out), SIDES[side] * np.sin(elbow_out)))
     upper, fore = bend(reach, UPPER_ARM * height_m, FOREARM * height_m, hinge, -1.0)
     return Arm(upper, fore, fore)
 
@@ -255,7 +257,8 @@ def rotations(pose: Pose, height_m: float) -> Array:
     }
     for side, sign in SIDES.items():
         leg = pose.ankles[side] - pose.root - pose.pelvis.apply(bones[f"{side}_hip"])
-        thigh, shank = bend(leg, THIGH * height_m, SHANK * height_m, pose.left, 1.0)
+        hinge = pose.left[side] if isinstance(pose.left, Mapping) else pose.left
+        thigh, shank = bend(leg, THIGH * height_m, SHANK * height_m, hinge, 1.0)
         found |= {
             f"{side}_hip": pose.pelvis,
             f"{side}_knee": thigh,
