@@ -19,9 +19,9 @@ from rtradar.settings import RunSettings
 from rtradar.signal.ghosts import GhostIf, ghosts_within
 from rtradar.signal.static_clutter import RoomIf
 
-_OF_SHADOW = 0.1
-"""Part of the tolerated power of errors that the shadow in the clutter may take; ghosts may take
-the rest."""
+_OF_GHOSTS = 0.75
+"""Part of the tolerated power of errors that ghosts may take; the shadow in the clutter may take
+what they leave."""
 
 
 class Indoors(NamedTuple):
@@ -58,10 +58,14 @@ def indoors(
     paths = model.prune(n_chirps, noise)
     order = max(settings.order, 1)
     clutter = Clutter(radar, scene, variant=variant, order=order).prune(noise)
-    allowed = 0.0
+    allowed = error = 0.0
+    ghosts, said = None, dict[str, Any]()
     if settings.path_tolerance_db is not None:
         allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
-    shadow = ClutterShadow(clutter, body, scene.objects, _OF_SHADOW * allowed)
+        if allowed > 0 and model.has_ghost_tones:
+            ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed)
+            error = said.pop("error_m2")
+    shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
     room = RoomIf(radar, clutter.cycle(), shadow)
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
@@ -74,12 +78,8 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
-    ghosts = None
-    if settings.path_tolerance_db is not None and person_power_m2 > 0:
-        error, said = shadow.error_m2, dict[str, Any]()
-        if model.has_ghost_tones:
-            ghosts, said = ghosts_within(model, radar, n_chirps, (1 - _OF_SHADOW) * allowed)
-            error += said.pop("error_m2")
+    if allowed > 0:
+        error += shadow.error_m2
         said["error_db"] = 10 * math.log10(error / person_power_m2) if error > 0 else None
         summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
     # Walls that are not followed over the sweep, where they matter.

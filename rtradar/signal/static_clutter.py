@@ -32,12 +32,14 @@ _CHIRPS_A_THREAD = 16
 class MovingShadow(Protocol):
     """What of static clutter a body occludes, as `ClutterShadow` computes it.
 
-    ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
+    ``step`` is the number of chirps between keyframes, ``slower`` that of keyframes between those
+    of weak points, 0 where none are apart; ``starts (object + 1,)`` the first echo of
     each object of the clutter, ``mirrors`` the objects that walls reflect; ``frequency (node,)``
     are the frequencies of their shadow, ``point_frequency (node,)`` those of the others' [Hz].
     """
 
     step: int
+    slower: int
     starts: NDArray[np.int64]
     mirrors: tuple[int, ...]
     frequency: _Array
@@ -45,6 +47,10 @@ class MovingShadow(Protocol):
 
     def at(self, keyframe: int) -> Shadow:
         """Return what is occluded at a keyframe."""
+        ...
+
+    def slow_at(self, keyframe: int) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
+        """Return what is lost of weak points at the keyframe ``keyframe * slower``."""
         ...
 
 
@@ -81,16 +87,16 @@ def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group
     return groups
 
 
-def _resampled(group: _Group, radar: Radar, shadow: MovingShadow) -> _Group:
-    """Give amplitudes at the frequencies of the shadow, or at no more than it asks for."""
-    echoes, nodes = group.echoes, shadow.point_frequency
-    if len(nodes) == 1:
+def _amplitude(
+    echoes: Echoes, which: NDArray[np.int64], radar: Radar, nodes: _Array | None
+) -> tuple[NDArray[np.complexfloating], _Array]:
+    """Amplitudes of some echoes at given frequencies, or at few of their own, and these."""
+    if nodes is None:
         if len(echoes.frequency) <= _SHADOW_NODES:
-            return group
+            return echoes.amplitude[..., which], echoes.frequency
         nodes = sweep_nodes(radar, _SHADOW_NODES)
     weights = interpolation_weights(echoes.frequency, nodes)
-    amplitude = np.tensordot(weights, echoes.amplitude, axes=1)
-    return group._replace(echoes=replace(echoes, amplitude=amplitude, frequency=nodes))
+    return np.tensordot(weights, echoes.amplitude[..., which], axes=1), nodes
 
 
 class RoomIf:
@@ -118,11 +124,11 @@ class RoomIf:
                 self._mirrors[number] = samples
         self._whole: _Samples = whole.astype(np.complex64)
         if shadow:
-            self._groups = [_resampled(group, radar, shadow) for group in self._groups]
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)
         self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
+        self._slow: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 
     @property
     def power_m2(self) -> float:
@@ -182,22 +188,41 @@ class RoomIf:
     def _find(self, keyframe: int) -> _Samples:
         """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""
         assert self._shadow is not None
-        now, starts = self._shadow.at(keyframe), self._shadow.starts
-        lost = np.zeros(self._whole.shape, dtype=np.complex64)
+        shadow, now = self._shadow, self._shadow.at(keyframe)
+        lost = self._of_points(now.echo, now.fraction)
         for number, of_mirror in zip(now.mirror.tolist(), now.of_mirror, strict=True):
             lost += self._mirrors[number] * (of_mirror @ self._sweep.T)
-        own = np.searchsorted(starts, now.echo, side="right") - 1
+        if shadow.slower:
+            before, rest = divmod(keyframe, shadow.slower)
+            weights = cubic_weights([rest / shadow.slower])[0].astype(np.float32)
+            for weight, number in zip(weights, range(before - 1, before + 3), strict=True):
+                if weight:
+                    lost += weight * self._slow.get(number, partial(self._find_slow, number))
+        return lost
+
+    def _find_slow(self, number: int) -> _Samples:
+        """The same of weak points, at one of their own keyframes."""
+        assert self._shadow is not None
+        return self._of_points(*self._shadow.slow_at(number))
+
+    def _of_points(self, echo: NDArray[np.int64], fraction: NDArray[np.complex128]) -> _Samples:
+        assert self._shadow is not None
+        starts, nodes = self._shadow.starts, self._shadow.point_frequency
+        lost = np.zeros(self._whole.shape, dtype=np.complex64)
+        own = np.searchsorted(starts, echo, side="right") - 1
         for group in self._groups:
             chosen = np.flatnonzero(group.member[own])
             if len(chosen):
-                which = group.first[own[chosen]] + now.echo[chosen] - starts[own[chosen]]
-                whole = group.echoes
+                which = group.first[own[chosen]] + echo[chosen] - starts[own[chosen]]
+                given = which, self._radar, nodes if len(fraction) > 1 else None
+                amplitude, frequency = _amplitude(group.echoes, *given)
                 some = replace(
-                    whole,
-                    length=whole.length[..., which],
-                    amplitude=whole.amplitude[..., which] * now.fraction[..., chosen],
-                    part=whole.part[which],
-                    bounces=whole.bounces[which],
+                    group.echoes,
+                    length=group.echoes.length[..., which],
+                    amplitude=amplitude * fraction[..., chosen].astype(np.complex64),
+                    frequency=frequency,
+                    part=group.echoes.part[which],
+                    bounces=group.echoes.bounces[which],
                 )
                 lost += self._synthesized(some)
         return lost

@@ -8,12 +8,11 @@ a half where it is in the middle. An echo keeps the product of what its legs kee
 reflect every leg of every Tx and Rx is computed, at `SWEEP_NODES` frequencies, for zones narrow
 over the sweep.
 
-Points on furniture and on rough walls, which all antennas share, are many, and the shadow in them
-is weak: of a person who walks through a furnished room some 40 dB below their own echoes. They are
-computed as `FINE` says, from every Tx and at three frequencies, where the error of `COARSE`,
-measured beforehand, is more than may be: that is at the sweep's centre, from the ends of each line
-of Tx and the middle of each of Rx, the weakest points from the array's middle. The time between
-keyframes, too, follows from the error of cubics between them.
+Points on furniture and on rough walls, which all antennas share, are many. A few hundred of them
+return most: these are computed for every Tx and at three frequencies, the weak ones from the
+array's middle at the sweep's centre. How many count as strong, the time between keyframes, and that
+between the fewer ones of weak points follow from errors that are measured beforehand. Where nothing
+may be in error all points are computed as `FINE` says.
 
 Mitsuba is not asked. A ray is free or not, and what is wanted is the wave near an edge, whose field
 is between both over a Fresnel zone. Clutter that furniture hides is not in the room's echoes
@@ -45,11 +44,10 @@ from rtradar.kernels.still_room import cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import small_facets
 from rtradar.scatter.clutter.point_shadow import (
-    COARSE,
-    FADE,
+    FAINT,
     FINE,
-    MEDIUM,
     REACH,
+    USUAL,
     PointShadow,
     Precision,
     SharedPoints,
@@ -65,6 +63,7 @@ from rtradar.scene import Object
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 _SHORTEST_M = 1e-6
 KEYFRAMES_S, SHORTEST_S, TRIED_S = 50e-3, 4e-3, 10e-3
@@ -74,12 +73,20 @@ ERROR_DB, _ERROR_POWER = -32.0, 3.0
 """Error that is aimed at, over what changes of the shadow in `_CHANGE_S` [dB], and the power of the
 time between keyframes with which its power grows, as `validation/other_methods/shadow.py` has
 it."""
-_OF_KEYFRAMES, _OF_POINTS = 0.25, 0.75
-"""Parts of the power that may be in error which keyframes and coarse points may take."""
-_CHANGE_S, _TESTS = 0.1, 12
-"""Time of a change [s], and the instants of the capture at which errors are measured."""
-_FEW = 4
-"""One of how many tests is made for the error of points."""
+_OF_KEYFRAMES, _OF_POINTS, _OF_SLOW = 0.15, 0.7, 0.15
+"""Parts of the power that may be in error which keyframes, points, and the keyframes of weak points
+may take."""
+SLOW_S, SLOW_TRIED_S = 0.4, 0.1
+"""As `KEYFRAMES_S` and `TRIED_S`, of weak points."""
+_STRONG = (0.8, 0.95, 0.99)
+"""Parts of the power of points, the strongest of which may be computed as `USUAL`."""
+_LEFT_OUT, _THIN = 1e-4, 4
+"""Part of the power of points that is left out, and one in how many weak points is looked at."""
+_ENDS = np.array([-1.5, -0.5, 0.5, 1.5])
+"""Keyframes about the middle between two of them."""
+_CHANGE_S, _TESTS, _FEW = 0.1, 12, 4
+"""Time of a change [s], and the instants of the capture at which errors are measured: those between
+keyframes, and those of points."""
 _KEPT_KEYFRAMES = 8
 """Keyframes in the cache: those on both sides of a chirp, and a few before."""
 SWEEP_NODES = 5
@@ -98,7 +105,8 @@ class ClutterShadow:
     What is approximated may be in error by ``allowed_m2``, a mean power of IF samples [m^2], and by
     `ERROR_DB` of what changes if that is more; ``error_m2`` is what it is expected to be.
 
-    ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
+    ``step`` is the number of chirps between keyframes, ``slower`` that of keyframes between those
+    of weak points, 0 where none are apart; ``starts (object + 1,)`` the first echo of
     each object of the clutter in the count through all, ``mirrors`` the numbers of those that walls
     reflect; ``frequency (node,)`` are the frequencies of their shadow, ``point_frequency (node,)``
     those of the others' [Hz].
@@ -125,6 +133,7 @@ class ClutterShadow:
         last = body.duration_s / self._radar.chirp_interval_s
         poses = [self._posed(int(chirp)) for chirp in np.linspace(0.0, last, count)]
         near = points.some(points.near(self._radar, poses))
+        near = near.some(near.shares() < 1 - _LEFT_OUT)
         self._settle(clutter, near, allowed_m2)
         self.point_frequency = sweep_nodes(self._radar, self._points.precision.nodes)
         self._kept: KeyframeCache[int, Shadow] = KeyframeCache(0, _KEPT_KEYFRAMES)
@@ -132,6 +141,13 @@ class ClutterShadow:
     def at(self, keyframe: int) -> Shadow:
         """Return the shadow at a keyframe, the pose of chirp ``keyframe * step``."""
         return self._kept.get(keyframe, partial(self._find, keyframe))
+
+    def slow_at(self, keyframe: int) -> tuple[Indices, Field]:
+        """Return the shadow in weak points at the keyframe ``keyframe * slower``.
+
+        It is as in `Shadow`, the same for all antennas and at all frequencies.
+        """
+        return self._weak.at(self._posed(max(keyframe * self.slower, 0) * self.step))
 
     def _find(self, keyframe: int) -> Shadow:
         posed = self._posed(max(keyframe, 0) * self.step)
@@ -158,51 +174,82 @@ class ClutterShadow:
     def _settle(self, clutter: Clutter, near: SharedPoints, allowed_m2: float) -> None:
         """Choose the precision of the points and the time between keyframes by measured errors.
 
-        Measured are what changes of the error of points, in the samples of two Tx, and the error of
-        cubics between keyframes `TRIED_S` apart.
+        Measured are the error of points, and that of cubics between keyframes `TRIED_S` and
+        `SLOW_TRIED_S` apart, in the samples of one Tx.
         """
-        ends = np.array([-1.5, -0.5, 0.5, 1.5]) * TRIED_S
-        around = np.array([0.0, *ends, -_CHANGE_S / 2, _CHANGE_S / 2])
-        middles = np.linspace(0.0, self._body.duration_s, _TESTS + 2)[1:-1, None]
-        chirps = np.clip(middles + around, 0, self._body.duration_s) / self._radar.chirp_interval_s
-        poses = [[self._posed(int(chirp)) for chirp in row] for row in chirps]
-        # Not at the ends of a line, where coarse points are exact.
-        tx = np.unique([self._radar.n_tx // 4, self._radar.n_tx * 3 // 4])
+        tx = np.array([self._radar.n_tx // 4])
         fields = _fields(clutter, self.starts, near.number, tx)
-        precision, of_points = FINE, 0.0
+        strong, precision, of_points = np.ones(len(near.power), dtype=bool), FINE, 0.0
         if allowed_m2 > 0:
-            some = [[row[i] for i in (0, 5, 6)] for row in poses[_FEW // 2 :: _FEW]]
-            precision, of_points = self._enough(near, fields, tx, some, _OF_POINTS * allowed_m2)
-        self._points = PointShadow(self._radar, near, precision)
-        middle = precision._replace(nodes=1, weak=2.0)
-        points = PointShadow(self._radar, near, middle, tx[:1])
-        lost = [[self._lost(points, fields, own) for own in row] for row in poses]
-        apart_s, of_keyframes = _apart_s(lost, _OF_KEYFRAMES * allowed_m2)
-        self.step, self.error_m2 = keyframe_step(self._radar, apart_s), of_points + of_keyframes
+            strong, precision, of_points = self._enough(near, fields, tx, _OF_POINTS * allowed_m2)
+        self._points = PointShadow(self._radar, near.some(strong), precision)
+        points = PointShadow(self._radar, near.some(strong), FAINT)
+        around = np.array([0.0, *(_ENDS * TRIED_S), -_CHANGE_S / 2, _CHANGE_S / 2])
+        lost = [
+            [self._lost(points, fields[..., strong], own) for own in row]
+            for row in self._tests(_TESTS, around)
+        ]
+        limits_s, allowed = (SHORTEST_S, KEYFRAMES_S), _OF_KEYFRAMES * allowed_m2
+        apart_s, of_keyframes = _apart_s(lost, allowed, TRIED_S, limits_s)
+        self.step, self.slower = keyframe_step(self._radar, apart_s), 0
+        self.error_m2 = of_points + of_keyframes
+        if not strong.all():
+            self._settle_weak(near.some(~strong), fields[..., ~strong], _OF_SLOW * allowed_m2)
+
+    def _settle_weak(self, weak: SharedPoints, fields: Field, allowed_m2: float) -> None:
+        """Choose the keyframes of weak points, by one in `_THIN`, whose powers add up."""
+        self._weak, some = (
+            PointShadow(self._radar, weak, FAINT),
+            np.arange(len(weak.power))[::_THIN],
+        )
+        points = PointShadow(self._radar, weak.some(some), FAINT)
+        own = np.sqrt(_THIN / fields[..., 0].size) * fields[..., some]
+        lost = [
+            [points.samples(own, posed).ravel() for posed in row]
+            for row in self._tests(_FEW, np.array([0.0, *(_ENDS * SLOW_TRIED_S)]))
+        ]
+        fast_s = self.step * self._radar.chirp_interval_s
+        apart_s, error_m2 = _apart_s(lost, allowed_m2, SLOW_TRIED_S, (fast_s, SLOW_S))
+        self.slower = max(1, round(apart_s / fast_s))
+        self.error_m2 += error_m2
+
+    def _tests(self, count: int, around: Array) -> list[list[Posed]]:
+        """Poses at times ``around`` some instants of the capture [s]."""
+        middles = (np.arange(count) + 0.5) * self._body.duration_s / count
+        times = np.clip(middles[:, None] + around, 0, self._body.duration_s)
+        chirps = times / self._radar.chirp_interval_s
+        return [[self._posed(int(chirp)) for chirp in row] for row in chirps]
 
     def _enough(
-        self,
-        near: SharedPoints,
-        fields: Field,
-        tx: Indices,
-        poses: list[list[Posed]],
-        allowed_m2: float,
-    ) -> tuple[Precision, float]:
-        """Find the least precision whose error changes little enough in the samples.
+        self, near: SharedPoints, fields: Field, tx: Indices, allowed_m2: float
+    ) -> tuple[Bools, Precision, float]:
+        """Find how few points need more than `FAINT`: which, and to what precision.
 
-        What changes of the error beside `FINE` follows, a mean power of samples [m^2].
+        The mean power of the error of samples follows [m^2], beside those of `FINE`. Of weak points
+        one in `_THIN` is looked at, whose errors add up as powers do.
         """
-
-        def samples(precision: Precision) -> Field:
-            points = PointShadow(self._radar, near, precision, tx)
-            return np.array([[points.samples(fields, own) for own in row] for row in poses])
-
-        fine = samples(FINE)
-        for precision in (COARSE, MEDIUM):
-            error = float(np.var(samples(precision) - fine, axis=1).mean())
-            if error <= allowed_m2:
-                return precision, error
-        return FINE, 0.0
+        group = np.searchsorted(_STRONG, near.shares(), side="right")
+        poses = [own for (own,) in self._tests(_FEW, np.zeros(1))]
+        error = np.zeros((2, len(_STRONG) + 1, len(poses), *fields.shape[:-1]), np.complex128)
+        for number in range(len(_STRONG) + 1):
+            thin = 1 if number < 2 else _THIN
+            which = np.flatnonzero(group == number)[::thin]
+            own = np.sqrt(thin) * fields[..., which]
+            fine, *others = (
+                np.array([points.samples(own, posed) for posed in poses])
+                for points in (
+                    PointShadow(self._radar, near.some(which), precision, tx)
+                    for precision in (FINE, USUAL, FAINT)
+                )
+            )
+            error[:, number] = np.array(others) - fine
+        for strong in range(len(_STRONG) + 1):
+            weak = error[1, strong:].sum(axis=0)
+            for precision, wrong in ((USUAL, weak + error[0, :strong].sum(axis=0)), (FINE, weak)):
+                power_m2 = float((np.abs(wrong) ** 2).mean())
+                if power_m2 <= allowed_m2:
+                    return group < strong, precision, power_m2
+        return group >= 0, FINE, 0.0
 
     def _lost(self, points: PointShadow, fields: Field, posed: Posed) -> Field:
         """Samples of what is lost of points, for the array's middle, and of mirrors [m].
@@ -231,21 +278,26 @@ class ClutterShadow:
         return np.array(self.mirrors, dtype=np.int64)[hidden], 1 - kept[hidden].reshape(shape)
 
     def _on_legs(self, geometry: tuple[Array, ...], posed: Posed, scales: Array) -> Field:
-        return lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales, FADE)
+        return lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales)
 
 
-def _apart_s(lost: list[list[Field]], allowed_m2: float) -> tuple[float, float]:
-    """Time between keyframes at which the error is as large as it may be [s], and that error."""
+def _apart_s(
+    lost: list[list[Field]], allowed_m2: float, tried_s: float, limits_s: tuple[float, float]
+) -> tuple[float, float]:
+    """Time between keyframes at which the error is as large as it may be [s], and that error.
+
+    Each row has what is lost at an instant, at `_ENDS` about it, and at times of a change.
+    """
     error = change = 0.0
     for now, *rest in lost:
         error += float((np.abs(now - cubic_weights([0.5])[0] @ rest[:4]) ** 2).sum()) / len(lost)
         change += float(np.var([now, *rest[4:]], axis=0).sum()) / len(lost)
     if not error > 0:
-        return KEYFRAMES_S, 0.0
+        return limits_s[1], 0.0
     goal = max(change * 10 ** (ERROR_DB / 10), allowed_m2)
-    apart_s = TRIED_S * (goal / error) ** (1 / _ERROR_POWER)
-    apart_s = float(min(KEYFRAMES_S, max(SHORTEST_S, apart_s)))
-    return apart_s, error * (apart_s / TRIED_S) ** _ERROR_POWER
+    apart_s = tried_s * (goal / error) ** (1 / _ERROR_POWER)
+    apart_s = float(min(limits_s[1], max(limits_s[0], apart_s)))
+    return apart_s, error * (apart_s / tried_s) ** _ERROR_POWER
 
 
 class _Faces(NamedTuple):

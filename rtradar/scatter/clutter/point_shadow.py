@@ -29,28 +29,22 @@ class Precision(NamedTuple):
     """How the shadow in shared points is computed.
 
     ``nodes`` are the frequencies; ``along_tx`` and ``along_rx`` the places along each line of
-    antennas; ``lines`` those of the integral, ``fade`` and ``reach`` as `FADE` and `REACH`.
-    ``weak`` is the power of the points seen from the array's middle only, ``faint`` that of those
-    left out, over that of all that the body may come near.
+    antennas, none for the array's middle; ``lines`` those of the integral, ``reach`` as `REACH`.
     """
 
     nodes: int
     along_tx: int
     along_rx: int
     lines: int
-    fade: float
     reach: float
-    weak: float
-    faint: float
 
 
-FINE = Precision(3, 99, 2, 40, FADE, REACH, 0.0, 1e-4)
+FINE = Precision(3, 99, 2, 40, REACH)
 """Each approximation for itself is below -25 dB of the change of the samples in a walk."""
-MEDIUM = Precision(3, 99, 1, 24, FADE, REACH, 0.0, 0.01)
-"""-8 to -11 dB of the change."""
-COARSE = Precision(1, 2, 1, 12, 0.3, 2.0, 0.03, 2e-3)
-"""As if points were as wide as a Fresnel zone, which sees no far fringes, in six places of the
-paper's array: most of the change, of which it has the size."""
+USUAL = Precision(3, 99, 2, 24, 2.0)
+"""-20 dB of what strong points lose."""
+FAINT = Precision(1, 0, 0, 12, 2.0)
+"""From the array's middle alone: -7 dB of what points lose, and half the change in 0.1 s."""
 
 
 class SharedPoints(NamedTuple):
@@ -63,6 +57,13 @@ class SharedPoints(NamedTuple):
     def some(self, which: Indices | Bools) -> SharedPoints:
         """Return some of them."""
         return SharedPoints(self.places[which], self.number[which], self.power[which])
+
+    def shares(self) -> Array:
+        """Power of all points that are stronger than each, over that of all."""
+        order = np.argsort(-self.power)
+        share = np.empty(len(order))
+        share[order] = np.cumsum(self.power[order]) - self.power[order]
+        return share / max(float(self.power.sum()), 1e-300)
 
     def near(self, radar: Radar, poses: Sequence[Posed]) -> Bools:
         """Which points have something in the Fresnel zone of their legs in any of some poses."""
@@ -95,7 +96,7 @@ def _balls(posed: Posed) -> list[tuple[Array, float]]:
 
 
 class PointShadow:
-    """What some points lose, to a precision, without the faintest of them.
+    """What some points lose, to a precision.
 
     It is computed for the Tx whose numbers are ``tx (tx,)``, or for all.
     """
@@ -107,42 +108,36 @@ class PointShadow:
         precision: Precision,
         tx: Indices | None = None,
     ) -> None:
-        self.precision, self._radar = precision, radar
-        own = radar, precision.along_tx, precision.along_rx
-        places, tx_weights, rx_weights = shadow_nodes(*own)
-        self._middle = places.mean(axis=0)
-        tx = np.arange(radar.n_tx) if tx is None else tx
-        used = tx_weights[tx].any(axis=0) | rx_weights.any(axis=0)
-        self._antennas, self._rx_of_tx = places[used], radar.rx_of_tx[tx]
-        self._tx_weights, self._rx_weights = tx_weights[tx][:, used], rx_weights[:, used]
+        self.precision, self._radar, self._points = precision, radar, points
+        if precision.along_tx:
+            own = radar, precision.along_tx, precision.along_rx
+            places, tx_weights, rx_weights = shadow_nodes(*own)
+            tx = np.arange(radar.n_tx) if tx is None else tx
+            used = tx_weights[tx].any(axis=0) | rx_weights.any(axis=0)
+            self._antennas, self._rx_of_tx = places[used], radar.rx_of_tx[tx]
+            self._tx_weights, self._rx_weights = tx_weights[tx][:, used], rx_weights[:, used]
+        else:
+            self._antennas = np.concatenate([radar.tx, radar.rx]).mean(axis=0)[None]
+            self._rx_of_tx = np.zeros((1, 1), dtype=np.int64)
+            self._tx_weights = self._rx_weights = np.ones((1, 1))
         self._scales = sweep_nodes(radar, precision.nodes) / radar.centre_frequency_hz
-        order = np.argsort(points.power)
-        share = np.cumsum(points.power[order]) / max(points.power.sum(), 1e-300)
-        self._which = np.sort(order[share >= precision.faint])
-        weak = np.ones(len(order), dtype=bool)
-        weak[order[share >= precision.weak]] = False
-        self._points, self._strong = points.some(self._which), ~weak[self._which]
 
     def at(self, posed: Posed) -> tuple[Indices, Field]:
-        """Which echoes are occluded, and the fraction (node, tx, rx, echo)."""
+        """Which echoes are occluded, and the fraction (node, tx, rx, echo), one of all antennas."""
         which, fraction = self._find(posed)
         return self._points.number[which], fraction
 
     def samples(self, fields: Field, posed: Posed) -> Field:
         """Sum what all points lose of ``fields (node, tx, rx, point)``, over the points.
 
-        What is given at one frequency, or for one Tx, is that of all.
+        What is lost at one frequency, or for one Tx, is that of all.
         """
         which, fraction = self._find(posed)
-        return np.asarray((fields[..., self._which[which]] * fraction).sum(axis=-1))
+        return np.asarray((fields[..., which] * fraction).sum(axis=-1))
 
     def _find(self, posed: Posed) -> tuple[Indices, Field]:
         near = np.flatnonzero(self._points.near(self._radar, [posed]))
-        strong = np.flatnonzero(self._strong[near])
-        lost = np.zeros((len(self._antennas), len(near), len(self._scales)), dtype=np.complex128)
-        if len(strong) < len(near):
-            lost[:] = self._seen_from(self._middle[None], near, posed)
-        lost[:, strong] = self._seen_from(self._antennas, near[strong], posed)
+        lost = self._seen_from(self._antennas, near, posed)
         some = lost.any(axis=(0, 2))
         lost, near = lost[:, some], near[some]
         # Not by BLAS, whose threads cost more than these few numbers.
@@ -158,9 +153,7 @@ class PointShadow:
         ends = np.tile(self._points.places[which], (len(antennas), 1))
         length = np.linalg.norm(ends - starts, axis=1)
         geometry, own = (starts, ends, np.zeros(len(length)), length), self.precision
-        lost = lost_on_legs(
-            self._radar, geometry, posed, own.reach, own.lines, self._scales, own.fade
-        )
+        lost = lost_on_legs(self._radar, geometry, posed, own.reach, own.lines, self._scales)
         return lost.reshape(len(antennas), len(which), len(self._scales))
 
 
@@ -171,7 +164,6 @@ def lost_on_legs(
     reach: float,
     lines: int,
     scales: Array,
-    fade: float,
 ) -> Field:
     """Fraction of the field that is taken from each leg (leg, node), as `occluded_fractions`."""
     out = np.zeros((len(geometry[0]), len(scales)), dtype=np.complex128)
@@ -179,7 +171,7 @@ def lost_on_legs(
     def fill(begin: int) -> None:
         some = slice(begin, begin + _LEGS_A_THREAD)
         own = tuple(np.ascontiguousarray(array[some]) for array in geometry)
-        given = radar.wavelength_m, tuple(posed), reach, lines, scales, _table(fade)
+        given = radar.wavelength_m, tuple(posed), reach, lines, scales, _table()
         occluded_fractions(own, *given, out[some])
 
     thread_map(fill, range(0, len(out), _LEGS_A_THREAD))
@@ -187,5 +179,5 @@ def lost_on_legs(
 
 
 @lru_cache
-def _table(fade: float) -> Field:
-    return np.asarray(wave_table(fade))
+def _table() -> Field:
+    return np.asarray(wave_table(FADE))
