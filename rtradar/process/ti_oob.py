@@ -127,7 +127,8 @@ def _beside(level_db: _Reals) -> _Reals:
 def _along_range(level_db: _Reals) -> _Reals:
     """Mean level of the noise cells on that side of each cell over range where it is the less.
 
-    At the ends of the axis one side is whole; infinite where none is.
+    It is CFAR_CASO, mode 2 of cfarCfg, which the profiles of the SDK have over range, and CFAR_CA
+    over Doppler. At the ends of the axis one side is whole; infinite where none is.
     """
     count = level_db.shape[1]
     means = np.full((2, *level_db.shape), np.inf)
