@@ -17,6 +17,7 @@ from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
 from rtradar.body import Person
+from rtradar.campaign.augmentation import VARIED
 from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
@@ -122,6 +123,22 @@ DATA_SET_KEYS = {
         "labels": ("list of what they do, drawn for each", "`['walk', 'stand']`"),
         "x_m": ("range [least, most] of their mean places [m]", "`[-1.0, 1.0]`"),
         "y_m": ("the same", "`[-1.5, 1.5]`"),
+    },
+    "[augmented]": {
+        "copies": (
+            "copies of each interval of a recording, half of them mirrored",
+            "must be given",
+        ),
+        **{
+            key: (f"range [least, most] of {what}", f"`{list(VARIED[key][0])}`")
+            for key, what in (
+                ("tempo", "their tempo, a factor"),
+                ("height", "their height, a factor"),
+                ("build", "their build, a factor"),
+                ("drift_mps", "a drift in any direction [m/s]"),
+                ("start_s", "by how much later they begin [s]"),
+            )
+        },
     },
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from rtradar import __version__
 from rtradar.body import Person
+from rtradar.campaign.augmentation import vary
 from rtradar.campaign.kept import capture_of
 from rtradar.campaign.spec import (
     APART_M,
@@ -99,9 +100,10 @@ class SamplePlan:
         """Return a copy whose motion is cut to the interval, small enough to send to a worker."""
         if self.motion is None:
             return self
-        start_s = self.parameters["start_s"]
+        start_s, varied = self.parameters["start_s"], self.parameters.get("varied")
+        length_s = self.interval_s * (varied["tempo"] if varied else 1.0)
         # An interval to the end is rounded, and may be a little longer than what is there.
-        duration_s = min(self.interval_s, self.motion.duration_s - start_s)
+        duration_s = min(length_s, self.motion.duration_s - start_s)
         return replace(self, motion=cut(self.motion, start_s, duration_s))
 
     def run_settings(self) -> RunSettings:
@@ -133,7 +135,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     hide = None if spec.recordings else True
     for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
         motion = read(recorded.path, skeleton=recorded.skeleton)
-        count = len(intervals) + recorded.intervals.most(motion.duration_s)
+        copies = 1 + (spec.augmented.copies if spec.augmented else 0)
+        count = len(intervals) + copies * recorded.intervals.most(motion.duration_s)
         check_samples(count, len(spec.combinations))
         intervals += _intervals(spec, recorded, motion)
     run = asdict(spec.run)
@@ -211,6 +214,13 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
             "duration_s": duration_s,
         }
         yield _Interval(recorded.label, parameters, _draw(spec, seed), motion)
+        for copy in range(spec.augmented.copies if spec.augmented else 0):
+            assert spec.augmented is not None
+            own = _seed(spec.run.seed, content, start_s, copy)
+            drawn = spec.augmented.draw(own, start_s, duration_s, motion.duration_s)
+            yield _Interval(
+                recorded.label, parameters | {"seed": own} | drawn, _draw(spec, own), motion
+            )
 
 
 def _plan(
@@ -309,6 +319,8 @@ def make_sample(plan: SamplePlan) -> Made:
     motion, values = plan.motion, plan.parameters
     if motion is None:
         motion = _actor_motion(plan.label, values)
+    elif "varied" in values:
+        motion = vary(motion, values["varied"])
     settings: Any = vars(plan.run_settings())
     people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
     with warnings.catch_warnings(record=True) as caught:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rtradar.campaign.augmentation import Augmented
 from rtradar.campaign.intervals import Intervals
 from rtradar.campaign.kept import sizes
 from rtradar.errors import InputError
@@ -108,6 +109,7 @@ class Spec(NamedTuple):
     recordings: tuple[Recorded, ...]
     keep: tuple[str, ...] = ()
     others: Others | None = None
+    augmented: Augmented | None = None
 
 
 def check_samples(intervals: int, combinations: int) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from rtradar.campaign.augmentation import VARIED, Augmented
 from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.kept import KEPT
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
@@ -82,6 +83,7 @@ _TOP = (
     "each",
     "drawn",
     "others",
+    "augmented",
     "synthetic",
     "recordings",
 )
@@ -139,19 +141,21 @@ def _spec(table: Table, folder: Path) -> Spec:
     keep = wrong.of(_keep, table) or ()
     run = wrong.of(_run_settings, table)
     others = wrong.of(_others, table)
+    augmented = wrong.of(_augmented, table)
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.most(intervals.needed_s)
-    count += sum(recorded.intervals.most() for recorded in recordings)
+    copies = 1 + (augmented.copies if augmented else 0)
+    count += copies * sum(recorded.intervals.most() for recorded in recordings)
     check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
     combinations = _combinations(lists)
     if keep:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
         check_equal_sizes(keep, lengths, combinations)
-    return Spec(run, intervals, combinations, drawn, actors, recordings, keep, others)
+    return Spec(run, intervals, combinations, drawn, actors, recordings, keep, others, augmented)
 
 
 def _keep(table: Table) -> tuple[str, ...]:
@@ -182,6 +186,20 @@ def _others(table: Table) -> Others | None:
         _range(key, given.get(key, OTHERS[key]), low, high, "[others]") for key in ("x_m", "y_m")
     )
     return Others(count, tuple(labels), x_m, y_m)
+
+
+def _augmented(table: Table) -> Augmented | None:
+    """Return how recordings are augmented, if there is a table ``[augmented]``."""
+    if "augmented" not in table:
+        return None
+    given = table_at("augmented", table)
+    check_keys("[augmented] ", given, ("copies",), tuple(VARIED))
+    copies = _whole("[augmented] ", "copies", given["copies"], 1, 1000)
+    ranges = {
+        key: _range(key, given.get(key, usual), least, most, "[augmented]")
+        for key, (usual, least, most) in VARIED.items()
+    }
+    return Augmented(copies, ranges)
 
 
 def _run_settings(table: Table) -> RunSettings:
