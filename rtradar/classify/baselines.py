@@ -197,6 +197,6 @@ def evaluate_baselines(clouds: Collection, study: Study) -> dict[str, list[Outco
                     spread = ".*within_class_std_dev_"
                     warnings.filterwarnings("ignore", message=spread, category=UserWarning)
                     model = make(plan["seed"]).fit(features[split.train], truth[split.train])
-                    predicted = model.predict(features[split.test])
-                found[name].append(outcome_of(clouds, split, values, truth, predicted))
+                    chances = model.predict_proba(features[split.test])
+                found[name].append(outcome_of(clouds, split, values, truth, chances))
     return found

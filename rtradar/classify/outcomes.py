@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.classify.scores import Answers
 from rtradar.classify.splits import Split
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
@@ -44,6 +45,10 @@ class Outcome:
     history : list of dict
         One entry for each epoch, with the entries of `HISTORY`; empty for classifiers without
         epochs.
+    subjects : (test,) str
+        Who each cloud is of, and
+    probabilities : (test, class) float64
+        the probability that the classifier gave each class; both are empty in older files.
     """
 
     name: str
@@ -54,11 +59,20 @@ class Outcome:
     tested_on: NDArray[np.str_]
     recordings: NDArray[np.str_]
     history: list[dict[str, float]] = field(default_factory=list)
+    subjects: NDArray[np.str_] = field(default_factory=lambda: np.zeros(0, np.str_))
+    probabilities: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def accuracy(self) -> float:
         """Fraction of correct predictions."""
         return float(np.mean(self.truth == self.predicted))
+
+    @property
+    def answers(self) -> Answers | None:
+        """What `rtradar.classify.scores` judges; None if probabilities were not kept."""
+        if not len(self.probabilities):
+            return None
+        return Answers(self.probabilities, self.truth, self.recordings, self.subjects)
 
     @property
     def seconds(self) -> float:
@@ -78,13 +92,19 @@ def outcome_of(
     split: Split,
     values: NDArray[np.str_],
     truth: NDArray[np.int64],
-    predicted: NDArray[np.int64],
+    probabilities: NDArray[np.floating],
     history: Sequence[dict[str, float]] = (),
 ) -> Outcome:
-    """Outcome of ``predicted (test,)``; ``values`` (see `values_of`) and ``truth`` are (cloud,)."""
-    test, recordings = split.test, clouds.column("recording").astype(str)
-    columns = (test, truth[test], predicted, values[test], recordings[test])
-    return Outcome(split.name, split.trained_on, *columns, list(history))
+    """Outcome of ``probabilities (test, class)``.
+
+    ``values`` (see `values_of`) and ``truth`` are (cloud,).
+    """
+    test, chances = split.test, np.asarray(probabilities, dtype=np.float64)
+    recordings, subjects = (
+        clouds.column(name).astype(str)[test] for name in ("recording", "subject")
+    )
+    columns = (test, truth[test], chances.argmax(axis=1), values[test], recordings)
+    return Outcome(split.name, split.trained_on, *columns, list(history), subjects, chances)
 
 
 def save_outcome(path: Path, outcome: Outcome) -> None:
@@ -97,7 +117,10 @@ def load_outcome(path: Path) -> Outcome:
     """Read an outcome; InputError if it cannot be read or is damaged."""
     try:
         content = read_json(path)
+        content = {"subjects": [], "probabilities": []} | content
         columns = {name: _column(content[name], dtype) for name, dtype in _COLUMNS.items()}
+        columns["subjects"] = _column(content["subjects"], np.str_)
+        columns["probabilities"] = _chances(content["probabilities"], len(columns["subjects"]))
         outcome = Outcome(**content | columns)
         if not _is_whole(outcome):
             raise ValueError
@@ -120,6 +143,18 @@ def _column(values: Any, dtype: Any) -> NDArray[Any]:
     return np.array(values, dtype=dtype)
 
 
+def _chances(values: Any, count: int) -> NDArray[np.float64]:
+    """Array (test, class) of probabilities, or an empty one; ValueError for any other."""
+    if not isinstance(values, list) or len(values) != count:
+        raise ValueError
+    if not values:
+        return np.zeros((0, 0))
+    found = np.array(values, dtype=np.float64)
+    if found.ndim != 2 or not np.all((found >= 0) & (found <= 1 + 1e-6)):
+        raise ValueError
+    return found
+
+
 def _is_number(value: Any) -> bool:
     """Return whether a value is a number; NaN and infinity are, as a training may diverge."""
     return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**53)
@@ -132,6 +167,7 @@ def _is_whole(outcome: Outcome) -> bool:
         isinstance(outcome.name, str)
         and isinstance(outcome.trained_on, str)
         and all(column.shape == (len(outcome.truth),) for column in columns)
+        and len(outcome.subjects) in (0, len(outcome.truth))
         and len(outcome.truth) > 0
         and min(outcome.indices.min(), outcome.truth.min(), outcome.predicted.min()) >= 0
         and isinstance(outcome.history, list)

@@ -31,6 +31,12 @@ PHYSICAL_SCALES = (0.5, 0.5, 2.5)
 
 _ROTATION_JITTER, _ROTATION_JITTER_LIMIT = 0.02, 0.05  # those of PointNet on unit spheres
 
+_WIDE_TEMPO, _WIDE_SIZE, _WIDE_ASPECT = 0.25, 0.15, 0.25
+_WIDE_DRIFT_MPS = 0.3
+_WIDE_CUT = 0.2  # largest part of the time that is left out
+_WIDE_FILTERED, _WIDE_SLOW_MPS = 0.2, 0.4  # how often slow points are missing, and how slow
+_WIDE_FALSE = 0.04
+"""How clouds are varied by ``wide``: natural logarithms of factors, or largest values."""
 
 _TIME_SHIFT_S, _RANGE_SHIFT_M = 0.1, 0.1  # the largest in either direction
 _TEMPO = 0.15  # largest relative change of tempo: velocity is multiplied and time divided by it
@@ -38,7 +44,7 @@ _ASPECT = 0.15  # largest relative loss of radial motion, as of a person who fac
 _JITTER = (0.008, 0.012, 0.035)  # standard deviation [s, m, m/s], about a third of a map's cell
 
 
-def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
+def stack_clouds(clouds: Collection, *, seed: int = 0, edge_s: float = 0.0) -> Tensor:
     """Stack all clouds into one array, each in random order, so that its first points are a sample.
 
     Parameters
@@ -47,6 +53,8 @@ def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
         Labelled clouds.
     seed : int
         Seed of the random order.
+    edge_s : float
+        Time at both ends of each interval whose points are left out [s].
 
     Returns
     -------
@@ -60,6 +68,12 @@ def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
         If there are no clouds, or none has points.
     """
     each = [np.asarray(clouds.points(index), dtype=np.float64) for index in range(len(clouds))]
+    if edge_s:
+        ends = clouds.column("duration_s").astype(np.float64) - edge_s
+        each = [
+            some[(some[:, 0] >= edge_s) & (some[:, 0] < end)]
+            for some, end in zip(each, ends, strict=True)
+        ]
     n_points = max((len(points) for points in each), default=0)
     if not n_points:
         raise InputError(
@@ -100,6 +114,8 @@ def for_training(points: Tensor, augmentation: Augmentation, scaling: Scaling) -
         return _rotated(scaled(points, scaling))
     if augmentation == "none":
         return scaled(points, scaling)
+    if augmentation == "wide":
+        return scaled(_varied(points), scaling)
     largest = torch.tensor([_TIME_SHIFT_S, _RANGE_SHIFT_M, 0.0])
     shift = largest * _uniform(len(points), 3)
     # Shifts are added after scaling, because scaling removes the middle of the cloud.
@@ -117,6 +133,38 @@ def _stretched(points: Tensor) -> Tensor:
     middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
     jitter = torch.randn(points.shape) * torch.tensor(_JITTER)
     return middle + (points - middle) * factor + jitter
+
+
+def _varied(points: Tensor) -> Tensor:
+    """Vary clouds (cloud, point, 3) in the ways in which recordings of people differ.
+
+    Tempo, aspect and size; a drift of the whole person, which shifts velocity and tilts range; the
+    part of the interval; slow points that a filter removes; false points; and jitter.
+    """
+    n_clouds, n_points, _ = points.shape
+    time, distance, _ = (points - points.mean(dim=1, keepdim=True)).unbind(dim=2)
+    tempo = torch.exp(_WIDE_TEMPO * _uniform(n_clouds, 1))
+    size = torch.exp(_WIDE_SIZE * _uniform(n_clouds, 1))
+    size = size * (1 - _WIDE_ASPECT * torch.rand(n_clouds, 1))
+    drift = _WIDE_DRIFT_MPS * _uniform(n_clouds, 1)
+    time, velocity = time / tempo, points[..., 2] * size * tempo + drift
+    varied = torch.stack([time, distance * size + drift * time, velocity], dim=2)
+    varied += torch.randn(points.shape) * torch.tensor(_JITTER) * 2 * torch.rand(n_clouds, 1, 1)
+    # What is left out is replaced by other points of the cloud.
+    begin = time.amin(dim=1, keepdim=True)
+    length = (time.amax(dim=1, keepdim=True) - begin).clamp(min=1e-3)
+    kept = 1 - _WIDE_CUT * torch.rand(n_clouds, 1)
+    place = (time - begin) / length - (1 - kept) * torch.rand(n_clouds, 1)
+    slow = _WIDE_SLOW_MPS * torch.rand(n_clouds, 1) * (torch.rand(n_clouds, 1) < _WIDE_FILTERED)
+    good = (place >= 0) & (place <= kept) & (velocity.abs() >= slow)
+    good |= ~good.any(dim=1, keepdim=True)
+    others = torch.multinomial(good.float(), n_points, replacement=True)
+    chosen = torch.where(good, torch.arange(n_points), others)
+    varied = varied.gather(1, chosen[..., None].expand(-1, -1, 3))
+    low, high = varied.amin(dim=1, keepdim=True), varied.amax(dim=1, keepdim=True)
+    anywhere = low + (high - low) * torch.rand(points.shape)
+    false = torch.rand(n_clouds, n_points) < _WIDE_FALSE * torch.rand(n_clouds, 1)
+    return torch.where(false[..., None], anywhere, varied)
 
 
 def _rotated(points: Tensor) -> Tensor:

@@ -12,16 +12,20 @@ from rtradar.errors import InputError
 
 Schedule = Literal["step", "one-cycle"]
 Scaling = Literal["unit-sphere", "physical"]
-Augmentation = Literal["none", "rotation", "physical"]
+Augmentation = Literal["none", "rotation", "physical", "wide"]
 Precision = Literal["float32", "bfloat16"]
+Network = Literal["pointnet", "pooled", "edges"]
 
 _CHOICES = {
     "schedule": get_args(Schedule),
     "scaling": get_args(Scaling),
     "augmentation": get_args(Augmentation),
     "precision": get_args(Precision),
+    "network": get_args(Network),
 }
 _FILE_KEYS = {"resample": "redraw", "step_epochs": "halve_every"}
+_LATER_FIELDS = ("network", "edge_s", "label_smoothing", "balanced")
+"""Fields that files of studies have only where they differ from their defaults."""
 _FILE_VALUES = {"step": "halving", "rotation": "turned"}
 """Names and values in the files of studies, where they differ from those of `Recipe`."""
 
@@ -62,11 +66,20 @@ class Recipe:
         Normalisation of time, range and velocity, see `rtradar.classify.prepare`.
     resample : bool
         Whether the points of a cloud are resampled in every epoch; otherwise they stay the same.
-    augmentation : {"none", "rotation", "physical"}
+    augmentation : {"none", "rotation", "physical", "wide"}
         Augmentation of training clouds, see `rtradar.classify.prepare`.
     precision : {"float32", "bfloat16"}
         Precision of the search for the maximum over the points during training. Values, gradients
         and predictions are always float32.
+    network : {"pointnet", "pooled", "edges"}
+        PointNet, or one of `rtradar.classify.small_networks`.
+    edge_s : float
+        Time at both ends of each interval whose points are left out [s]. The surface from which
+        points are drawn is closed there.
+    label_smoothing : float
+        Probability that is spread over all classes in the loss, at least 0 and below 1.
+    balanced : bool
+        Whether each class has the same weight in the loss, however many clouds show it.
 
     Raises
     ------
@@ -97,6 +110,10 @@ class Recipe:
     resample: bool = False
     augmentation: Augmentation = "none"
     precision: Precision = "float32"
+    network: Network = "pointnet"
+    edge_s: float = 0.0
+    label_smoothing: float = 0.0
+    balanced: bool = False
 
     def __post_init__(self) -> None:
         for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("step_epochs", 1)):
@@ -105,12 +122,13 @@ class Recipe:
             self._demand(field, whole and value >= least, f"a whole number, at least {least}")
         positive = math.isfinite(self.rate) and self.rate > 0
         self._demand("rate", positive, "a finite number above 0, such as 1e-4")
-        for field in ("stop_below", "weight_decay"):
+        for field in ("stop_below", "weight_decay", "edge_s"):
             value = getattr(self, field)
             self._demand(
                 field, math.isfinite(value) and value >= 0, "a finite number, not negative"
             )
-        self._demand("dropout", 0 <= self.dropout < 1, "at least 0 and below 1")
+        for field in ("dropout", "label_smoothing"):
+            self._demand(field, 0 <= getattr(self, field) < 1, "at least 0 and below 1")
         words = {old: new for new, old in _FILE_VALUES.items()}
         for field, allowed in _CHOICES.items():
             value = words.get(getattr(self, field), getattr(self, field))
@@ -171,7 +189,12 @@ class Recipe:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain values, with the names and words of the files of studies."""
-        fields = dataclasses.asdict(self).items()
+        usual = {field.name: field.default for field in dataclasses.fields(self)}
+        fields = [
+            (key, value)
+            for key, value in dataclasses.asdict(self).items()
+            if key not in _LATER_FIELDS or value != usual[key]
+        ]
         return {_FILE_KEYS.get(key, key): _FILE_VALUES.get(value, value) for key, value in fields}
 
     @classmethod
@@ -211,5 +234,22 @@ LEAN = Recipe(
 T-Nets would mix time with velocity.
 """
 
-RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER)}
+SMALL = LEAN.changed(
+    name="small",
+    points=128,
+    batch=32,
+    epochs=50,
+    dropout=0.3,
+    augmentation="wide",
+    network="pooled",
+    edge_s=0.1,
+    label_smoothing=0.05,
+    balanced=True,
+)
+"""A small network, widely varied clouds, few points: what learns from actors for recordings."""
+
+EDGES = SMALL.changed(name="edges", network="edges")
+"""The same with a network that looks at the neighbours of each point."""
+
+RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER, SMALL, EDGES)}
 """Predefined recipes by name."""

@@ -20,7 +20,9 @@ from rtradar.clouds.sample_files import UNKNOWN
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 
-SCHEMES = ("folds", "recording", "subject", "recorded", "across:COLUMN")
+SCHEMES = (
+    "folds", "recording", "subject", "leave-one-subject-out", "recorded", "across:COLUMN"
+)  # fmt: skip
 """Schemes: folds over clouds (the paper's), recordings or subjects; recorded; across a column."""
 
 _ACROSS = "across:"
@@ -59,7 +61,9 @@ def make_splits(
     scheme : str
         Scheme of the splits. ``folds``: the paper's, stratified over clouds. ``recording``,
         ``subject``: each recording or subject is on one side only; a recording whose subject is
-        ``unknown`` counts as a subject of its own. ``recorded``: train on synthetic
+        ``unknown`` counts as a subject of its own. ``leave-one-subject-out``: each recorded person
+        in turn is asked about, and all others are learnt from, actors among them; without
+        recordings each actor. ``recorded``: train on synthetic
         motion, test on recorded motion. ``across:COLUMN`` (or ``across:A,B``): for every value of
         the column(s) and every fold over recordings, train on the clouds of that value, test on
         clouds of all values from other recordings.
@@ -82,6 +86,8 @@ def make_splits(
     intervals, recordings = intervals_of(clouds), recordings_of(clouds)
     if scheme == "recorded":
         splits = [_synthetic_to_recorded(clouds)]
+    elif scheme == "leave-one-subject-out":
+        splits = _each_left_out(clouds)
     elif scheme.startswith(_ACROSS):
         values = values_of(clouds, scheme)
         parts = _folds(clouds, "recording", recordings, folds, _MAX_FOLDS[_ACROSS], seed)
@@ -185,6 +191,16 @@ def _synthetic_to_recorded(clouds: Collection) -> Split:
             "build a data set of synthetic and recorded motion"
         )
     return Split("synthetic to recorded", known["synthetic"], known["recorded"])
+
+
+def _each_left_out(clouds: Collection) -> list[Split]:
+    subjects, source = subjects_of(clouds), clouds.column("source").astype(str)
+    asked = source == "recorded" if (source == "recorded").any() else np.full(len(source), True)
+    names, index = clouds.column("subject").astype(str), np.arange(len(clouds))
+    return [
+        Split(f"{names[subjects == one][0]}", index[subjects != one], index[subjects == one])
+        for one in np.unique(subjects[asked])
+    ]
 
 
 def _folds(

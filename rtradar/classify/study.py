@@ -19,13 +19,14 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 from tqdm import tqdm
 
 from rtradar.classify import training
 from rtradar.classify.outcomes import Outcome, load_outcome, outcome_of, save_outcome
-from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
+from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples
 from rtradar.clouds.collection import Collection
@@ -202,7 +203,9 @@ def train_study(
     values = values_of(clouds, split)
     missing = [n for n in numbers if not (training_folder(out, n) / _OUTCOME).exists()]
     if missing:
-        examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
+        examples = Examples(
+            stack_clouds(clouds, seed=seed, edge_s=recipe.edge_s), torch.from_numpy(truth), names
+        )
         training.check_points(examples, recipe)
     write_plan(out, plan)
     with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:
@@ -219,8 +222,8 @@ def train_study(
                 checkpoint=folder / _CHECKPOINT,
                 on_epoch=_shown(bar, one.name),
             )
-            predicted = training.predict(network, test, recipe).argmax(axis=1)
-            outcome = outcome_of(clouds, one, values, truth, predicted, history)
+            chances = np.exp(training.predict(network, test, recipe))
+            outcome = outcome_of(clouds, one, values, truth, chances, history)
             save_outcome(folder / _OUTCOME, outcome)
     return load_study(out)
 
@@ -283,7 +286,7 @@ def load_study(folder: Path) -> Study:
     return Study(folder, plan, outcomes)
 
 
-def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple[str, ...]]:
+def load_network(folder: Path, number: int = 1) -> tuple[nn.Module, Recipe, tuple[str, ...]]:
     """Load a trained network, to classify other clouds.
 
     Parameters
@@ -295,7 +298,7 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
 
     Returns
     -------
-    network : PointNet
+    network : torch.nn.Module
         Network in evaluation mode, see `rtradar.classify.predict`.
     recipe : Recipe
         Recipe by which clouds are sampled and scaled for the network.
@@ -310,7 +313,7 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
     plan = read_plan(folder)
     recipe, classes = Recipe.from_dict(plan["recipe"]), tuple(plan["classes"])
     path = training_folder(folder, number - 1) / _CHECKPOINT
-    network = PointNet(len(classes), recipe)
+    network = build_network(len(classes), recipe)
     try:
         network.load_state_dict(training.load_checkpoint(path).network)
     except (RuntimeError, TypeError, AttributeError):

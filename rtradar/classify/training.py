@@ -17,12 +17,12 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 from torch.nn import functional
 
-from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import for_training, sampled, scaled
 from rtradar.classify.recipes import Precision, Recipe
+from rtradar.classify.small_networks import build_network
 from rtradar.errors import BackendError, InputError
 from rtradar.system.files import atomic_file, open_regular
 from rtradar.system.seeds import stream
@@ -100,7 +100,7 @@ def train_network(
     device: torch.device | None = None,
     checkpoint: Path | None = None,
     on_epoch: Callable[[int, Row], None] = lambda epoch, row: None,
-) -> tuple[PointNet, list[Row]]:
+) -> tuple[nn.Module, list[Row]]:
     """Train a network to the end of the recipe, continuing from the checkpoint if there is one.
 
     On a CPU the same clouds, recipe, seed and number of threads give the same network, interrupted
@@ -123,7 +123,7 @@ def train_network(
 
     Returns
     -------
-    network : PointNet
+    network : torch.nn.Module
         Trained network in evaluation mode.
     history : list of dict
         One entry for each epoch: ``rate``; ``train_loss`` and ``train_accuracy`` during training,
@@ -144,7 +144,7 @@ def train_network(
     # Torch's random state is restored afterwards.
     with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         torch.manual_seed(_number(seed, 0))
-        network = PointNet(len(train.names), recipe).to(device)
+        network = build_network(len(train.names), recipe).to(device)
         optimiser = torch.optim.AdamW(
             network.parameters(), lr=recipe.rate, weight_decay=recipe.weight_decay, fused=True
         )
@@ -172,12 +172,12 @@ def train_network(
     return network.eval(), history
 
 
-def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np.float32]:
+def predict(network: nn.Module, examples: Examples, recipe: Recipe) -> NDArray[np.float32]:
     """Predict the log-probability of every class from the first points of every cloud.
 
     Parameters
     ----------
-    network : PointNet
+    network : torch.nn.Module
         Trained network.
     examples : Examples
         Clouds to classify.
@@ -201,14 +201,21 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
 
 
 def _train_epoch(
-    network: PointNet, optimiser: torch.optim.Optimizer, train: Examples, recipe: Recipe, epoch: int
+    network: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    train: Examples,
+    recipe: Recipe,
+    epoch: int,
 ) -> Row:
     device = next(network.parameters()).device
     network.train()
     n_clouds = len(train.points)
     batches = torch.randperm(n_clouds).tensor_split(max(1, n_clouds // recipe.batch))
     loss_sum, right = 0.0, 0
-    rate = recipe.rate_at(epoch, 0.0)
+    rate, weights = recipe.rate_at(epoch, 0.0), None
+    if recipe.balanced:
+        counts = torch.bincount(train.classes, minlength=len(train.names)).clamp(min=1)
+        weights = (counts.sum() / len(counts) / counts).to(device)
     for number, batch in enumerate(batches):
         for group in optimiser.param_groups:
             group["lr"] = recipe.rate_at(epoch, number / len(batches))
@@ -216,7 +223,9 @@ def _train_epoch(
         points = for_training(points, recipe.augmentation, recipe.scaling).to(device)
         wanted = train.classes[batch].to(device)
         log_probabilities, skewness = network(points)
-        loss = functional.nll_loss(log_probabilities, wanted)
+        loss = functional.cross_entropy(
+            log_probabilities, wanted, weights, label_smoothing=recipe.label_smoothing
+        )
         optimiser.zero_grad()
         (loss + SKEWNESS_WEIGHT * skewness).backward()
         optimiser.step()
@@ -225,7 +234,7 @@ def _train_epoch(
     return {"rate": rate, "train_loss": loss_sum / n_clouds, "train_accuracy": right / n_clouds}
 
 
-def _evaluate(network: PointNet, test: Examples, recipe: Recipe) -> Row:
+def _evaluate(network: nn.Module, test: Examples, recipe: Recipe) -> Row:
     log_probabilities = torch.from_numpy(predict(network, test, recipe))
     right = (log_probabilities.argmax(dim=1) == test.classes).float().mean()
     return {
@@ -235,7 +244,7 @@ def _evaluate(network: PointNet, test: Examples, recipe: Recipe) -> Row:
 
 
 def _restore(
-    path: Path, network: PointNet, optimiser: torch.optim.Optimizer, recipe: Recipe
+    path: Path, network: nn.Module, optimiser: torch.optim.Optimizer, recipe: Recipe
 ) -> list[Row]:
     """Load the state of a checkpoint and return its history."""
     state = load_checkpoint(path)

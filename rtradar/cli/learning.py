@@ -110,14 +110,16 @@ def _add_train(train: OneLineParser) -> None:
         required=True,
     )
     train.add_argument(
-        "--recipe", default="lean", help="lean, our own, or paper (default: %(default)s)"
+        "--recipe",
+        default="lean",
+        help="lean, our own, paper, small or edges (default: %(default)s)",
     )
     train.option(
         "--split",
         "HOW",
-        "folds (the paper's, over clouds), recording, subject, recorded (learn from "
-        "synthetic motion), or across:COLUMN, which learns from one value of a column, such as "
-        "fidelity, and asks about all (default: %(default)s)",
+        "folds (the paper's, over clouds), recording, subject, leave-one-subject-out, recorded "
+        "(learn from synthetic motion), or across:COLUMN, which learns from one value of a "
+        "column, such as fidelity, and asks about all (default: %(default)s)",
         default="folds",
     )
     train.option(
@@ -127,13 +129,23 @@ def _add_train(train: OneLineParser) -> None:
         type=whole,
     )
     train.option("--fold", "N,M,...", "only these trainings, from 1 (default: all)", type=numbers)
-    train.option("--points", "N", "points of each cloud (default: 1000)", type=whole)
-    train.option("--epochs", "N", "number of epochs (default: lean 30, paper 200)", type=whole)
+    train.option(
+        "--points",
+        "N",
+        "points of each cloud (default: lean and paper 1000, small and edges 128)",
+        type=whole,
+    )
+    train.option(
+        "--epochs",
+        "N",
+        "number of epochs (default: lean 30, paper 200, small and edges 50)",
+        type=whole,
+    )
     train.option("--rate", "X", "learning rate (default: lean 2e-3, paper 1e-4)", type=number)
     train.flag("--all-epochs", "with paper: go on when the halved rate is below 1e-6")
     train.add_argument(
         "--augmentation",
-        help="none, physical, or rotation, which is the paper's "
+        help="none, physical, wide, or rotation, which is the paper's "
         "(default: lean physical, paper none)",
     )
     train.add_argument(

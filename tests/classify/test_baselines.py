@@ -28,7 +28,7 @@ def study_of(clouds: Any) -> Study:
     _, truth = classes_of(clouds)
     splits = make_splits(clouds, "folds", folds=3)
     outcomes: list[Outcome] = [
-        outcome_of(clouds, split, values_of(clouds, "folds"), truth, truth[split.test])
+        outcome_of(clouds, split, values_of(clouds, "folds"), truth, np.eye(3)[truth[split.test]])
         for split in splits
     ]
     plan = {

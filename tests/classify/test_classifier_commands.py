@@ -14,8 +14,9 @@ import pytest
 import torch
 
 from rtradar.classify import study
+from rtradar.classify.baselines import BASELINES
 from rtradar.classify.prepare import stack_clouds
-from rtradar.classify.recipes import LEAN, PAPER, RECIPES
+from rtradar.classify.recipes import LEAN, PAPER, RECIPES, SMALL
 from rtradar.classify.study import load_network, train_study
 from rtradar.classify.training import Examples, predict
 from rtradar.cli import main
@@ -78,7 +79,7 @@ def test_a_study_is_trained_and_evaluated(
     assert "random forest, metadata alone" in said
     content = json.loads((out / "evaluation.json").read_text())
     assert content == json.loads((tmp_path / "numbers.json").read_text())
-    assert len(content["groups"]) == 2 + 5
+    assert len(content["groups"]) == 2 + len(BASELINES)
     lean = content["groups"][0]
     assert lean["summary"]["test_clouds"] == 36  # each cloud once
     assert sum(map(sum, lean["confusion"])) == 36
@@ -272,11 +273,13 @@ def test_the_help_of_train_has_the_defaults_of_the_recipes(
     assert rtradar("train", "--help") == 0
     words = " ".join(capsys.readouterr().out.split())
     for text in (
-        f"number of epochs (default: lean {LEAN.epochs}, paper {PAPER.epochs})",
+        f"number of epochs (default: lean {LEAN.epochs}, paper {PAPER.epochs}, "
+        f"small and edges {SMALL.epochs})",
         f"learning rate (default: lean {LEAN.rate:.0e}, paper {PAPER.rate:.0e})",
         f"the paper's (default: lean {LEAN.augmentation}, paper {PAPER.augmentation})",
     ):
         assert text.replace("e-0", "e-") in words
+    points = f"lean and paper {LEAN.points}, small and edges {SMALL.points}"
+    assert f"points of each cloud (default: {points})" in words
     for recipe in RECIPES.values():
-        assert f"points of each cloud (default: {recipe.points})" in words
         assert f"all by one (default: {recipe.scaling})" in words

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rtradar.classify import outcomes as scores
 from rtradar.classify.outcomes import HISTORY, TABLE_4, Outcome
+from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.canvas import add_colour_bar
@@ -73,6 +74,8 @@ def write_evaluation(
             transfer = scores.transfer(study.outcomes)
             blocks.append(scores.transfer_table(*transfer))
             draw_transfer(out / f"transfer-{number}.png", *transfer, title)
+    if judged := [(title, found) for title, each in groups if (found := together(each))]:
+        blocks.append(score_table(judged))
     rows = [(title, _accuracies(outcomes)) for title, outcomes in groups]
     draw_accuracies(out / "accuracy.png", rows)
     text = "\n\n".join(blocks)
@@ -86,6 +89,46 @@ def write_evaluation(
     content["files"] = EVALUATION_FILES.list_of(out)
     (out / "evaluation.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return text, content
+
+
+def together(outcomes: Sequence[Outcome]) -> Answers | None:
+    """Return the answers of all trainings; None where one has kept none."""
+    each = [one.answers for one in outcomes]
+    known = [answers for answers in each if answers is not None]
+    if not known or len(known) < len(each):
+        return None
+    return Answers(*(np.concatenate(columns) for columns in zip(*known, strict=True)))
+
+
+def scores_of(answers: Answers) -> dict[str, Any]:
+    """Return balanced accuracies, their interval over people, and the error of calibration."""
+    recordings = answers.by_recording()
+    return {
+        "balanced": balanced_accuracy(answers),
+        "balanced_by_recording": balanced_accuracy(recordings),
+        "interval": interval(recordings),
+        "calibration_error": calibration_error(recordings),
+        "recordings": len(recordings.truth),
+        "people": len(set(answers.subjects.tolist())),
+    }
+
+
+def score_table(judged: Sequence[tuple[str, Answers]]) -> str:
+    """Format balanced accuracies [%] of clouds and of recordings."""
+    width = max(len("balanced, in %"), *(len(title) for title, _ in judged))
+    heads = ("clouds", "recordings", "95 % over people", "calibration error")
+    lines = [f"{'balanced, in %':<{width}}" + "".join(f"  {head:>17}" for head in heads)]
+    for title, answers in judged:
+        found = scores_of(answers)
+        low, high = found["interval"]
+        cells = (
+            f"{100 * found['balanced']:.1f}",
+            f"{100 * found['balanced_by_recording']:.1f}",
+            f"{100 * low:.1f} to {100 * high:.1f}",
+            f"{100 * found['calibration_error']:.1f}",
+        )
+        lines.append(f"{title:<{width}}" + "".join(f"  {cell:>17}" for cell in cells))
+    return "\n".join(lines)
 
 
 def _accuracies(outcomes: Sequence[Outcome]) -> list[float]:
@@ -133,6 +176,7 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     content = {
         "title": title,
         "summary": scores.summary(outcomes),
+        "scores": scores_of(found) if (found := together(outcomes)) else None,
         "confusion": scores.confusion(outcomes, n_classes).tolist(),
         "recordings": scores.recordings_of(outcomes, n_classes),
         "trainings": [
