@@ -32,6 +32,7 @@ READERS = Registry(
         "bvh": "rtradar.motion.formats.bvh:load_bvh",
         "c3d": "rtradar.motion.formats.c3d:load_c3d",
         "npz": "rtradar.motion.formats.joints:load_npz",
+        "csv": "rtradar.motion.formats.joints:load_csv",
     },
 )
 """Readers of motion files, by the ending of the file without the dot."""

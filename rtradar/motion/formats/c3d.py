@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion
+from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import to_world
 from rtradar.system.checks import brief
@@ -145,8 +145,7 @@ def bridged(seen: Markers) -> NDArray[np.float64]:
         unseen = np.isnan(positions[:, k, 0])
         if not unseen.any():
             continue
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], unseen, [0]])))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        for begin, end in runs(unseen):
             first, last = seen.first_frame + begin, seen.first_frame + end - 1
             where = f"{seen.path}: marker {name} is not seen in frames {first} to {last}"
             if begin == 0 or end == len(positions):

@@ -1,10 +1,26 @@
-"""Recordings of joint positions (.npz), such as cameras with depth and body models give."""
+"""Recordings of joint positions, such as cameras with depth and body models give.
+
+What is measured joint by joint is made the motion of a rigid skeleton: the 22 nodes are taken from
+the joints (`joint_sets`), gaps are bridged, joints of cameras pass a low-pass, all is sampled
+evenly, heads and feet are completed, the floor is found, and the bones are given their median
+lengths (`markers.rigid_motion`).
+
+The low-pass is a smoothing spline, the least of ``sum (y - f)^2 + lam int f''^2``. For samples
+``dt`` apart its response is ``1 / (1 + (f / f_c)^4)`` with ``lam = (2 pi f_c)^-4 / dt``, that of a
+Butterworth filter of second order run forward and backward, but it takes gaps and uneven times.
+
+References
+----------
+H. J. Woltring, A Fortran package for generalized, cross-validatory spline smoothing and
+differentiation, Advances in Engineering Software 8, 1986. R. Drillis, R. Contini, Body segment
+parameters, New York University, 1966.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from dataclasses import dataclass
+import math
 from pathlib import Path
 
 import numpy as np
@@ -12,185 +28,253 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, make_smoothing_spline
 
 from rtradar.errors import InputError
+from rtradar.motion.formats.joint_files import (
+    LEAST_FRAMES,
+    UPWARD,
+    JointRecording,
+    read_csv,
+    read_npz,
+)
 from rtradar.motion.formats.joint_sets import JointSet, node_positions, recognise
-from rtradar.motion.formats.markers import level_axes, rigid_motion
+from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
-from rtradar.motion.skeleton import HEAD_OF_THIGH, NODE_PARENTS, NODES
-from rtradar.system.files import read_arrays
+from rtradar.motion.skeleton import HEAD_OF_THIGH, MINIMUM_PART_M, NODE_PARENTS, NODES
 
 Array = NDArray[np.float64]
 
 LONGEST_GAP_S = 0.25
-"""Longest gap of a joint that is bridged [s]."""
+"""Longest gap that is bridged [s]: a quarter of a step of a walk."""
 
 CUTOFF_HZ = 8.0
-"""Frequency of which the low-pass for joints that jitter leaves half [Hz]."""
+"""Frequency of which the low-pass for joints of cameras leaves half [Hz]."""
 
-LEAST_RATE_HZ = 120.0
+RATE_HZ = 120.0
+"""Least rate of the motion that is made [Hz], for `Motion` interpolates its root by PCHIP, which
+flattens the crests of what is sampled more rarely."""
+
+_EVEN = 0.01
+"""Largest deviation of steps of time from their median, relative to it, that is rounding."""
+
+_TIMES_TOO_LONG, _TIMES_TOO_SHORT = 1.6, 0.5
+"""Lengths of a bone over its median beyond which the joint at its end was lost by the camera."""
+
+_THIGH_M = (0.15, 0.8)
+"""Limits of the length of people's thighs, children included [m]."""
+
+_UPRIGHT = 0.7
+"""Least cosine between an axis and the median direction from the ankles to the head, for that axis
+to be up."""
+
+_FOOT_OF_SHANK = 0.43
+"""Ratio of the lengths from ankle to toe tip and from knee to ankle (HDM05, CMU)."""
+
+_ANKLE_OF_STATURE = 0.039
+"""Height of the ankle over that of the person (Drillis and Contini 1966)."""
 
 _NOMINAL_STATURE_M = 1.75
-_SEGMENTS_OF_STATURE = {"knee": 0.245, "ankle": 0.246, "elbow": 0.186, "wrist": 0.146}
-_TRUNK_OF_STATURE = 0.288
-_FOOT_OF_SHANK = 0.43
-_TOE_HEIGHT_M = 0.02
+"""Stature of a person of girth 1."""
+
+_TOE_HEIGHT_M, _ON_THE_FLOOR = 0.02, 0.1
+"""Height of the toe tips of who stands, of a person of nominal stature [m], and the quantile of the
+height of the lowest node, over all frames, that is a person's who stands."""
 
 
-@dataclass(frozen=True)
-class JointRecording:
-    """Positions (frame, joint, 3) of named joints [m], NaN where unseen, at ``times`` (frame,)."""
-
-    path: Path
-    names: tuple[str, ...]
-    positions: Array
-    times: Array
-    up: str
+def load_npz(path: Path, *, unit_m: float | None = None) -> Motion:
+    """Read joint positions from an archive of NumPy."""
+    return motion_of(read_npz(path, 1.0 if unit_m is None else unit_m))
 
 
-def load_npz(path: Path) -> Motion:
-    """Read joint positions from an archive of NumPy; an `InputError` tells what is wrong with it.
-
-    It holds ``positions (frame, joint, 3)`` [m], ``joints``, ``up``, and ``rate_hz`` or ``time_s``.
-    """
-    try:
-        arrays = read_arrays(path)
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot read this NPZ file ({error.strerror}); check the path"
-        ) from None
-    except ValueError as error:
-        raise InputError(
-            f"{path}: not an archive of NumPy, or a damaged one ({error}); write positions, "
-            "joints, up, and rate_hz or time_s with numpy.savez"
-        ) from None
-    for needed in ("positions", "joints", "up", "rate_hz or time_s"):
-        if not any(name in arrays for name in needed.split(" or ")):
-            raise InputError(
-                f"{path}: {needed} is missing; joint positions need positions, "
-                "joints, up, and rate_hz or time_s"
-            )
-    positions = arrays["positions"].astype(np.float64)
-    times = (
-        arrays["time_s"].astype(np.float64)
-        if "time_s" in arrays
-        else np.arange(len(positions)) / float(arrays["rate_hz"])
-    )
-    names = tuple(map(str, arrays["joints"]))
-    return motion_of(JointRecording(path, names, positions, times, str(arrays["up"])))
+def load_csv(path: Path, *, unit_m: float | None = None) -> Motion:
+    """Read joint positions from a table with a header."""
+    return motion_of(read_csv(path, 1.0 if unit_m is None else unit_m))
 
 
 def motion_of(recording: JointRecording) -> Motion:
-    """Make a rigid skeleton of joints that were measured one by one."""
-    joint_set = recognise(str(recording.path), recording.names)
-    positions = recording.positions.copy()
-    positions[~positions.any(axis=2)] = np.nan
-    if recording.up == "y":
-        positions = positions[..., [2, 0, 1]]
-    nodes = node_positions(joint_set, recording.names, positions)
-    nodes[_impossible(nodes)] = np.nan
-    nodes, times = _longest_stretch(nodes, recording.times)
+    """Make the motion of a rigid skeleton of joints that were measured one by one."""
+    where = str(recording.path)
+    joint_set = recognise(where, recording.names)
+    nodes = node_positions(joint_set, recording.names, recording.positions)
+    for node in np.flatnonzero(np.isnan(nodes[..., 0]).all(axis=0)):
+        raise InputError(
+            f"{where}: the joint of node {NODES[node]!r} is never seen; add it, or take another "
+            "recording"
+        )
+    nodes = nodes @ _to_world(where, nodes, recording.up).T
+    thigh = float(np.nanmedian(_length(nodes, "l_knee", "l_hip")))
+    if not _THIGH_M[0] <= thigh <= _THIGH_M[1]:
+        raise InputError(
+            f"{where}: hip and knee are {thigh:.3g} m apart, a person's {_THIGH_M[0]} to "
+            f"{_THIGH_M[1]} m; positions are in metres, give unit_m (0.001 for millimetres)"
+        )
+    if joint_set.jitters:
+        _drop_lost(nodes, recording.times)
+    nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, joint_set)
-    pelvis = level_axes(_across(nodes, "hip"), np.cross(_across(nodes, "hip"), _spine(nodes)))
-    thorax = level_axes(
-        _across(nodes, "shoulder"), np.cross(_across(nodes, "shoulder"), _spine(nodes))
-    )
+    hips, shoulders = (_node(nodes, f"l_{at}") - _node(nodes, f"r_{at}") for at in _SIDES)
+    pelvis, thorax = (level_axes(left, np.cross(left, _trunk(nodes))) for left in (hips, shoulders))
     _complete(nodes, pelvis, joint_set)
-    lengths = np.median(np.linalg.norm(nodes - nodes[:, NODE_PARENTS], axis=2), axis=0)
-    stature = _stature(nodes, lengths)
-    floor = np.quantile(nodes[..., 2].min(axis=1), 0.1)
-    nodes[..., 2] += _TOE_HEIGHT_M * stature / _NOMINAL_STATURE_M - floor
+    _keep_directions(where, nodes)
+    size = _stature(nodes) / _NOMINAL_STATURE_M
+    lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
+    nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
     motion = rigid_motion(recording.path.stem, nodes, pelvis, thorax, rate_hz)
-    return dataclasses.replace(motion, girth=stature / _NOMINAL_STATURE_M)
+    return dataclasses.replace(motion, girth=size)
 
 
-def _impossible(nodes: Array) -> NDArray[np.bool_]:
-    """Nodes (frame, node) whose bone is more than twice, or less than a third, of its length.
-
-    Hands and feet may be foreshortened; `_complete` mends them.
-    """
-    spans = np.linalg.norm(nodes - nodes[:, NODE_PARENTS], axis=2)
-    usual = np.nanmedian(spans, axis=0)
-    ends = np.array([node.endswith(("hand", "toe")) for node in NODES])
-    wrong = (spans > 2 * usual) | ((spans < usual / 3) & ~ends)
-    wrong[:, 0] = False
-    return np.asarray(wrong)
-
-
-def _longest_stretch(nodes: Array, times: Array) -> tuple[Array, Array]:
-    """Cut to the longest stretch in which no node is unseen for more than `LONGEST_GAP_S`."""
-    seen = ~np.isnan(nodes[..., 0])
-    ends = [0]
-    for k in range(nodes.shape[1]):
-        own = np.flatnonzero(seen[:, k])
-        for first, last in itertools.pairwise(own.tolist()):
-            if times[last] - times[first] > LONGEST_GAP_S:
-                ends += [first + 1, last]
-    whole = np.flatnonzero(seen.all(axis=1))
-    edges = sorted({*ends, len(times)})
-    best = slice(0, 0)
-    for first, last in itertools.pairwise(edges):
-        own = whole[(whole >= first) & (whole < last)]
-        if len(own) and own[-1] + 1 - own[0] > best.stop - best.start:
-            best = slice(int(own[0]), int(own[-1]) + 1)
-    return nodes[best], times[best] - times[best.start]
-
-
-def _resampled(nodes: Array, times: Array, joint_set: JointSet) -> tuple[Array, float]:
-    step = float(np.median(np.diff(times)))
-    rate = round(float(np.ceil(LEAST_RATE_HZ * step - 1e-6) / step), 6)
-    at = np.arange(int(times[-1] * rate + 1e-6) + 1) / rate
-    made = np.empty((len(at), *nodes.shape[1:]))
-    for k in range(nodes.shape[1]):
-        own = ~np.isnan(nodes[:, k, 0])
-        if joint_set.jitters:
-            lam = (2 * np.pi * CUTOFF_HZ) ** -4 / step
-            for axis in range(3):
-                made[:, k, axis] = make_smoothing_spline(times[own], nodes[own, k, axis], lam=lam)(
-                    at
-                )
-        else:
-            made[:, k] = CubicSpline(times[own], nodes[own, k])(at)
-    return made, rate
+_SIDES = ("hip", "shoulder")
 
 
 def _node(nodes: Array, name: str) -> Array:
     return nodes[:, NODES.index(name)]
 
 
-def _across(nodes: Array, name: str) -> Array:
-    return _node(nodes, f"l_{name}") - _node(nodes, f"r_{name}")
+def _length(nodes: Array, first: str, last: str) -> Array:
+    return np.asarray(np.linalg.norm(_node(nodes, first) - _node(nodes, last), axis=1))
 
 
-def _spine(nodes: Array) -> Array:
-    hips, shoulders = (
-        _node(nodes, f"l_{name}") + _node(nodes, f"r_{name}") for name in ("hip", "shoulder")
-    )
+def _trunk(nodes: Array) -> Array:
+    """Vectors (frame, 3) from the middle of the hips to that of the shoulders."""
+    hips, shoulders = (_node(nodes, f"l_{at}") + _node(nodes, f"r_{at}") for at in _SIDES)
     return np.asarray((shoulders - hips) / 2)
 
 
+def _to_world(where: str, nodes: Array, up: str) -> Array:
+    """Rotation (3, 3) from the axes of the file to the world's, whose z is up."""
+    if not up:
+        ankles = (_node(nodes, "l_ankle") + _node(nodes, "r_ankle")) / 2
+        upright = np.nanmedian(_node(nodes, "head") - ankles, axis=0)
+        upright /= max(float(np.linalg.norm(upright)), 1e-12)
+        axis = int(np.argmax(np.abs(upright)))
+        if abs(upright[axis]) < _UPRIGHT:
+            raise InputError(
+                f"{where}: up is unknown, for in the median the head is not above the ankles "
+                f"along an axis; give up, one of {', '.join(UPWARD)}"
+            )
+        up = ("-" if upright[axis] < 0 else "") + "xyz"[axis]
+    cyclic = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
+    return np.diag([1.0, -1.0, -1.0]) @ cyclic if up[0] == "-" else cyclic
+
+
+def _drop_lost(nodes: Array, times: Array) -> None:
+    """Take nodes for unseen, in place, where a camera lost a joint for a short time.
+
+    It did where a bone is too long or too short, and between two turns of a bone by more than a
+    right angle from one frame to the next. What hangs on such a joint was lost with it. Hands and
+    feet may be foreshortened; `_complete` mends them.
+    """
+    bones, last = nodes - nodes[:, NODE_PARENTS], len(times) - 1
+    spans = np.linalg.norm(bones, axis=2)
+    usual = np.nanmedian(spans, axis=0)
+    ends = np.array([node.endswith(("hand", "toe")) for node in NODES])
+    lost = (spans > _TIMES_TOO_LONG * usual) | ((spans < _TIMES_TOO_SHORT * usual) & ~ends)
+    turned = np.sum(bones[1:] * bones[:-1], axis=2) < 0
+    for node in range(1, len(NODES)):
+        turns = [0, *(1 + np.flatnonzero(turned[:, node])).tolist(), len(times)]
+        for begin, end in itertools.pairwise(turns):
+            around = times[min(end, last)] - times[max(begin - 1, 0)]
+            lost[begin:end, node] |= len(turns) > 2 and around <= LONGEST_GAP_S
+        if NODES[NODE_PARENTS[node]][2:] in ("knee", "ankle", "elbow", "wrist"):
+            lost[:, node] |= lost[:, NODE_PARENTS[node]]
+        for begin, end in runs(lost[:, node]):
+            if times[min(end, last)] - times[max(begin - 1, 0)] <= LONGEST_GAP_S:
+                nodes[begin:end, node] = np.nan
+
+
+def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Array]:
+    """Cut to the longest stretch in which no gap of any node is longer than `LONGEST_GAP_S`."""
+    unseen = np.isnan(nodes[..., 0])
+    out, last = np.zeros(len(times), dtype=bool), len(times) - 1
+    for node in range(len(NODES)):
+        for begin, end in runs(unseen[:, node]):
+            at_an_end = begin == 0 or end > last
+            if at_an_end or times[end] - times[begin - 1] > LONGEST_GAP_S:
+                out[begin:end] = True
+    breaks = 1 + np.flatnonzero(np.diff(times) > LONGEST_GAP_S)
+    best = slice(0, 0)
+    for begin, end in runs(~out):
+        for stretch in np.split(
+            np.arange(begin, end), breaks[(breaks > begin) & (breaks < end)] - begin
+        ):
+            whole = stretch[~unseen[stretch].any(axis=1)]
+            if len(whole) and whole[-1] + 1 - whole[0] > best.stop - best.start:
+                best = slice(int(whole[0]), int(whole[-1]) + 1)
+    kept = best.stop - best.start
+    if kept < max(LEAST_FRAMES, 0.4 * len(times)):
+        worst = NODES[int(np.argmax(unseen.sum(axis=0)))]
+        raise InputError(
+            f"{where}: too much is not seen: {kept} of {len(times)} frames are the longest stretch "
+            f"without a gap of more than {LONGEST_GAP_S} s (node {worst!r} is unseen most); fill "
+            "the gaps, or cut the recording"
+        )
+    return nodes[best], times[best] - times[best.start]
+
+
+def _resampled(nodes: Array, times: Array, joint_set: JointSet) -> tuple[Array, float]:
+    """Nodes (frame, node, 3) at even times, without gaps, and their rate."""
+    steps = np.diff(times)
+    step = float(np.median(steps))
+    rate_hz = RATE_HZ
+    if np.abs(steps - step).max() < _EVEN * step:  # each frame that was measured is one again
+        rate_hz = round(math.ceil(RATE_HZ * step - 1e-6) / step, 6)
+    at = np.arange(int(times[-1] * rate_hz + 1e-6) + 1) / rate_hz
+    made = np.empty((len(at), *nodes.shape[1:]))
+    seen = ~np.isnan(nodes[..., 0])
+    for own in np.unique(seen, axis=1).T:  # nodes that are seen in the same frames go together
+        alike = np.flatnonzero((seen == own[:, None]).all(axis=0))
+        places = nodes[own][:, alike]
+        if joint_set.jitters:
+            lam = (2 * np.pi * CUTOFF_HZ) ** -4 / step
+            made[:, alike] = make_smoothing_spline(times[own], places, lam=lam)(at)
+        else:
+            made[:, alike] = CubicSpline(times[own], places)(at)
+    return made, rate_hz
+
+
 def _complete(nodes: Array, pelvis: Array, joint_set: JointSet) -> None:
-    """Lengthen heads and feet to where the nodes are, in place."""
-    thigh = np.median(np.linalg.norm(_node(nodes, "l_knee") - _node(nodes, "l_hip"), axis=1))
+    """Complete heads, feet and hands, in place.
+
+    A foot that ends before its toe tips goes on as the pelvis looks, at right angles to the shank;
+    the joint that cameras find is at the instep. A hand or a head that is foreshortened, whose
+    direction is uncertain then, points more and more as the forearm or the trunk does.
+    """
+    thigh = float(np.median(_length(nodes, "l_knee", "l_hip")))
+    head, upward = _node(nodes, "head") - _node(nodes, "neck"), _directions(_trunk(nodes))
+    head = _lengthened(head, upward, 0.5 * float(np.median(np.linalg.norm(head, axis=1))))
     if not joint_set.head_is_top:
-        along = _direction(_node(nodes, "head") - _node(nodes, "neck"))[0]
-        nodes[:, NODES.index("head")] = _node(nodes, "neck") + HEAD_OF_THIGH * thigh * along
+        head = HEAD_OF_THIGH * thigh * _directions(head)
+    nodes[:, NODES.index("head")] = _node(nodes, "neck") + head
     for side in ("l", "r"):
-        knee, ankle, toe = (_node(nodes, f"{side}_{name}") for name in ("knee", "ankle", "toe"))
-        shank, length = _direction(knee - ankle)
-        foot = toe - ankle
-        down = np.sum(foot * shank, axis=1, keepdims=True)
-        wanted = np.sqrt(np.maximum((_FOOT_OF_SHANK * length) ** 2 - down**2, 0))
-        ahead = _lengthened(foot - down * shank, np.cross(pelvis[..., 1], shank), wanted)
-        nodes[:, NODES.index(f"{side}_toe")] = ankle + down * shank + ahead
-        elbow, wrist, hand = (_node(nodes, f"{side}_{name}") for name in ("elbow", "wrist", "hand"))
-        half = np.median(np.linalg.norm(hand - wrist, axis=1)) / 2
-        hand = _lengthened(hand - wrist, _direction(wrist - elbow)[0], half)
+        knee, ankle, toe = (_node(nodes, f"{side}_{at}") for at in ("knee", "ankle", "toe"))
+        shank = _directions(knee - ankle)
+        length = _FOOT_OF_SHANK * float(np.median(_length(nodes, f"{side}_knee", f"{side}_ankle")))
+        along = np.sum((toe - ankle) * shank, axis=1, keepdims=True) * shank
+        reach = np.sqrt(np.maximum(length**2 - np.sum(along**2, axis=1, keepdims=True), 0))
+        ahead = _lengthened(toe - ankle - along, np.cross(pelvis[..., 1], shank), reach)
+        nodes[:, NODES.index(f"{side}_toe")] = ankle + along + ahead
+        elbow, wrist, end = (_node(nodes, f"{side}_{at}") for at in ("elbow", "wrist", "hand"))
+        half = 0.5 * float(np.median(_length(nodes, f"{side}_hand", f"{side}_wrist")))
+        hand = _lengthened(end - wrist, _directions(wrist - elbow), half)
         nodes[:, NODES.index(f"{side}_hand")] = wrist + hand
 
 
-def _direction(bone: Array) -> tuple[Array, float]:
-    """Unit vectors (frame, 3) along a bone, and its median length."""
-    lengths = np.linalg.norm(bone, axis=1, keepdims=True)
-    return bone / np.maximum(lengths, 1e-12), float(np.median(lengths))
+def _keep_directions(where: str, nodes: Array) -> None:
+    """Give bones that vanish for a moment, in place, the direction that they had before."""
+    for node in range(1, len(NODES)):
+        start = nodes[:, NODE_PARENTS[node]]
+        bone = nodes[:, node] - start
+        there = np.linalg.norm(bone, axis=1) > MINIMUM_PART_M
+        if there.mean() < 0.5:
+            raise InputError(
+                f"{where}: {NODES[NODE_PARENTS[node]]!r} and {NODES[node]!r} are in one place; "
+                f"every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, mend the joints"
+            )
+        first = int(np.argmax(there))
+        kept = np.maximum.accumulate(np.where(there, np.arange(len(bone)), first))
+        nodes[:, node] = start + bone[kept]
+
+
+def _directions(bone: Array) -> Array:
+    return bone / np.maximum(np.linalg.norm(bone, axis=1, keepdims=True), 1e-12)
 
 
 def _lengthened(bone: Array, along: Array, wanted: Array | float) -> Array:
@@ -199,8 +283,15 @@ def _lengthened(bone: Array, along: Array, wanted: Array | float) -> Array:
     return np.asarray(bone + np.maximum(lacking, 0) * along)
 
 
-def _stature(nodes: Array, lengths: Array) -> float:
-    own = [lengths[NODES.index(f"{side}_{name}")] for side in "lr" for name in _SEGMENTS_OF_STATURE]
-    trunk = float(np.median(np.linalg.norm(_spine(nodes), axis=1)))
-    whole = 2 * (sum(_SEGMENTS_OF_STATURE.values()) + _TRUNK_OF_STATURE)
-    return float(sum(own) + 2 * trunk) / whole
+def _stature(nodes: Array) -> float:
+    """Height of the person: what legs, trunk and head add up to, in medians."""
+    legs = [
+        np.median(_length(nodes, f"{side}_{first}", f"{side}_{last}"))
+        for side in "lr"
+        for first, last in (("hip", "knee"), ("knee", "ankle"))
+    ]
+    trunk = np.linalg.norm(_trunk(nodes), axis=1)
+    shoulders = (_node(nodes, "l_shoulder") + _node(nodes, "r_shoulder")) / 2
+    head = np.linalg.norm(_node(nodes, "head") - shoulders, axis=1)
+    whole = sum(legs) / 2 + np.median(trunk) + np.median(head)
+    return float(whole) / (1 - _ANKLE_OF_STATURE)

@@ -233,6 +233,12 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
     )
 
 
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Begin and end, which is one past the last, of each run of True in a mask (frame,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
 def _followed(directions: Array) -> Array:
     """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
     rotations = np.empty((*directions.shape[:2], 4))

@@ -1,0 +1,187 @@
+"""Files of joint positions: archives of NumPy (.npz), and tables with a header (.csv).
+
+Both hold ``positions (frame, joint, 3)`` [m], the names of the ``joints``, which axis is ``up``,
+and ``rate_hz`` or ``time_s (frame,)``. In a table each coordinate of a joint has a column, such as
+``HipLeft_x``; ``time_s``, ``rate_hz`` and ``up`` have one each. What is not seen is NaN, an empty
+cell, or the origin to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.motion.formats.text_file import TextFile
+from rtradar.motion.skeleton import plain
+from rtradar.system.checks import brief, check_number
+from rtradar.system.files import read_arrays
+
+Array = NDArray[np.float64]
+
+UPWARD = ("x", "y", "z", "-x", "-y", "-z")
+"""Values of ``up``."""
+
+LEAST_FRAMES = 5
+"""Least number of frames, which the low-pass needs."""
+
+_NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
+_MOST_JOINTS = 1000
+
+
+@dataclass(frozen=True)
+class JointRecording:
+    """Positions (frame, joint, 3) of named joints in the file's axes [m], NaN where not seen.
+
+    ``times`` (frame,) ascend from 0 [s]. ``up`` is one of `UPWARD`, or empty where the file does
+    not say it.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    positions: Array
+    times: Array
+    up: str
+
+
+def read_npz(path: Path, unit_m: float) -> JointRecording:
+    """Read an archive of NumPy; an `InputError` tells what is wrong with it."""
+    try:
+        arrays = read_arrays(path)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot read this NPZ file ({error.strerror}); check the path"
+        ) from None
+    except ValueError as error:
+        raise InputError(
+            f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
+            f"{_NEEDED}, written with numpy.savez"
+        ) from None
+    return _checked(path, arrays, unit_m)
+
+
+def read_csv(path: Path, unit_m: float) -> JointRecording:
+    """Read a table with a header; an `InputError` names the line."""
+    with TextFile(path, "table of joint positions") as text:
+        header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
+        columns, joints = _columns(text, header)
+        rows, up = list[list[float]](), ""
+        for line in text:
+            cells = [cell.strip(" \"'\t\r\n") for cell in line.split(",")]
+            if cells == [""]:
+                continue
+            if len(cells) != len(header):
+                raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
+            if "up" in columns:
+                up = cells[columns["up"]]
+                cells[columns["up"]] = ""
+            seen = [k for k, cell in enumerate(cells) if cell.lower() not in ("", "nan")]
+            row = [math.nan] * len(cells)
+            for k, value in zip(seen, text.numbers([cells[k] for k in seen]), strict=True):
+                row[k] = value
+            rows.append(row)
+            text.check_size(len(joints), len(rows))
+    values = np.array(rows).reshape(len(rows), len(header))
+    named = list(joints.values())
+    arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
+    if "up" in columns:
+        arrays["up"] = np.array(up)
+    if "time_s" in columns:
+        arrays["time_s"] = values[:, columns["time_s"]]
+    if "rate_hz" in columns and len(rows):
+        arrays["rate_hz"] = values[0, columns["rate_hz"]]
+    return _checked(path, arrays, unit_m)
+
+
+def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
+    """Columns of what is not a coordinate, and three of each joint."""
+    others, joints = dict[str, int](), dict[str, list[int]]()
+    for k, cell in enumerate(header):
+        found = re.fullmatch(r"(.+)[_. ]([xyz])", cell, re.IGNORECASE)
+        if found:
+            place = joints.setdefault(found[1], [-1, -1, -1])
+            axis = "xyz".index(found[2].lower())
+            if place[axis] >= 0:
+                raise text.fail(f"column {brief(cell)} is there twice")
+            place[axis] = k
+        elif cell in ("time_s", "rate_hz", "up", "frame"):
+            others[cell] = k
+        else:
+            raise text.fail(
+                f"column {brief(cell)} is not understood; allowed are time_s, rate_hz, up, frame, "
+                "and NAME_x, NAME_y, NAME_z of each joint"
+            )
+    for name, place in joints.items():
+        if min(place) < 0:
+            raise text.fail(
+                f"joint {brief(name)} has no column for {'xyz'[place.index(-1)]}; each joint needs "
+                "NAME_x, NAME_y, NAME_z"
+            )
+    return others, joints
+
+
+def _checked(path: Path, arrays: Mapping[str, NDArray[Any]], unit_m: float) -> JointRecording:
+    """Make a recording of what a file holds."""
+    for needed in ("positions", "joints", "rate_hz or time_s"):
+        if not any(name in arrays for name in needed.split(" or ")):
+            raise InputError(f"{path}: {needed} is missing; {_NEEDED}")
+    if not (math.isfinite(unit_m) and unit_m > 0):
+        raise InputError(f"{path}: unit_m = {unit_m}; it must be positive (0.001 for millimetres)")
+    given, named = arrays["positions"], arrays["joints"]
+    if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "fiu":
+        raise InputError(
+            f"{path}: positions are {given.dtype} of shape {given.shape}; they must be real "
+            "numbers of shape (frame, joint, 3)"
+        )
+    if named.shape != given.shape[1:2] or named.dtype.kind != "U":
+        raise InputError(
+            f"{path}: joints are {named.dtype} of shape {named.shape}; they must be "
+            f"{given.shape[1]} names, one for each of the positions"
+        )
+    if len(given) < LEAST_FRAMES or given.shape[1] > _MOST_JOINTS:
+        raise InputError(
+            f"{path}: {len(given)} frames of {given.shape[1]} joints; there must be at least "
+            f"{LEAST_FRAMES} frames, and at most {_MOST_JOINTS} joints"
+        )
+    names = tuple(map(str, named))
+    known = [plain(name) for name in names]
+    for name in names:
+        if known.count(plain(name)) > 1:
+            raise InputError(f"{path}: joint {brief(name)} is there twice; keep one person's")
+    positions = given.astype(np.float64) * unit_m
+    if np.isinf(positions).any():
+        raise InputError(f"{path}: positions hold infinity; what is not seen is NaN")
+    positions[np.isnan(positions).any(axis=2) | ~positions.any(axis=2)] = np.nan
+    up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
+    if up and up not in UPWARD:
+        raise InputError(f"{path}: up is {brief(up)}; it must be one of {', '.join(UPWARD)}")
+    return JointRecording(path, names, positions, _times(path, arrays, len(given)), up)
+
+
+def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array:
+    """Times (frame,) that ascend from 0 [s]."""
+    if "time_s" not in arrays:
+        rate = arrays["rate_hz"]
+        number = rate.item() if rate.size == 1 else rate
+        return np.arange(frames) / check_number(str(path), "rate_hz", number, 1.0, 100_000.0)
+    times = arrays["time_s"]
+    if times.shape != (frames,) or times.dtype.kind not in "fiu":
+        raise InputError(
+            f"{path}: time_s is {times.dtype} of shape {times.shape}; it must be {frames} "
+            "numbers, one for each frame"
+        )
+    times = times.astype(np.float64)
+    wrong = np.flatnonzero(~(np.diff(times, prepend=times[0] - 1) > 0) | ~np.isfinite(times))
+    if len(wrong):
+        raise InputError(
+            f"{path}: time_s is {times[wrong[0]]:g} in frame {wrong[0] + 1}; times must be finite "
+            "and ascend"
+        )
+    return np.asarray(times - times[0])
