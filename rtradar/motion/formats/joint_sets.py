@@ -24,27 +24,27 @@ class JointSet:
     """Joints of one source, by node.
 
     ``joints`` has the plain name of a joint for each node, or two names and a fraction. Where it
-    has alternatives the first one that is there counts. A set ``jitters`` whose joints come from a
-    camera. ``head_is_top`` tells whether the joint of the head is the top of the head.
+    has alternatives the first one that is there counts. Joints of cameras jitter: ``cutoff_hz`` is
+    the frequency of which their low-pass leaves half [Hz]. ``head_is_top`` tells whether the joint
+    of the head is the top of the head.
     """
 
     name: str
     joints: Mapping[str, tuple[str, ...]]
-    jitters: bool
+    cutoff_hz: float | None
     head_is_top: bool
 
 
 def _joint_set(
-    name: str, middle: str, sided: str, sides: tuple[str, str], *, jitters: bool, top: bool = False
+    name: str, middle: str, sided: str, *, cutoff_hz: float | None = None, top: bool = False
 ) -> JointSet:
     """Make a set from texts such as ``root=hips; neck=neck>head 0.4, neck``."""
     joints = {}
     for prefix, text in (("", middle), ("l_", sided), ("r_", sided)):
-        side = sides[prefix == "r_"]
-        for entry in text.replace("@", side).split(";"):
+        for entry in text.replace("@", "right" if prefix == "r_" else "left").split(";"):
             node, found = entry.split("=")
             joints[prefix + node.strip()] = tuple(found.strip().split(", "))
-    return JointSet(name, joints, jitters, top)
+    return JointSet(name, joints, cutoff_hz, top)
 
 
 _KINECT_LIMBS = (
@@ -59,16 +59,14 @@ JOINT_SETS: tuple[JointSet, ...] = (
         "root=hipcenter; lowerback=spine; upperback=spine>shouldercenter 0.5; "
         "thorax=shouldercenter; neck=shouldercenter>head 0.36; head=head",
         _KINECT_LIMBS,
-        ("left", "right"),
-        jitters=True,
+        cutoff_hz=8.0,
     ),
     _joint_set(
         "Kinect v2",
         "root=spinebase; lowerback=spinebase>spinemid 0.5; upperback=spinemid; "
         "thorax=spineshoulder; neck=neck; head=head",
         _KINECT_LIMBS,
-        ("left", "right"),
-        jitters=True,
+        cutoff_hz=6.0,
     ),
     _joint_set(
         "Berkeley MHAD",
@@ -77,8 +75,6 @@ JOINT_SETS: tuple[JointSet, ...] = (
         # Its hand has an end that is where the hand begins.
         "hip=@upleg; knee=@leg; ankle=@foot; toe=@toeend, @toebase; "
         f"shoulder=@arm; elbow=@forearm; wrist=@hand; hand=@forearm>@hand {_HAND}",
-        ("left", "right"),
-        jitters=False,
         top=True,
     ),
     _joint_set(
@@ -86,8 +82,6 @@ JOINT_SETS: tuple[JointSet, ...] = (
         "root=pelvis; lowerback=spine1; upperback=spine2; thorax=spine3; neck=neck; head=head",
         "hip=@hip; knee=@knee; ankle=@ankle; toe=@foot; "
         f"shoulder=@shoulder; elbow=@elbow; wrist=@wrist; hand=@elbow>@wrist {_HAND}",
-        ("left", "right"),
-        jitters=False,
     ),
 )
 """Every set that is understood."""

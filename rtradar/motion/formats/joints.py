@@ -45,9 +45,6 @@ Array = NDArray[np.float64]
 LONGEST_GAP_S = 0.25
 """Longest gap that is bridged [s]: a quarter of a step of a walk."""
 
-CUTOFF_HZ = 8.0
-"""Frequency of which the low-pass for joints of cameras leaves half [Hz]."""
-
 RATE_HZ = 120.0
 """Least rate of the motion that is made [Hz], for `Motion` interpolates its root by PCHIP, which
 flattens the crests of what is sampled more rarely."""
@@ -61,7 +58,7 @@ _TIMES_TOO_LONG, _TIMES_TOO_SHORT = 1.6, 0.5
 _THIGH_M = (0.15, 0.8)
 """Limits of the length of people's thighs, children included [m]."""
 
-_UPRIGHT = 0.7
+_UPRIGHT = 0.8
 """Least cosine between an axis and the median direction from the ankles to the head, for that axis
 to be up."""
 
@@ -106,7 +103,7 @@ def motion_of(recording: JointRecording) -> Motion:
             f"{where}: hip and knee are {thigh:.3g} m apart, a person's {_THIGH_M[0]} to "
             f"{_THIGH_M[1]} m; positions are in metres, give unit_m (0.001 for millimetres)"
         )
-    if joint_set.jitters:
+    if joint_set.cutoff_hz:
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, joint_set)
@@ -222,8 +219,8 @@ def _resampled(nodes: Array, times: Array, joint_set: JointSet) -> tuple[Array, 
     for own in np.unique(seen, axis=1).T:  # nodes that are seen in the same frames go together
         alike = np.flatnonzero((seen == own[:, None]).all(axis=0))
         places = nodes[own][:, alike]
-        if joint_set.jitters:
-            lam = (2 * np.pi * CUTOFF_HZ) ** -4 / step
+        if joint_set.cutoff_hz:
+            lam = (2 * np.pi * joint_set.cutoff_hz) ** -4 / step
             made[:, alike] = make_smoothing_spline(times[own], places, lam=lam)(at)
         else:
             made[:, alike] = CubicSpline(times[own], places)(at)
