@@ -196,7 +196,7 @@ def test_a_run_that_fails_is_one_line_and_status_1(
         raise RunError("bench: analytic, radar paper-12ghz: rtradar: no backend works")
 
     monkeypatch.setattr(Runner, "run", fails)
-    assert main(["bench", "--quick"]) == 1
+    assert main(["bench", "--quick", "--only", "models"]) == 1
     assert (
         capsys.readouterr().err
         == "rtradar: bench: analytic, radar paper-12ghz: rtradar: no backend works\n"

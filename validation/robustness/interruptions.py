@@ -8,7 +8,7 @@ the command ends within 2 s, with status 130 and 1 respectively, one line and no
 process is left. No command notices SIGKILL: after it the folder of a run holds old files or new
 ones. If the kill came between the renames of its files it holds both, its list says so, and a
 command that reads it refuses it in one line. A command that only reads changes nothing, and the
-next run removes what is neither.
+next run removes what is neither. With --quick each stage gets one of the three in turn.
 
     python validation/robustness/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
@@ -16,6 +16,7 @@ next run removes what is neither.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shutil
 import signal
@@ -32,6 +33,7 @@ from campaign_kills import HALVES, RADAR
 from rtradar.validate.rows import Row, judged, main
 
 SAYS = "an interrupted command: "
+SIGNALS = "SIGINT", "SIGTERM", "SIGKILL"
 STATUS = {"SIGINT": 130, "SIGTERM": 1}
 PATIENCE_S = 300.0
 SPEC = f"""
@@ -360,6 +362,7 @@ def tally(old: dict[str, int], after: dict[str, int]) -> str:
 
 def measure(quick: bool) -> list[Row]:
     found: list[Row] = []
+    in_turn = itertools.cycle(SIGNALS)
     signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # a command started with "&" would pass on that it ignores the signal
@@ -387,7 +390,7 @@ def measure(quick: bool) -> list[Row]:
                 if process.returncode:
                     raise SystemExit(said)
             for stage in case.stages:
-                for name in ("SIGINT", "SIGTERM", "SIGKILL"):
+                for name in [next(in_turn)] if quick else SIGNALS:
                     row, rows = disturb(case, stage, name, before, work)
                     print(row, flush=True)
                     found += rows

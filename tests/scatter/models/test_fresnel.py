@@ -100,13 +100,14 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
 
 
 def test_an_edge_that_wanders_changes_the_share_without_jumps() -> None:
-    u = np.linspace(-1, 1, 1001)
+    # Steps of 2e-3, where the edge is in sight, at its corner and where it vanishes.
+    u = (np.array([-0.8, 0.0, 0.6])[:, None] + np.linspace(-0.06, 0.06, 61)).ravel()
     k = 2 * np.pi * 79e9 / C
     edges = u / np.sqrt(k * (2 / 3.9 + 2 / 0.1) / 2)
     share = np.array([share_behind_plate(0.1, 79e9, edge) for edge in edges])
     # exp(-j u^2) bends by 2 u / sqrt(pi) a unit squared: 5e-6 at a step of 2e-3. Each side of a
     # cell has the edge to 1 / 16384 of it, in all 6e-5; a corner that pops would be 1e-2.
-    assert np.abs(np.diff(share, 2)).max() < 1e-4
+    assert np.abs(np.diff(share.reshape(3, -1), 2)).max() < 1e-4
 
 
 def test_full_view_is_exactly_one_and_full_cover_exactly_nothing(backend: Backend) -> None:
