@@ -14,7 +14,9 @@ from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
 from rtradar.motion.synthetic import kick as kicks
+from rtradar.motion.synthetic.daily import WAVES, bend, sit, squat, wave
 from rtradar.motion.synthetic.exercises import punch
+from rtradar.motion.synthetic.falls import FALLS, fall
 from rtradar.motion.synthetic.figure import (
     Array,
     Pose,
@@ -25,9 +27,9 @@ from rtradar.motion.synthetic.figure import (
     offsets,
     rotations,
 )
-from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.gait import walk, walk_in_place
 from rtradar.motion.synthetic.gait_styles import GAITS
-from rtradar.motion.synthetic.jacks import jumping_jack
+from rtradar.motion.synthetic.jacks import jump, jumping_jack
 from rtradar.motion.synthetic.stance import stand
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
@@ -43,10 +45,22 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "punch": _repeating(punch),
     "jumping_jack": jumping_jack,
     "stand": _repeating(stand),
+    "sit": sit,
+    "bend": bend,
+    "squat": squat,
+    "wave": wave,
+    "jump": jump,
+    "fall": fall,
+    "walk_in_place": walk_in_place,
 }
 """Activities of the actors, by name."""
 
-STYLES: Mapping[str, tuple[str, ...]] = {"walk": tuple(GAITS), "kick": kicks.STYLES}
+STYLES: Mapping[str, tuple[str, ...]] = {
+    "walk": tuple(GAITS),
+    "kick": kicks.STYLES,
+    "wave": WAVES,
+    "fall": FALLS,
+}
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 
 

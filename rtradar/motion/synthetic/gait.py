@@ -179,7 +179,15 @@ def _body(steps: list[Step], subject: Subject, gait: Gait) -> _Body:
 
 def walk(duration_s: float, subject: Subject) -> PosesAt:
     """A walk, facing and starting along +x."""
-    gait = gait_of(subject)
+    return _steps(duration_s, subject, gait_of(subject, in_place=False))
+
+
+def walk_in_place(duration_s: float, subject: Subject) -> PosesAt:
+    """Steps on the spot, facing +x."""
+    return _steps(duration_s, subject, gait_of(subject, in_place=True))
+
+
+def _steps(duration_s: float, subject: Subject, gait: Gait) -> PosesAt:
     steps = footprints(subject, gait, duration_s)
     body = _body(steps, subject, gait)
     foot_at = {

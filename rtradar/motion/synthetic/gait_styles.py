@@ -216,7 +216,21 @@ GAITS = {
 """Ranges of each style, where they are not those of a normal walker."""
 
 
-def gait_of(subject: Subject) -> Gait:
+_IN_PLACE = {
+    "cycle_s": (0.8, 1.25),
+    "step": (1e-6, 2e-6),
+    "stance": (0.56, 0.66),
+    "sway": (0.4, 1.0),
+    "pulse_mps": (0.0, 0.06),
+    "toe_off_deg": (20.0, 40.0),
+    "heel_strike_deg": (-14.0, 2.0),
+    "clearance": (0.04, 0.15),
+    "hip_yaw_deg": (1.0, 5.0),
+}
+"""Ranges of who walks in place, where they are not those of a normal walker."""
+
+
+def gait_of(subject: Subject, *, in_place: bool) -> Gait:
     """Draw how a subject walks."""
-    ranges = _NORMAL | GAITS[subject.style or "normal"]
+    ranges = _NORMAL | (_IN_PLACE if in_place else GAITS[subject.style or "normal"])
     return Gait(**{name: subject.drawn(name, *between) for name, between in ranges.items()})

@@ -1,8 +1,12 @@
-"""Synthetic jumping jacks: each flight is a parabola, each contact a quintic between flights."""
+"""Synthetic jumping jacks, and jumps on the spot.
+
+Each flight is a parabola, each contact a quintic between flights.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -45,7 +49,7 @@ class _Manner:
     """Time from take-off to take-off at tempo 1."""
     flight_s: float
     jacks: float
-    """Number of jacks between rests."""
+    """Number of jacks, or of pairs of jumps, between rests."""
     rest_s: float
     uneven: float
     """Deviation of the times of single hops."""
@@ -68,6 +72,10 @@ class _Manner:
     """Further lean where the root is a tenth of the height lower than in standing."""
     turn: float
     shrug: float
+    swing: float = 0.0
+    """How far both arms swing forward with each hop."""
+    back: float = 0.0
+    """The same back, before take-off."""
 
 
 _RANGES = {
@@ -92,6 +100,25 @@ _RANGES = {
     "turn": (2.0, 10.0),
     "shrug": (12.0, 26.0),
 }
+"""Ranges of jumping jacks."""
+
+_JUMPS = _RANGES | {
+    "hop_s": (0.56, 0.95),
+    "flight_s": (0.24, 0.46),
+    "jacks": (2.0, 5.0),
+    "rest_s": (0.1, 1.2),
+    "uneven": (0.01, 0.03),
+    "close": (0.8, 1.9),
+    "toes_out": (0.0, 0.0),
+    "lift": (0.008, 0.02),
+    "elbow": (15.0, 60.0),
+    "forward": (0.0, 10.0),
+    "lean": (0.0, 6.0),
+    "crouch": (2.0, 14.0),
+    "swing": (5.0, 50.0),
+    "back": (0.0, 20.0),
+}
+"""Ranges of jumps with both legs, where they are not those of jumping jacks."""
 
 
 class _Flight(NamedTuple):
@@ -102,7 +129,7 @@ class _Flight(NamedTuple):
     apart: bool
 
 
-def _sets(subject: Subject, manner: _Manner, until_s: float) -> list[list[_Flight]]:
+def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> list[list[_Flight]]:
     """Sets of flights; each set begins and ends standing, the first one before 0."""
     hop = manner.hop_s / subject.tempo
     # A hop of the same height takes as long at any tempo; only where contact would get too short it
@@ -116,7 +143,10 @@ def _sets(subject: Subject, manner: _Manner, until_s: float) -> list[list[_Fligh
         late = hop * manner.uneven * np.clip(uneven.standard_normal(number), -2.0, 2.0)
         begins = begin + 0.8 * hop + hop * np.arange(number) + late
         sets.append(
-            [_Flight(float(at), float(at) + flight, k % 2 == 0) for k, at in enumerate(begins)]
+            [
+                _Flight(float(at), float(at) + flight, apart and k % 2 == 0)
+                for k, at in enumerate(begins)
+            ]
         )
         begin = sets[-1][-1].end + 0.8 * hop + manner.rest_s / subject.tempo
     return sets
@@ -151,11 +181,22 @@ def _height(
 
 def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
     """Jumping jacks, facing +x."""
-    manner = _Manner(**{name: subject.drawn(name, *some) for name, some in _RANGES.items()})
-    return partial(_jump, subject, manner, _sets(subject, manner, duration_s))
+    return _hopping(duration_s, subject, _RANGES, apart=True)
 
 
-def _jump(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
+def jump(duration_s: float, subject: Subject) -> PosesAt:
+    """Jumps with both legs on the spot, facing +x."""
+    return _hopping(duration_s, subject, _JUMPS, apart=False)
+
+
+def _hopping(
+    duration_s: float, subject: Subject, ranges: Mapping[str, tuple[float, float]], *, apart: bool
+) -> PosesAt:
+    manner = _Manner(**{name: subject.drawn(name, *some) for name, some in ranges.items()})
+    return partial(_hops, subject, manner, _sets(subject, manner, duration_s, apart=apart))
+
+
+def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
     hop_s = manner.hop_s / subject.tempo
     # A jumper does not move before the first hop of a set and after the last: further sets do not
@@ -178,8 +219,10 @@ def _jump(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
     # Heels lift before take-off and come down after landing, so that the legs need not be straight
     # there.
     roll_s, heels = ROLL * contact, math.radians(manner.heels)
-    lift, roll = np.zeros(len(t)), np.zeros(len(t))
+    lift, roll, swung = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
     for hop in hops:
+        swung += manner.swing * bump((t - hop.begin + 0.3 * contact) / (span + 0.7 * contact))
+        swung -= manner.back * bump((t - hop.begin + 0.8 * contact) / (0.7 * contact))
         lift += bump((t - hop.begin) / (hop.end - hop.begin))
         roll += bump((t - hop.begin + roll_s) / (hop.end - hop.begin + 2 * roll_s))
     pitch = heels * roll
@@ -226,7 +269,7 @@ def _jump(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         arms[side] = swing_arm(
             thorax,
             side,
-            forward=math.radians(manner.forward) - lean,
+            forward=np.radians(manner.forward + swung) - lean,
             outward=subject.uneven[side] * raised,
             elbow=np.radians(manner.elbow + manner.elbow_swing * moving),
             wrist=0.05,
