@@ -22,6 +22,7 @@ from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
 from rtradar.conventions import PERSON_LIMITS
+from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.receiver import Interferer, Receiver
 from rtradar.scene import (
@@ -143,7 +144,7 @@ DATA_SET_KEYS = {
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {
         "label": (
-            "`walk`, `kick`, `punch`, `jumping_jack` or `stand`; each at most once",
+            f"{', '.join(f'`{activity}`' for activity in ACTIVITIES)}; each at most once",
             "must be given",
         ),
         "count": ("number of takes; `count` or `seeds` is needed", ""),

@@ -9,6 +9,7 @@ import pytest
 
 from rtradar.cli import main
 from rtradar.errors import ExtensionError
+from rtradar.motion import ACTIVITIES
 from rtradar.scene import MATERIALS
 from rtradar.system.registries import DETECTORS, MODELS, RADARS, scene_files
 
@@ -19,6 +20,7 @@ NAMES = {
     "materials": MATERIALS,
     "fidelities": MODELS,
     "detectors": DETECTORS,
+    "activities": ACTIVITIES,
 }
 
 

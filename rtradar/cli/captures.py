@@ -145,7 +145,7 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "motion",
         "MOTION",
-        "an .amc, .bvh or .c3d file; or synthetic:walk, :kick, :punch, :jumping_jack or :stand; "
+        "an .amc, .bvh or .c3d file; or synthetic:walk, or another of `list activities`; "
         "several for several people, none where the scene has its own",
         nargs="*",
     )

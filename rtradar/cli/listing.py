@@ -26,7 +26,7 @@ def add(commands: Subcommands) -> None:
     add_command(
         commands,
         "list",
-        "list the scenes, radars, materials, fidelity levels or detectors that have a name",
+        "list the scenes, radars, materials, fidelity levels, detectors or activities by name",
         _add_list,
         ("rtradar list scenes", "rtradar list fidelities --json levels.json"),
     )
@@ -103,6 +103,15 @@ def _detectors() -> Described:
     return _documented(DETECTORS)
 
 
+def _activities() -> Described:
+    from rtradar.motion.synthetic import ACTIVITIES, STYLES
+
+    for name, function in ACTIVITIES.items():
+        first = (inspect.getdoc(function) or "").partition("\n\n")[0]
+        styles = f" Styles: {', '.join(STYLES[name])}." if name in STYLES else ""
+        yield name, " ".join(first.split()) + styles
+
+
 def _documented(registry: Registry) -> Described:
     """Describe functions and classes by the first paragraph of their docstrings."""
     for name in registry:
@@ -119,5 +128,6 @@ _KINDS: dict[str, tuple[str, Callable[[], Described]]] = {
     "materials": ("list the materials of walls, furniture and bodies", _materials),
     "fidelities": ("list the echo models, cheapest first, for --fidelity", _fidelities),
     "detectors": ("list the detectors, for --detector", _detectors),
+    "activities": ("list what synthetic actors do, for synthetic:NAME", _activities),
 }
 """What can be listed: its help text, and the function that gives the names."""

@@ -19,7 +19,7 @@ from rtradar.campaign.intervals import Intervals, strike_times
 from rtradar.campaign.patterns import matching_files
 from rtradar.campaign.spec_file import _spec, read_spec
 from rtradar.errors import InputError, InputErrors
-from rtradar.motion import synthetic_motion
+from rtradar.motion import ACTIVITIES, synthetic_motion
 
 SMALL = """
 [windows]
@@ -192,7 +192,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (SMALL.replace("count = 3", 'seeds = ["a"]'), "seeds = 'a'; it must be a whole number"),
         (
             SMALL.replace("walk", "dance"),
-            "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack, stand",
+            f"label = 'dance' is unknown; allowed: {', '.join(ACTIVITIES)}",
         ),
         (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' is given twice"),
         (

@@ -1,11 +1,11 @@
-"""Synthetic actors: a person of any size walks, kicks, punches, does jumping jacks or stands."""
+"""Synthetic actors: people of any size and manner who walk, kick, jump, sit down, fall and more."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import partial, wraps
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -36,7 +36,11 @@ from rtradar.system.seeds import check_seed, stream
 
 
 def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subject], PosesAt]:
-    return lambda duration_s, subject: partial(poses, subject)
+    @wraps(poses)
+    def moving(_: float, subject: Subject) -> PosesAt:
+        return partial(poses, subject)
+
+    return moving
 
 
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
@@ -95,15 +99,17 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
     turns round within 1.5 m of the middle. Who stands sways by millimetres
-    (`rtradar.motion.synthetic.stance`). The others repeat with short rests.
+    (`rtradar.motion.synthetic.stance`); who bends or squats keeps the centre of mass over the feet.
+    All but walks repeat with short rests.
 
     Parameters
     ----------
-    activity : {"walk", "kick", "punch", "jumping_jack", "stand"}
-        What the person does. Traits may follow as text: ``"walk,tempo=0.9,side=right"``.
+    activity : str
+        What the person does, one of `ACTIVITIES`. Traits may follow as text, as in
+        ``"walk,tempo=0.9,side=right"``.
     seed : int
-        Number of the subject, which has its own phase, and a few percent of tempo, amplitude and
-        unevenness of the sides.
+        Number of the subject, whose way of moving is drawn from it: phase, tempo, amplitude,
+        unevenness of the sides, and the traits of each activity, such as how much the hips turn.
     **traits
         Traits of the actor by name; each may be left out.
 
@@ -111,9 +117,9 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         - ``height_m``: standing height [m], which segment lengths follow (Drillis and Contini, see
           `rtradar.motion.synthetic.figure`); 1.75.
         - ``build``: thickness relative to a normal person of that height; 1.
-        - ``tempo``: speed of the movement; 1 is a walk of about 1.2 m/s.
-        - ``side``: side of the leg or hand that strikes, or of the foot that steps first, "left" or
-          "right"; left.
+        - ``tempo``: speed of the movement; 1 is a walk of about 1.1 m/s. A fall takes its own time.
+        - ``side``: side of the leg or hand that strikes, of the foot that steps first, or of the
+          lame leg, "left" or "right"; left.
         - ``style``: one of the `STYLES` of the activity; by default the subject's own.
         - ``amplitude``: factor of step length, kick height, extension of the arm, width of the
           jumps and sway; 1.

@@ -33,7 +33,7 @@ FALLS = ("backward", "forward")
 """Styles of falls."""
 
 _FALLING_S = {"backward": (0.95, 1.2), "forward": (1.25, 1.55)}
-_SPANS_S = {"stay": (1.5, 4.0), "back": (1.8, 3.0), "rest": (0.5, 1.6)}
+_SPANS_S = {"stay": (1.5, 4.0), "back": (2.3, 3.6), "rest": (0.5, 1.6)}
 """Durations of the fall, of lying, of getting up and of standing [s], at 1.75 m."""
 
 _SUDDEN = 1.35

@@ -87,8 +87,8 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
         assert np.quantile(across, 0.98) < 0.02
         assert across.max() < 0.2
         carried.append(down.any(axis=1))
-    # At any time of a walk, a kick or a punch a toe or a heel carries.
-    if subject["activity"] != "jumping_jack":
+    # At any time a toe or a heel carries who does not jump.
+    if subject["activity"] not in ("jumping_jack", "jump"):
         assert (carried[0] | carried[1]).all()
 
 
