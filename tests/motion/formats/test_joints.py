@@ -127,8 +127,7 @@ def test_nodes_stand_where_the_joints_are(tmp_path: Path, joints: dict[str, str]
     assert to_nodes(motion) is motion
     # The floor is found from the toes, and the swing at 1 Hz loses (1/8)^4 of its 0.55 m.
     np.testing.assert_allclose(motion.positions[::2][:, LIMBS], nodes[:, LIMBS], atol=3e-3)
-    # A person of 1.7 m, as the segments of the nominal body have it.
-    assert 0.93 < motion.girth < 1.01
+    assert motion.girth * 1.75 == pytest.approx(1.63, abs=0.02)  # the height of the head's top
 
 
 @pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z", None])
