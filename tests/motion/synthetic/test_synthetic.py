@@ -84,8 +84,9 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
         # to lift or just landed.
         down = np.maximum(points[1:, :, 2], points[:-1, :, 2]) < level + 1e-5
         across = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)[down] * motion.rate_hz
-        assert np.quantile(across, 0.98) < 0.02
-        assert across.max() < 0.2
+        if across.size:  # a short jump may touch the floor with the toes alone
+            assert np.quantile(across, 0.98) < 0.02
+            assert across.max() < 0.2
         carried.append(down.any(axis=1))
     # At any time a toe or a heel carries who does not jump.
     if subject["activity"] not in ("jumping_jack", "jump"):
