@@ -14,8 +14,8 @@ from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
 from rtradar.motion.synthetic import kick as kicks
+from rtradar.motion.synthetic import punch as punches
 from rtradar.motion.synthetic.daily import WAVES, bend, sit, squat, wave
-from rtradar.motion.synthetic.exercises import punch
 from rtradar.motion.synthetic.falls import FALLS, fall
 from rtradar.motion.synthetic.figure import (
     Array,
@@ -46,7 +46,7 @@ def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subj
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
     "kick": kicks.kick,
-    "punch": _repeating(punch),
+    "punch": punches.punch,
     "jumping_jack": jumping_jack,
     "stand": _repeating(stand),
     "sit": sit,
@@ -56,6 +56,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "jump": jump,
     "fall": fall,
     "walk_in_place": walk_in_place,
+    "boxing": punches.boxing,
 }
 """Activities of the actors, by name."""
 
@@ -64,6 +65,8 @@ STYLES: Mapping[str, tuple[str, ...]] = {
     "kick": kicks.STYLES,
     "wave": WAVES,
     "fall": FALLS,
+    "punch": punches.STYLES,
+    "boxing": punches.BOXING_STYLES,
 }
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 
@@ -125,7 +128,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
           jumps and sway; 1.
         - ``rate_hz``: number of frames per second of the result [Hz]; 120.
         - ``take``: number of the take; another take of the same subject begins elsewhere in the
-          movement; 0.
+          movement, and has its strikes in another order; 0.
 
     Returns
     -------

@@ -243,14 +243,14 @@ class Fighter:
             far = math.dist(to[:2], foot.toe.last)
             if far > 0.015 or abs(to[2] - foot.yaw.last[0]) > 0.5:
                 # First the weight comes over the foot that stays.
-                at = max(at, self.root.end + 0.12, self.stepped + _BETWEEN_S)
+                at = max(at, self.root.end + 0.14, self.stepped + _BETWEEN_S)
                 over = 0.7 * np.array(self.ankle(other)) + 0.3 * np.array(self.middle())
-                self.root.move(at - 0.12, at + 0.08, *over.tolist())
+                self.root.move(at - 0.14, at + 0.14, *over.tolist())
                 at = self.step(side, at, at + 0.5 * (end - begin), to, lift * min(1.0, far / 0.1))
             else:
                 foot.heel.move(at, end, own.heel * (side != self.lead))
-        end = max(at + 0.1, end)
-        self.root.move(at - 0.14, end, *self.middle())
+        end = max(at + 0.16, end)
+        self.root.move(at - 0.16, end, *self.middle())
         self.turn_home(begin, end)
         self.depth.move(begin, end, own.depth)
         for side in SIDES:

@@ -1,4 +1,4 @@
-"""Kicks: what each style looks like, and that a body can do it."""
+"""Kicks, punches and boxing: what each style looks like, and that a body can do it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rtradar.motion.synthetic.figure import MAXIMUM_REACH, SHANK, THIGH, TOE_HEI
 
 NODE = NODES.index
 HEIGHT_M = 1.75
-KICKS = [("kick", style) for style in STYLES["kick"]]
+STRIKES = [(name, style) for name in ("kick", "punch", "boxing") for style in STYLES[name]]
 
 
 @cache
@@ -56,8 +56,43 @@ def test_spins_turn_all_the_way_round(seed: int) -> None:
     assert hips_turn_deg(actor("kick", "spin", seed)) > 330
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("style", STYLES["punch"])
+def test_punches_reach_the_opponent_and_come_back(style: str, seed: int) -> None:
+    motion = actor("punch", style, seed)
+    wrists = motion.positions[:, [NODE("l_wrist"), NODE("r_wrist")]]
+    ahead = motion.positions[:, :1, 0] - wrists[..., 0]  # forward is -x
+    height = wrists[..., 2].ravel()[np.argmax(ahead)] / motion.positions[:, NODE("thorax"), 2].max()
+    assert ahead.max() > (0.38 if style in ("hook", "uppercut") else 0.48)
+    assert 0.6 < height < 1.25
+    assert np.quantile(ahead.max(axis=1), 0.2) < 0.75 * ahead.max()
+    assert 1.5 < max(speeds(motion, "l_hand").max(), speeds(motion, "r_hand").max()) < 14.0
+
+
+def test_kinds_of_punches_use_their_hands() -> None:
+    """A jab is of the hand in front, a cross of the other; hooks come round, uppercuts up."""
+
+    def path(style: str, side: str) -> np.ndarray:
+        motion = actor("punch", style, 1)
+        places = [motion.positions[:, NODE(f"{side}_{end}")] for end in ("wrist", "shoulder")]
+        return np.ptp(places[0] - places[1], axis=0)
+
+    # The right hand is in front where the left one is asked to strike.
+    assert path("jab", "r")[0] > path("jab", "l")[0]
+    assert path("cross", "l")[0] > path("cross", "r")[0]
+    assert path("hook", "l")[1] > path("cross", "l")[1]
+    assert path("uppercut", "l")[2] > path("jab", "r")[2]
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_side_is_behind_in_punches(side: str) -> None:
+    motion = synthetic_motion("punch", 2, side=side)
+    left, right = (np.median(motion.positions[:, NODE(f"{s}_ankle"), 0]) for s in "lr")
+    assert (left > right) == (side == "left")
+
+
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("activity", "style"), KICKS)
+@pytest.mark.parametrize(("activity", "style"), STRIKES)
 def test_a_body_can_do_it(activity: str, style: str, seed: int) -> None:
     """Legs reach their feet with bent knees, the spine twists little, weight is over the feet."""
     motion = actor(activity, style, seed)

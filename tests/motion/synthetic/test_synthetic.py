@@ -84,7 +84,7 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
         # to lift or just landed.
         down = np.maximum(points[1:, :, 2], points[:-1, :, 2]) < level + 1e-5
         across = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)[down] * motion.rate_hz
-        if across.size:  # a short jump may touch the floor with the toes alone
+        if across.size:  # heels may be in the air all the time
             assert np.quantile(across, 0.98) < 0.02
             assert across.max() < 0.2
         carried.append(down.any(axis=1))
@@ -164,52 +164,6 @@ def test_long_walk_turns_round() -> None:
     brisk = np.abs(going) > 0.7
     # Who goes to -x has the left hip at -y, and the other way round: nobody walks backwards.
     assert (np.sign(left[brisk]) == np.sign(going[brisk])).all()
-
-
-@pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize("seed", range(3))
-def test_punch(seed: int, side: str) -> None:
-    motion = synthetic_motion("punch", seed, side=side)
-    hand, other = ("l", "r") if side == "left" else ("r", "l")
-    assert 4.5 < speeds(motion, f"{hand}_wrist").max() < 7.5
-    assert speeds(motion, f"{other}_wrist").max() < 3
-    reach = motion.positions[:, NODE(f"{hand}_wrist"), 0].min()
-    assert reach < -0.5
-    assert max(speeds(motion, "l_toe").max(), speeds(motion, "r_toe").max()) < 1e-6
-
-
-@pytest.mark.parametrize("height_m", [1.3, 1.75, 2.0])
-@pytest.mark.parametrize(("activity", "least_deg", "most_deg"), [("punch", 25.0, 50.0)])
-def test_who_strikes_stands_on_bent_knees(
-    activity: str, least_deg: float, most_deg: float, height_m: float
-) -> None:
-    """The height of the root follows from the feet, the legs and the bend of a fighter's knees.
-
-    Leg lengths are those of Drillis and Contini: thigh 0.245 and shank 0.246 of the standing
-    height, and the root lies 0.04 above the hip joints. A root 2 % of the height lower or higher
-    would bend the knees by 10 degrees more or less.
-    """
-    for seed in range(4):
-        motion = synthetic_motion(activity, seed, height_m=height_m, side="left")
-        found = motion.positions / height_m
-        for side in "lr":
-            ankle, hip = (found[:, NODE(f"{side}_{end}")] for end in ("ankle", "hip"))
-            np.testing.assert_allclose(ankle[:, 2], 0.039, atol=1e-6)
-            aside = np.linalg.norm((hip - ankle)[:, :2], axis=1)
-            lowest, highest = (
-                0.039
-                + np.sqrt(
-                    0.245**2 + 0.246**2 + 2 * 0.245 * 0.246 * np.cos(np.radians(bend)) - aside**2
-                )
-                for bend in (most_deg, least_deg)
-            )
-            assert (lowest < hip[:, 2]).all()
-            assert (hip[:, 2] < highest).all()
-        # Both hips are level to 15 degrees, so the root is as far above their middle.
-        hips = found[:, [NODE("l_hip"), NODE("r_hip")], 2].mean(axis=1)
-        np.testing.assert_allclose(
-            found[:, 0, 2] - hips, 0.04, atol=0.04 * (1 - np.cos(np.radians(15)))
-        )
 
 
 @pytest.mark.parametrize("seed", range(3))
