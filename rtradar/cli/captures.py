@@ -145,8 +145,8 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "motion",
         "MOTION",
-        "an .amc, .bvh or .c3d file; or synthetic:walk, or another of `list activities`; "
-        "several for several people, none where the scene has its own",
+        "an .amc, .bvh, .c3d, .npz or .csv file; or synthetic:walk, or another of "
+        "`list activities`; several for several people, none where the scene has its own",
         nargs="*",
     )
     command.intermixed = True

@@ -23,12 +23,13 @@ def load_motion(
     ----------
     path : path
         ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and
-        HDM05, or an ending of `READERS`.
+        HDM05, ``.npz`` and ``.csv`` with joint positions, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
     unit_m : float, optional
         Metres in one length unit of a ``.bvh``, which does not say; found from the person's size
-        where not given. A ``.c3d`` needs it only where it does not say.
+        where not given. A ``.c3d`` needs it only where it does not say, joint positions only where
+        they are not in metres.
 
     Returns
     -------

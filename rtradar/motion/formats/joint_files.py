@@ -34,6 +34,7 @@ LEAST_FRAMES = 5
 
 _NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
 _MOST_JOINTS = 1000
+_FARTHEST_M, _LEAST_STEP_S = 1e6, 1e-6
 
 
 @dataclass(frozen=True)
@@ -156,8 +157,11 @@ def _checked(path: Path, arrays: Mapping[str, NDArray[Any]], unit_m: float) -> J
         if known.count(plain(name)) > 1:
             raise InputError(f"{path}: joint {brief(name)} is there twice; keep one person's")
     positions = given.astype(np.float64) * unit_m
-    if np.isinf(positions).any():
-        raise InputError(f"{path}: positions hold infinity; what is not seen is NaN")
+    if (np.abs(positions) > _FARTHEST_M).any():  # NaN is not
+        raise InputError(
+            f"{path}: positions reach beyond {_FARTHEST_M:g} m; what is not seen is NaN, and "
+            "unit_m says how many metres a unit has"
+        )
     positions[np.isnan(positions).any(axis=2) | ~positions.any(axis=2)] = np.nan
     up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
     if up and up not in UPWARD:
@@ -178,10 +182,13 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
             "numbers, one for each frame"
         )
     times = times.astype(np.float64)
-    wrong = np.flatnonzero(~(np.diff(times, prepend=times[0] - 1) > 0) | ~np.isfinite(times))
-    if len(wrong):
+    for frame in np.flatnonzero(~np.isfinite(times)):
+        raise InputError(f"{path}: time_s is {times[frame]} in frame {frame + 1}; mend it")
+    steps = np.diff(times)
+    for frame in np.flatnonzero(steps < _LEAST_STEP_S):
         raise InputError(
-            f"{path}: time_s is {times[wrong[0]]:g} in frame {wrong[0] + 1}; times must be finite "
-            "and ascend"
+            f"{path}: time_s is {times[frame + 1]:g} in frame {frame + 2}, after "
+            f"{times[frame]:g}; times must ascend, by a microsecond at least"
         )
+    check_number(str(path), "frames a second by time_s", 1 / np.median(steps), 1.0, 100_000.0)
     return np.asarray(times - times[0])

@@ -108,7 +108,7 @@ def motion_of(recording: JointRecording) -> Motion:
     nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, joint_set)
     hips, shoulders = (_node(nodes, f"l_{at}") - _node(nodes, f"r_{at}") for at in _SIDES)
-    pelvis, thorax = (level_axes(left, np.cross(left, _trunk(nodes))) for left in (hips, shoulders))
+    pelvis, thorax = (_axes(where, left, _trunk(nodes)) for left in (hips, shoulders))
     _complete(nodes, pelvis, joint_set)
     _keep_directions(where, nodes)
     size = _stature(nodes) / _NOMINAL_STATURE_M
@@ -254,20 +254,36 @@ def _complete(nodes: Array, pelvis: Array, joint_set: JointSet) -> None:
         nodes[:, NODES.index(f"{side}_hand")] = wrist + hand
 
 
+def _axes(where: str, left: Array, upward: Array) -> Array:
+    """Axes (frame, 3, 3) with this left; where it is nearly upward, those before."""
+    forward = np.cross(left, upward)
+    kept = _last(np.linalg.norm(forward, axis=1) > MINIMUM_PART_M**2)
+    if kept is None:
+        raise InputError(
+            f"{where}: hips, or shoulders, are in one place or in line with the trunk; mend them"
+        )
+    return level_axes(left[kept], forward[kept])
+
+
 def _keep_directions(where: str, nodes: Array) -> None:
     """Give bones that vanish for a moment, in place, the direction that they had before."""
     for node in range(1, len(NODES)):
         start = nodes[:, NODE_PARENTS[node]]
         bone = nodes[:, node] - start
-        there = np.linalg.norm(bone, axis=1) > MINIMUM_PART_M
-        if there.mean() < 0.5:
+        kept = _last(np.linalg.norm(bone, axis=1) > MINIMUM_PART_M)
+        if kept is None:
             raise InputError(
                 f"{where}: {NODES[NODE_PARENTS[node]]!r} and {NODES[node]!r} are in one place; "
                 f"every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, mend the joints"
             )
-        first = int(np.argmax(there))
-        kept = np.maximum.accumulate(np.where(there, np.arange(len(bone)), first))
         nodes[:, node] = start + bone[kept]
+
+
+def _last(good: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """Index of the last good frame at each, or the first one; None where most are not."""
+    if good.mean() < 0.5:
+        return None
+    return np.maximum.accumulate(np.where(good, np.arange(len(good)), int(np.argmax(good))))
 
 
 def _directions(bone: Array) -> Array:
