@@ -17,6 +17,7 @@ from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
 from rtradar.scatter.inside_people import InsidePeople
 from rtradar.scatter.inside_walls import Inside
+from rtradar.scatter.radar_axes import in_world
 from rtradar.scatter.validity import (
     Limit,
     folded_angle_deg,
@@ -75,7 +76,8 @@ def link_budget(
     """
     chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
     powers, fractions = FileBackedRows(), FileBackedRows()
-    solid, others = Inside(scene or Scene(), body.part_names, body.owner), InsidePeople(body)
+    scene, there = in_world(scene or Scene(), body)
+    solid, others = Inside(scene, body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts = np.zeros(len(body.part_names), dtype=bool)
     ever_sampled = np.zeros(len(body.names), dtype=bool)
@@ -90,7 +92,7 @@ def link_budget(
         powers.append(by_part)
         fractions.append(hidden)
         for look in (solid.look, others.look):
-            look(times, body.at(times), by_part)
+            look(times, there.at(times), by_part)
         concerned["beyond_range"] += beyond
         small = by_part * small_curvature(radar, body, times)
         concerned["small_curvature"] += float(small.sum())

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
-from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene import Furniture, Object, Scene
+from rtradar.scene import Furniture, Object, Scene, Wall
 
 Array = NDArray[np.float64]
 
@@ -39,6 +38,11 @@ class BodyInRadarAxes(Body):
     _seen: Body
     _pose: _Pose
     _centre: Array
+
+    @property
+    def in_world(self) -> Body:
+        """The body in the axes of the world."""
+        return self._seen
 
     @property
     def people(self) -> tuple[Body, ...]:
@@ -96,52 +100,67 @@ class _ObjectInRadarAxes(Object):
         return np.einsum("tji,tjk->tik", axes, rotation), seen
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MovingScene(Scene):
+    """A scene as a radar that moves sees it at the start of the capture.
+
+    ``radar`` is the one that moves, and ``world`` the scene in the axes of the world.
+    """
+
+    radar: Radar
+    world: Scene
+
+    @classmethod
+    def of(cls, radar: Radar, world: Scene, time_s: float = 0.0) -> MovingScene:
+        """Return what the radar sees at some time [s]."""
+        (axes,), (origin,) = radar.poses_at([time_s])
+        seen = _seen_by(radar, world, axes, origin)
+        given = {field.name: getattr(seen, field.name) for field in dataclasses.fields(seen)}
+        return cls(**given, radar=radar, world=world)
+
+    def antennas(self, times: ArrayLike) -> tuple[Array, Array]:
+        """Give the places of all Tx (time, tx, 3) and Rx (time, rx, 3) at some times, world [m]."""
+        axes, origins = self.radar.poses_at(times)
+        tx, rx = (
+            np.einsum("tij,aj->tai", axes, own) + origins[:, None]
+            for own in (self.radar.tx_m, self.radar.rx_m)
+        )
+        return tx, rx
+
+
+def in_world(scene: Scene, body: Body) -> tuple[Scene, Body]:
+    """Give scene and body in the axes of the world, where the radar moves; else themselves."""
+    if isinstance(scene, MovingScene) and isinstance(body, BodyInRadarAxes):
+        return scene.world, body.in_world
+    return scene, body
+
+
 def in_radar_axes(radar: Radar, body: Body, scene: Scene) -> tuple[Radar, Body, Scene]:
     """Give a radar that is upright, and a body and a scene as the given radar sees them.
 
-    All three are themselves where the radar is upright. An `InputError` is raised where a radar
-    that moves cannot be simulated in the scene.
+    All three are themselves where the radar is upright. Walls and furniture before a radar that
+    moves are a `MovingScene`.
     """
     if not (radar.is_turned or radar.is_moving):
         return radar, body, scene
-    if radar.is_moving and (scene.walls or scene.furniture):
-        raise InputError(
-            f"scene '{scene.name}': radar '{radar.name}' moves, which is simulated without walls "
-            "and furniture only; leave path_times_s out, or the scene"
-        )
     still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
     upright = dataclasses.replace(radar, yaw_deg=0.0, pitch_deg=0.0, roll_deg=0.0, **still)
     centre = np.array(radar.position_m)
     seen = BodyInRadarAxes(body, radar.poses_at, centre)
+    if radar.is_moving and (scene.walls or scene.furniture):
+        return upright, seen, MovingScene.of(radar, scene)
     return upright, seen, _seen_by(radar, scene, radar.axes, centre)
 
 
 def _seen_by(radar: Radar, scene: Scene, axes: Array, origin: Array) -> Scene:
     """A scene in the axes (3, 3) of a radar that is at an origin, which is its position then."""
     centre = np.array(radar.position_m)
-
-    def place(point: ArrayLike) -> tuple[float, float, float]:
-        x, y, z = ((np.asarray(point) - origin) @ axes + centre).tolist()
-        return x, y, z
-
-    def along(vector: ArrayLike) -> tuple[float, float, float]:
-        x, y, z = (np.asarray(vector) @ axes).tolist()
-        return x, y, z
-
-    walls = tuple(
-        dataclasses.replace(
-            wall,
-            corner_m=place(wall.corner_m),
-            edge_u_m=along(wall.edge_u_m),
-            edge_v_m=along(wall.edge_v_m),
-        )
-        for wall in scene.walls
-    )
+    walls = tuple(wall_seen(wall, axes, origin, centre) for wall in scene.walls)
     furniture = tuple(
         _FurnitureInRadarAxes(
             **{field.name: getattr(piece, field.name) for field in dataclasses.fields(piece)}
             | {
-                "position_m": place(piece.position_m),
+                "position_m": tuple(((piece.position_m - origin) @ axes + centre).tolist()),
                 "turned": tuple(map(tuple, (axes.T @ piece.axes).tolist())),
             }
         )
@@ -151,3 +170,15 @@ def _seen_by(radar: Radar, scene: Scene, axes: Array, origin: Array) -> Scene:
         _ObjectInRadarAxes.of(moving, radar.poses_at, centre) for moving in scene.objects
     )
     return dataclasses.replace(scene, walls=walls, furniture=furniture, objects=objects)
+
+
+def wall_seen(wall: Wall, axes: Array, origin: Array, centre: Array) -> Wall:
+    """Return a wall in axes (3, 3) about an origin (3,), which lies at ``centre`` (3,) in them [m].
+
+    It is of the same kind as the given one.
+    """
+    corner = ((np.array(wall.corner_m) - origin) @ axes + centre).tolist()
+    edges = (np.array([wall.edge_u_m, wall.edge_v_m]) @ axes).tolist()
+    return dataclasses.replace(
+        wall, corner_m=tuple(corner), edge_u_m=tuple(edges[0]), edge_v_m=tuple(edges[1])
+    )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
@@ -20,7 +21,7 @@ from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.radar_axes import in_radar_axes
+from rtradar.scatter.radar_axes import MovingScene, in_radar_axes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.rigid.legs import Past
 from rtradar.scatter.rigid.people import OccludingPeople
@@ -128,6 +129,12 @@ def build_world(
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
     if not scene.objects:
         return model
+    if isinstance(scene, MovingScene):
+        raise InputError(
+            f"scene '{scene.name}': objects that move, in a room before a radar that moves, are "
+            f"not simulated; leave out '{scene.objects[0].name}', the walls and furniture, or "
+            "path_times_s"
+        )
     past = None
     if model.variant is not None:
         mi = use(select(variant))

@@ -50,7 +50,8 @@ class RoomEchoes:
     lengths, defined as in `Echoes` [m], at ``frequency (node,)`` [Hz]. ``points (tx or 1, rx or 1,
     echo, hop, 3)`` are the corners of the path, world [m]; 1 where all antennas share them.
     ``off_m`` is the largest known error of the polynomial through the nodes, if it is above what
-    was asked for [m].
+    was asked for [m]. Of walls ``image`` (3, 3) and (3,) [m] says where a Tx has its image: at the
+    product and the sum.
     """
 
     name: str
@@ -61,6 +62,7 @@ class RoomEchoes:
     bounces: NDArray[np.int64]
     points: Array
     off_m: float = 0.0
+    image: tuple[Array, Array] | None = None
 
     @property
     def n_echoes(self) -> int:

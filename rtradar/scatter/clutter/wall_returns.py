@@ -46,7 +46,7 @@ from rtradar.scatter.clutter.returns import (
 )
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import sent_field
-from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain
+from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain, images
 from rtradar.scatter.multipath.slab_series import DENSE_NODES, whole_walls
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse, reflect
@@ -140,12 +140,19 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
             frequency=frequency,
             bounces=np.full(len(worth), len(leg)),
             points=np.repeat(np.stack(stops[1:-1], axis=-2)[:, :, None], len(worth), axis=2),
+            image=_image(leg),
         ).with_fewest_nodes(radar, FREQUENCY_ERROR if len(worth) == 1 else ENOUGH)
         if best is None or found.off_m < best.off_m:
             best = found
         if not best.off_m:
             break
     return best
+
+
+def _image(leg: Leg) -> tuple[Array, Array]:
+    """Rotation and shift that give the image of any point over a leg."""
+    origin = images(leg, np.zeros(3))
+    return (images(leg, np.eye(3)) - origin).T, origin
 
 
 # -- rough walls -----------------------------------------------------------------------------------

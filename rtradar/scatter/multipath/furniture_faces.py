@@ -71,16 +71,15 @@ class FaceSummary(NamedTuple):
 
 
 def reflecting_faces(
-    scene: Scene, radar: Radar, body: Body, room: RoomTracer | None
+    scene: Scene, radar: Radar, place: Array, body: Body, room: RoomTracer | None
 ) -> tuple[tuple[Face, ...], tuple[FaceSummary, ...]]:
     """Find the faces of furniture over which the radar may see parts of a body at some time.
 
-    Their specular points, for the middle of the array, are at most the radius of the Fresnel zone
-    beside the face, the face is as wide as that, furniture leaves both legs free, and the ghosts
-    are not expected more than `FAINT_DB` below the direct echoes, in the mean over the parts and
-    `_TIMES` poses. Returned are these faces, and what became of every face.
+    Their specular points, for the middle of the array at a place (3,) [m], are at most the radius
+    of the Fresnel zone beside the face, the face is as wide as that, furniture leaves both legs
+    free, and the ghosts are not expected more than `FAINT_DB` below the direct echoes, in the mean
+    over the parts and `_TIMES` poses. Returned are these faces, and what became of every face.
     """
-    place = np.asarray(radar.position_m, dtype=np.float64)
     points = body.at(np.linspace(0.0, body.duration_s, _TIMES)).centres.reshape(-1, 3)
     found, summaries = [], []
     for own in chain.from_iterable(map(faces_of, scene.furniture)):

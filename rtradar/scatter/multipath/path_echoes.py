@@ -34,22 +34,28 @@ AT_ONCE: Met = ((), ())
 
 
 class LegImages:
-    """Images of the antennas over the legs of paths, which do not move.
+    """Images of antennas over the legs of paths.
 
-    ``of_path (path, 2)`` are the legs out and back of each path, ``antennas`` the images over each.
+    ``of_path (path, 2)`` are the legs out and back of each path, ``antennas`` the images over each
+    of the Tx (place, 3) and of the Rx kept with each (place, rx, 3), world [m].
     """
 
-    def __init__(self, radar: Radar, paths: Sequence[WallPath]) -> None:
+    def __init__(self, paths: Sequence[WallPath], tx: Array, rx: Array, middle: Array) -> None:
         legs = list(dict.fromkeys(leg for path in paths for leg in (path.out, path.back)))
         self.of_path = np.array([[legs.index(path.out), legs.index(path.back)] for path in paths])
         self.antennas = LegAntennas(
-            np.array([images(leg, radar.tx) for leg in legs]),
-            np.array([images(leg, radar.rx[radar.rx_of_tx]) for leg in legs]),
+            np.array([images(leg, tx) for leg in legs]),
+            np.array([images(leg, rx) for leg in legs]),
         )
-        ends = ArrayEnds.of(radar)
-        middle = ends.rx_middle[ends.line_of_tx]
         self._in_lanes = np.ascontiguousarray(np.swapaxes(self.antennas.rx, 2, 3))
         self._middle = np.array([images(leg, middle) for leg in legs])
+
+    @classmethod
+    def of(cls, radar: Radar, paths: Sequence[WallPath]) -> LegImages:
+        """Return the images of the Tx of a radar that rests, and of its Rx."""
+        ends = ArrayEnds.of(radar)
+        middle = ends.rx_middle[ends.line_of_tx]
+        return cls(paths, radar.tx, radar.rx[radar.rx_of_tx], middle)
 
     def echoes(
         self,
@@ -149,18 +155,19 @@ class EchoColumns:
             for met in self.met
         ]
 
-    def lengths(self, at: ChirpPoses, points: Array, length: Array) -> Array:
+    def lengths(self, legs: LegImages, at: ChirpPoses, points: Array, length: Array) -> Array:
         """Compute the lengths (chirp, rx, column) of all columns [m].
 
-        They are ``length (chirp, rx, echo)`` and the delays of slabs. The points towards which
-        echoes leave the body (chirp, echo, 3) are in the axes of their part [m].
+        They are ``length (chirp, rx, echo)`` and the delays of slabs. ``legs`` are the images of
+        the antennas of ``at``. The points towards which echoes leave the body (chirp, echo, 3) are
+        in the axes of their part [m].
         """
         if self._delays is None:
             self._delays = self._list_delays()
         out = np.empty((*length.shape[:2], len(self)))
         where = PartPoints(points, self.part)
         bodies = Ellipsoids(at.centres, at.frames, at.semi_axes)
-        delayed_lengths(self._legs.antennas, at.tx_index, where, bodies, self._delays, length, out)
+        delayed_lengths(legs.antennas, at.tx_index, where, bodies, self._delays, length, out)
         return out
 
     def _list_delays(self) -> SlabDelays:

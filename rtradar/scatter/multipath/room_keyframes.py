@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +28,20 @@ _KEYFRAMES_AT_ONCE = 32
 
 
 class RoomKeyframes:
-    """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps."""
+    """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps.
 
-    def __init__(self, around: Surroundings, columns: EchoColumns, body: Body) -> None:
+    Where the radar moves, ``around_at`` gives the surroundings that it has at some time [s].
+    """
+
+    def __init__(
+        self,
+        around: Surroundings,
+        columns: EchoColumns,
+        body: Body,
+        around_at: Callable[[float], Surroundings] | None = None,
+    ) -> None:
         self._around, self.columns, self._body = around, columns, body
+        self._around_at = around_at
         self.step = keyframe_step(around.radar, KEYFRAMES_S)
         self._cache: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
 
@@ -73,13 +84,15 @@ class RoomKeyframes:
         cache = self._cache
         found = {number: cache[number] for number in numbers if number in cache}
         missing = [number for number in numbers if number not in cache]
-        for first in range(0, len(missing), _KEYFRAMES_AT_ONCE):
-            some = missing[first : first + _KEYFRAMES_AT_ONCE]
+        at_once = _KEYFRAMES_AT_ONCE if self._around_at is None else 1
+        for first in range(0, len(missing), at_once):
+            some = missing[first : first + at_once]
             chirps = np.array(some) * self.step
             gapless = self._around.radar.gapless
             times = gapless.centres_of(chirps)
             poses = Poses(*chirp_poses(gapless, self._body, chirps)[3:])
-            keyframes = path_keyframes(self._around, self.columns, poses, times)
+            around = self._around if self._around_at is None else self._around_at(float(times[0]))
+            keyframes = path_keyframes(around, self.columns, poses, times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))
                 cache.stay = int(_KEPT_BYTES / sum(array.nbytes for array in own))

@@ -12,6 +12,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
+from rtradar.errors import InputError
 from rtradar.kernels.scatter.rooms import PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
@@ -29,7 +32,7 @@ from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
-from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
+from rtradar.scatter.multipath.image_paths import Face, WallPath, corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
@@ -38,6 +41,7 @@ from rtradar.scatter.multipath.room_keyframes import RoomKeyframes, nearby_point
 from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scatter.radar_axes import MovingScene, in_world, wall_seen
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
@@ -54,6 +58,9 @@ _ENOUGH, _MOST_NODES = 0.015, 3
 """Part of it that polynomials through so many nodes may take; one pass of `synthesize` takes 3."""
 
 _CHIRPS_AT_ONCE = 64
+
+_PLACES = 9
+"""Places on the path of a radar that moves, from which walls and faces are looked for."""
 
 _LOOK_EVERY, _LEAST_LOOKS = 5, 25
 """One of how many keyframes is looked at to tell which echoes are above the noise, and the least
@@ -129,16 +136,34 @@ class RoomModel:
         self.variant: str | None = None
         if variant is not None:
             backend = select(variant)
-            self.variant, mi = backend.kind, use(backend)
-            tracers = BodyTracer(mi, body.semi_axes), RoomTracer(mi, scene)
+            self.variant, self._mi = backend.kind, use(backend)
+            tracers = BodyTracer(self._mi, body.semi_axes), RoomTracer(self._mi, scene)
+        self._moving = scene if isinstance(scene, MovingScene) else None
+        self._where, every_body = in_world(scene, body)
         faces: tuple[Face, ...] = ()
         self.faces: tuple[FaceSummary, ...] = ()
+        places = _places(radar, self._moving)
+        if order and not (self._fast or self._moving is None):
+            raise InputError(
+                f"scene '{scene.name}': radar '{radar.name}' moves; echoes over walls are then "
+                "those of analytic or specular: take one of these as fidelity, or order = 0"
+            )
         if order:
-            faces, self.faces = reflecting_faces(scene, radar, body, tracers and tracers[1])
-        self.paths = wall_paths(scene.walls, np.asarray(radar.position_m), order, faces)
-        every = *series.walls, *(HALF_SPACE,) * len(faces)
-        walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
-        self._legs = LegImages(radar, self.paths)
+            room = tracers and (
+                tracers[1] if self._moving is None else RoomTracer(self._mi, self._where)
+            )
+            found = [reflecting_faces(self._where, radar, own, every_body, room) for own in places]
+            faces = tuple(dict.fromkeys(face for some, _ in found for face in some))
+            self.faces = _summaries([summaries for _, summaries in found])
+        paths = [wall_paths(self._where.walls, place, order, faces) for place in places]
+        self.paths = tuple(
+            sorted(dict.fromkeys(chain.from_iterable(paths)), key=lambda path: path.order)
+        )
+        self._every = *series.walls, *(HALF_SPACE,) * len(faces)
+        walls = WallResponse(
+            WallEdges.of(self._where.walls, radar, faces), self._every, series.frequency
+        )
+        self._legs = LegImages.of(radar, self.paths)
         columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         self._around = Surroundings(
             radar,
@@ -150,8 +175,42 @@ class RoomModel:
             # A formula alone knows neither polarisation nor occlusion.
             whole_level=not (self._fast or isinstance(conductor, HasFormula)),
         )
-        self._keyframes = RoomKeyframes(self._around, columns, body)
+        around_at = None if self._moving is None else partial(self._around_at, self._moving)
+        self._keyframes = RoomKeyframes(self._around, columns, body, around_at)
         self.not_followed: dict[str, float] = {}
+
+    def _around_at(self, scene: MovingScene, time_s: float) -> Surroundings:
+        """What a radar that moves has around it at some time [s], in its axes then."""
+        (axes,), (origin,) = scene.radar.poses_at([time_s])
+        centre = np.array(self._radar.position_m)
+        edges = self._around.walls.edges
+        seen = {wall: wall_seen(wall, axes, origin, centre) for wall in edges.surfaces}
+        turned = [
+            WallPath(*(tuple(face._replace(wall=seen[face.wall]) for face in leg) for leg in legs))
+            for legs in ((path.out, path.back) for path in self.paths)
+        ]
+        faces = tuple(Face(seen[wall], False) for wall in edges.surfaces[len(edges.walls) :])
+        at = WallEdges.of(tuple(seen[wall] for wall in edges.walls), self._radar, faces)
+        walls = WallResponse(at, self._every, self._around.walls.frequency)
+        tracers = self._around.tracers
+        if tracers is not None:
+            now = MovingScene.of(scene.radar, scene.world, time_s)
+            tracers = tracers[0], RoomTracer(self._mi, now)
+        return self._around._replace(walls=walls, tracers=tracers, paths=turned)
+
+    def _before_walls(
+        self, chirps: NDArray[np.int64], at: ChirpPoses
+    ) -> tuple[ChirpPoses, LegImages]:
+        """Poses and images of the antennas, in the axes of the walls: each chirp has its own."""
+        if self._moving is None:
+            return at, self._legs
+        radar, body = self._radar, in_world(self._moving, self._body)[1]
+        times = np.minimum(radar.centres_of(chirps), body.duration_s)
+        tx, rx = self._moving.antennas(times)
+        number = np.arange(len(chirps))
+        tx, rx = tx[number, at.tx_index], rx[number[:, None], radar.rx_of_tx[at.tx_index]]
+        there = ChirpPoses(number, tx, rx, *body.at(times))
+        return there, LegImages(self.paths, tx, rx, rx.mean(axis=1))
 
     @property
     def _columns(self) -> EchoColumns:
@@ -206,15 +265,16 @@ class RoomModel:
                 found = [cast(HasSpecularPoints, model).specular_echo(chirps, at, start)]
             else:
                 found = [solve_specular_points(at, start=start)[:2]]
+        there, legs = self._before_walls(chirps, at)
         if n_echoes > n_direct:
             others = slice(n_direct, n_echoes)
             own = columns.path[others], columns.part[others]
-            found.append(self._legs.echoes(*own, at, near.take(others), formula))
+            found.append(legs.echoes(*own, there, near.take(others), formula))
         length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
         factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
         if columns.delayed:
             echo = np.array(columns.echo)
-            length = columns.lengths(at, near.places(), length)
+            length = columns.lengths(legs, there, near.places(), length)
             bare = bare[..., echo]
             factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
         # Times what walls, the body's surface and occluders leave.
@@ -234,8 +294,8 @@ class RoomModel:
 
     @property
     def has_ghost_tones(self) -> bool:
-        """Whether `ghosts` can be asked for, and there are any."""
-        return self._fast and not self._columns.direct.all()
+        """Whether `ghosts` can be asked for, and there are any: not before a radar that moves."""
+        return self._fast and self._moving is None and not self._columns.direct.all()
 
     def ghosts(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes over walls of a fast model; they have lengths where they are not seen.
@@ -261,7 +321,9 @@ class RoomModel:
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
             factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
-            extra = columns.lengths(at, nearby_points(blend, before, after).places(), extra)
+            there, legs = self._before_walls(chirps, at)
+            points = nearby_points(blend, before, after).places()
+            extra = columns.lengths(legs, there, points, extra)
         nodes = self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         path_amplitudes(np.ones(extra.shape), *factors, blend, left)
@@ -346,3 +408,16 @@ class RoomModel:
         self._keyframes.restrict(worth, keep)
         self._keyframes.look_ahead(n_chirps)
         return summaries
+
+
+def _places(radar: Radar, moving: MovingScene | None) -> Array:
+    """Where the middle of the array is looked for walls and faces from (place, 3), world [m]."""
+    if moving is None:
+        return np.array([radar.position_m])
+    knots = moving.radar.path_times_s or ()
+    return moving.radar.poses_at(np.linspace(knots[0], knots[-1], _PLACES))[1]
+
+
+def _summaries(found: Sequence[tuple[FaceSummary, ...]]) -> tuple[FaceSummary, ...]:
+    """What became of each face: that of the first place at which it was taken, or of the first."""
+    return tuple(min(own, key=lambda one: bool(one.reason)) for own in zip(*found, strict=True))

@@ -14,6 +14,7 @@ from rtradar.scene import Furniture, Scene, Wall, material, reflection
 from rtradar.trace.backends.backend import Backend
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+PLACE = np.array(RADAR.position_m)
 
 
 def block(folder: Path, size: tuple[float, float, float], made: str = "metal", **at: Any) -> Any:
@@ -64,7 +65,7 @@ def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: 
         ("metal", 0.06, (-2.6, 2.2, 1.0), "nobody is seen"),
     ):
         piece = block(tmp_path, (1.0, 0.3, high), made, position_m=place)
-        faces, summaries = reflecting_faces(Scene(furniture=(piece,)), RADAR, body, None)
+        faces, summaries = reflecting_faces(Scene(furniture=(piece,)), RADAR, PLACE, body, None)
         assert [face.wall.name for face in faces] == ([] if reason else ["block right"])
         reasons = {face.name: face.reason for face in summaries}
         assert len(reasons) == 6
