@@ -13,10 +13,12 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.multipath.room_model import FIELD_ERROR, RoomModel
+from rtradar.scatter.radar_axes import MovingScene
 from rtradar.scatter.validity import Limit, warn_of
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.signal.ghosts import GhostIf, ghosts_within
+from rtradar.signal.moving_clutter import MovingRoomIf
 from rtradar.signal.static_clutter import RoomIf
 
 _OF_GHOSTS = 0.75
@@ -57,7 +59,11 @@ def indoors(
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     paths = model.prune(n_chirps, noise)
     order = max(settings.order, 1)
-    clutter = Clutter(radar, scene, variant=variant, order=order).prune(noise)
+
+    def trace(seen: Scene) -> Clutter:
+        return Clutter(radar, seen, variant=variant, order=order).prune(noise)
+
+    clutter = trace(scene)
     allowed = error = 0.0
     ghosts, said = None, dict[str, Any]()
     if settings.path_tolerance_db is not None:
@@ -65,8 +71,11 @@ def indoors(
         if allowed > 0 and model.has_ghost_tones:
             ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed)
             error = said.pop("error_m2")
-    shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
-    room = RoomIf(radar, clutter.cycle(), shadow)
+    if isinstance(scene, MovingScene):
+        room: RoomIf = MovingRoomIf(radar, scene, radar.duration_of(n_chirps), trace)
+    else:
+        shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
+        room, error = RoomIf(radar, clutter.cycle(), shadow), error + shadow.error_m2
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
     summary: dict[str, Any] = {
         "paths": [asdict(path) for path in paths],
@@ -79,18 +88,19 @@ def indoors(
         },
     }
     if allowed > 0:
-        error += shadow.error_m2
         said["error_db"] = 10 * math.log10(error / person_power_m2) if error > 0 else None
         summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
+    limits = []
+    if isinstance(scene, MovingScene):
+        limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))
     # Walls that are not followed over the sweep, where they matter.
     fraction = max(model.not_followed.values(), default=0.0)
-    if fraction == 0:
-        return Indoors(model, room, ghosts, summary, ())
-    message = (
-        f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, "
-        "because they are too dispersive or transmit too little: "
-        f"{', '.join(model.not_followed)}"
-    )
-    limit = Limit("wall_frequency_response", fraction, message)
-    warn_of(limit)
-    return Indoors(model, room, ghosts, summary, (limit,))
+    if fraction > 0:
+        message = (
+            "echo power by walls whose coefficient over the sweep is not known to "
+            f"{FIELD_ERROR:.0%}, because they are too dispersive or transmit too little: "
+            f"{', '.join(model.not_followed)}"
+        )
+        limits.append(Limit("wall_frequency_response", fraction, message))
+        warn_of(limits[-1])
+    return Indoors(model, room, ghosts, summary, tuple(limits))

@@ -79,7 +79,7 @@ class Radar(Schedule):
     path_times_s, path_m, path_angles_deg : sequence, optional
         Motion of the radar: times [s], ascending, how far it is from its position then, (x, y, z)
         in world axes [m], and how far it is turned from its yaw, pitch and roll [deg]. In between
-        it goes straight and evenly, and before and after it rests. Only in free space.
+        it goes straight and evenly, and before and after it rests.
     channels : {"pairs", "all"}
         ``pairs`` keeps y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper); ``all`` keeps
         every Tx with every Rx (192). With a list every Rx is kept.

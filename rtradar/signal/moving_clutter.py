@@ -64,7 +64,7 @@ class MovingRoomIf(RoomIf):
         duration_s: float,
         trace: Callable[[MovingScene], Clutter],
     ) -> None:
-        self._scene, self._trace = scene, trace
+        self.scene, self._trace = scene, trace
         self.times = keyframe_times(scene.radar, duration_s)
         self._kept: KeyframeCache[int, _Keyframe] = KeyframeCache(0, 3)
         super().__init__(radar, trace(scene).cycle())
@@ -88,12 +88,12 @@ class MovingRoomIf(RoomIf):
     ) -> None:
         """Add the echoes of a keyframe, each chirp with its weight."""
         radar = self._radar
-        found = self._kept.get(keyframe, lambda: self._find(keyframe))
+        found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         # The antennas as the radar would see them from where it is at the keyframe.
         centre = np.array(radar.position_m)
         at_tx, at_rx = (
-            (places - found.origin) @ found.axes + centre for places in self._scene.antennas(times)
+            (places - found.origin) @ found.axes + centre for places in self.scene.antennas(times)
         )
         at_tx = at_tx[np.arange(len(tx)), tx]
         at_rx = np.take_along_axis(at_rx, radar.rx_of_tx[tx][..., None], axis=1)
@@ -111,8 +111,8 @@ class MovingRoomIf(RoomIf):
                 )
                 samples[some] += synthesize(echoes, radar, times[some], dtype=np.complex64)
 
-    def _find(self, keyframe: int) -> _Keyframe:
-        time_s, scene, radar = float(self.times[keyframe]), self._scene, self._radar
+    def _keyframe(self, keyframe: int) -> _Keyframe:
+        time_s, scene, radar = float(self.times[keyframe]), self.scene, self._radar
         objects = self._trace(MovingScene.of(scene.radar, scene.world, time_s)).objects
         (axes,), (origin,) = scene.radar.poses_at([time_s])
         rx = radar.rx[radar.rx_of_tx]
