@@ -10,6 +10,7 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
+from rtradar.report.view.three_d import posed_figure, semi_axis_poses
 from rtradar.scatter.echo_models import build_model
 
 RADAR = dataclasses.replace(
@@ -106,3 +107,18 @@ def test_points_of_a_turned_moving_radar_in_frames_stay_where_the_person_is() ->
         assert len(result.maps["time"]) == 5
     # Elevation is a third of a beam of 64 degrees off at most; range and azimuth are better.
     np.testing.assert_allclose(found[1], found[0], atol=0.25)
+
+
+def test_the_view_moves_the_radar_along() -> None:
+    body = Body.from_motion(rt.synthetic_motion("walk", duration_s=1.0))
+    times = np.array([0.0, 0.25, 0.75])
+    poses = semi_axis_poses(body, times).astype(np.float32)
+    moving = dataclasses.replace(RADAR, **POSE, **PATH)
+    for radar, count in ((moving, 3), (RADAR, 1)):
+        figure = posed_figure(body.part_names, times, poses, radar)
+        assert np.shape(figure["tx"]) == (count, 3, 3)
+        for step in range(count):
+            axes, places = radar.poses_at(times[step : step + 1])
+            expected = radar.rx_m @ axes[0].T + places[0]
+            np.testing.assert_allclose(figure["rx"][step], expected, atol=1e-4)
+            np.testing.assert_allclose(radar.at(times[step]).rx, expected, atol=1e-9)

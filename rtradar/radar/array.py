@@ -151,6 +151,11 @@ class Array(Waveform):
         positions : (time, 3) float64
             Positions, world [m].
         """
+        angles, positions = self.path_at(times)
+        return _rotation(angles), positions
+
+    def path_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Give yaw, pitch and roll (time, 3) [deg] and the position (time, 3) [m] at some times."""
         at = np.asarray(times, dtype=np.float64)
         positions, angles = np.empty((2, len(at), 3))
         positions[:] = self.position_m
@@ -158,7 +163,7 @@ class Array(Waveform):
         for values, path in ((positions, self.path_m), (angles, self.path_angles_deg)):
             for axis, along in enumerate(() if path is None else zip(*path, strict=True)):
                 values[:, axis] += np.interp(at, self.path_times_s or (), along)
-        return _rotation(angles), positions
+        return angles, positions
 
     @cached_property
     def axes(self) -> NDArray[np.float64]:

@@ -320,6 +320,26 @@ class Radar(Schedule):
 
         return plot_radar(self, ax)
 
+    def at(self, time_s: float) -> Radar:
+        """Return the radar at rest where it is at some time, itself if it does not move.
+
+        Parameters
+        ----------
+        time_s : float
+            Time since the start of the capture [s].
+
+        Returns
+        -------
+        Radar
+        """
+        if not self.is_moving:
+            return self
+        (angles,), (place,) = self.path_at([time_s])
+        yaw, pitch, roll = angles.tolist()
+        still = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
+        pose = {"yaw_deg": yaw, "pitch_deg": pitch, "roll_deg": roll}
+        return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)  # type: ignore[arg-type]
+
     # -- powers (derived) --------------------------------------------------------------------------
 
     @property

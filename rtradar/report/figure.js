@@ -46,8 +46,11 @@ function floorLines() {
 }
 
 const each = (name) => figure.parts.flatMap((part, index) => new Array(nVertices).fill(name(part, index)));
+/** What a radar has at a frame: one of a list for each, or the only one of a radar at rest. */
+const ofRadar = (list, frame) => list[Math.min(frame, list.length - 1)];
+const coordinates = (places) => ({ x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]) });
 const antennas = (places, name, colourName, symbol, size) => ({
-  type: "scatter3d", mode: "markers", name, x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
+  type: "scatter3d", mode: "markers", name, ...coordinates(ofRadar(places, 0)),
   marker: { size, symbol, color: colour(colourName), line: { width: 0 } },
   hovertemplate: `${name} %{pointNumber}<br>(%{x:.3f}, %{y:.3f}, %{z:.3f}) m<extra></extra>`,
 });
@@ -140,6 +143,9 @@ function movingMeshes(first) {
 function placesAt(frame, pointsTrace) {
   const { mesh, bones } = posed(frame);
   const sets = [[0, mesh], [1, bones]].map(([trace, [x, y, z]]) => ({ trace, x, y, z }));
+  if (figure.tx.length > 1) {
+    for (const [trace, places] of [[3, figure.tx], [4, figure.rx]]) sets.push({ trace, ...coordinates(ofRadar(places, frame)) });
+  }
   if (!spatial) return sets;
   const [x, y, z] = pointsAt(figure.times[frame]);
   return [...sets, { trace: pointsTrace, x, y, z, "marker.color": pointColours(figure.times[frame]) }];

@@ -87,7 +87,8 @@ function pathLines(mode, step, direct) {
     const value = echoValue(mode, step, echo);
     const text = `${label(echo)}<br>${range[step * nEchoes + echo].toFixed(3)} m, ${velocity[step * nEchoes + echo].toFixed(2)} m/s, ${power[step * nEchoes + echo].toFixed(1)} ${data.power_unit}`;
     // There and back over the same corner is one line.
-    for (const place of [echoes.radar_m, ...real, ...(real.length > 1 ? [echoes.radar_m] : [])]) put(place, value, text);
+    const radar = ofRadar(echoes.radar_m, step);
+    for (const place of [radar, ...real, ...(real.length > 1 ? [radar] : [])]) put(place, value, text);
     put([null, null, null], value, "");
   }
   return line;

@@ -124,11 +124,8 @@ def keyframe_times(radar: Radar, duration_s: float) -> _Array:
     """Times of keyframes on the path of a radar, up to the end of a capture [s]."""
     knots = np.clip([0.0, *(radar.path_times_s or ()), duration_s], 0.0, duration_s)
     knots = np.unique(knots)
-    _, places = radar.poses_at(knots)
     # Its angles change evenly between the knots, as its place does.
-    angles = np.zeros_like(places)
-    for axis, along in enumerate(zip(*(radar.path_angles_deg or ()), strict=True)):
-        angles[:, axis] = np.interp(knots, radar.path_times_s or (), along)
+    angles, places = radar.path_at(knots)
     way, turn = (np.linalg.norm(np.diff(values, axis=0), axis=1) for values in (places, angles))
     counts = np.ceil(np.maximum(way / (SPACING * radar.wavelength_m), turn / TURN_DEG))
     pieces = [

@@ -1,4 +1,4 @@
-"""Clutter before a radar that moves: that of a radar at rest wherever it is, and where it belongs."""
+"""Clutter before a radar that moves: that of one at rest wherever it is, and where it belongs."""
 
 from __future__ import annotations
 

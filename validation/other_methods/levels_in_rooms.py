@@ -265,7 +265,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
             # Out over a wall or back over it: by reciprocity the same.
             way = " > ".join(sorted(set(name.split(" > ")) - {"body"})) or "direct"
             own[way] = own.get(way, 0.0) + power(field[..., names == name])
-            angles[way] = bistatic_deg(model.course(name, middle), middle)
+            angles[way] = bistatic_deg(model.course(name, middle, radar), middle)
     optics = powers.pop("specular")
     strong = [name for name in optics if optics[name] > optics["direct"] * 10**-3.5]
     for fidelity, found in powers.items():

@@ -88,6 +88,7 @@ def _draw_room(
     if suffix:
         after = removed(maps["range_doppler"]).strip().capitalize()
         panels[after] = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
+    there = radar.at(time_s)
     found = [
         ghost for ghost in ghosts(inside.model, radar, time_s) if ghost.range_m < radar.max_range_m
     ]
@@ -111,7 +112,7 @@ def _draw_room(
             for ghost in found
         ]
         windows = capture.processing.window_functions
-        axes = (received("range_azimuth"), maps["azimuth"][:]), scene, radar
+        axes = (received("range_azimuth"), maps["azimuth"][:]), scene, there
         rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, key, heading, windows)
     times = np.linspace(0, body.duration_s, _TRACK_POINTS)
     tracks = truth_of(body, times)["person_position"][..., :2]
@@ -119,9 +120,11 @@ def _draw_room(
     if len(named) == 1:
         named = {"person": tracks[:, 0]}
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
-    paths = {number: inside.model.course(ghost.path, middle) for number, ghost in numbered.items()}
+    paths = {
+        number: inside.model.course(ghost.path, middle, there) for number, ghost in numbered.items()
+    }
     drawn["Plan of the room, with paths"] = folder / "plan.png"
-    rooms.draw_room_plan(folder / "plan.png", scene, radar, named, paths, key, heading)
+    rooms.draw_room_plan(folder / "plan.png", scene, there, named, paths, key, heading)
     return drawn
 
 

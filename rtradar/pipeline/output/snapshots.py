@@ -69,7 +69,8 @@ def snapshots(capture: Capture) -> Snapshots:
     every = max(math.ceil(len(frame_starts) / MAX_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
     window = np.arange(0, len(frame_starts), every)
     times = np.minimum(radar.window_times(frame_starts[window]), body.duration_s)
-    paths = model.paths if isinstance(model, RoomModel) else (WallPath((), ()),)
+    direct = (WallPath((), ()),)
+    paths = model.paths_in_world(radar) if isinstance(model, RoomModel) else direct
     cycles = frame_starts[window] + radar.cycles_per_frame // 2
     keys, observed = _observe(model, radar, cycles, capture.n_chirps // radar.n_tx)
     chosen = _strongest(keys, observed.power_m2)
@@ -194,7 +195,7 @@ def _corners(
 
     The specular point is that of both images of the middle of the array. NaN if it is not known.
     """
-    centre = np.broadcast_to(np.asarray(radar.position_m, dtype=np.float64), (len(times), 3))
+    centre = radar.poses_at(times)[1]
     poses = body.at(times)
     most = max(paths[path].order for path, _, _ in keys) + 1
     out = np.full((len(times), len(keys), most, 3), np.nan)

@@ -178,13 +178,15 @@ def draw_range_azimuth_with_walls(
     view = angle_view(power, angles, radar, [(one.across, one.range_m) for one in marked])
     image, words = draw_view(axes, level, angles, radar.range_m, view, unit=unit, below_peak_db=40)
     place = np.asarray(radar.position_m)[:2]
+    yaw = np.radians(radar.yaw_deg)
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     labels = _circle(axes, marked)
     for first, last, wall in feet_of_walls(scene):
         along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
-        labels += _line(axes, along, wall.name, "wall", linestyle="--")
+        labels += _line(axes, along @ turn, wall.name, "wall", linestyle="--")
     for piece in scene.furniture:
         kind = "furniture" if piece.triangles().closed else "reflector"
-        labels += _line(axes, _outline(piece) - place, piece.name, kind)
+        labels += _line(axes, (_outline(piece) - place) @ turn, piece.name, kind)
     axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]")
     notes = [words, _key("Circles are ghosts, predicted over", key)]
     notes += ["Dashed: walls. Outlined: furniture and reflectors."] if labels else []

@@ -326,6 +326,7 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     snapshots, radar = run_view.snapshots, run_view.radar
     figure = posed_figure(snapshots.part_names.tolist(), snapshots.times, snapshots.poses, radar)
     figure["drawn"] = snapshots.drawn_parts.tolist()
+    moments = snapshots.times if radar.is_moving else np.zeros(1)
     figure["ranges"] = _with_room(figure["ranges"], snapshots)
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
@@ -345,7 +346,7 @@ def view_data(run_view: RunView) -> dict[str, Any]:
             "velocity_mps": packed_floats(snapshots.velocity_mps),
             "power_db": packed_floats(run_view.power_db),
             "corners": packed_floats(snapshots.corners),
-            "radar_m": list(radar.position_m),
+            "radar_m": np.round(radar.poses_at(moments)[1], 4).tolist(),
         },
         "room": {
             "walls": np.round(snapshots.walls, 4).tolist(),

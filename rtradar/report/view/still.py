@@ -132,7 +132,8 @@ class _Paint:
 
 
 def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
-    snapshots, radar = run_view.snapshots, run_view.radar
+    snapshots = run_view.snapshots
+    radar = run_view.radar.at(float(snapshots.times[step]))
     vertices, faces = unit_sphere(2)
     poses = snapshots.poses[step].astype(np.float64)
     tints = paint.parts(step)

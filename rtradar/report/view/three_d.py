@@ -38,7 +38,7 @@ def posed_figure(
 
     ``poses`` is float32 (frame, part, 4, xyz): centre and the three semi-axes of each part in world
     coordinates [m]; ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx``
-    [m]; ``ranges`` of the axes x, y, z [m].
+    [m] of every frame, or once of a radar at rest; ``ranges`` of the axes x, y, z [m].
     """
     centres, axes = poses[:, :, 0], poses[:, :, 1:]
     vertices, faces = unit_sphere(_SUBDIVISIONS)
@@ -46,15 +46,18 @@ def posed_figure(
     # semi-axes' components.
     extent = np.sqrt((axes**2).sum(axis=2))
     places = [(centres - extent).reshape(-1, 3), (centres + extent).reshape(-1, 3)]
+    radars = [radar.at(time) for time in times.tolist()] if radar.is_moving else [radar]
+    tx, rx = np.array([own.tx for own in radars]), np.array([own.rx for own in radars])
+    antennas = np.concatenate([tx, rx], axis=1).reshape(-1, 3)
     return {
         "parts": list(part_names),
         "times": np.round(times, 4).tolist(),
         "poses": packed_floats(poses),
         "vertices": packed_floats(vertices),
         "faces": faces.ravel().tolist(),
-        "tx": np.round(radar.tx, 4).tolist(),
-        "rx": np.round(radar.rx, 4).tolist(),
-        "ranges": _ranges(np.concatenate(places), np.concatenate([radar.tx, radar.rx])),
+        "tx": np.round(tx, 4).tolist(),
+        "rx": np.round(rx, 4).tolist(),
+        "ranges": _ranges(np.concatenate(places), antennas),
         "window_s": radar.frame_duration_s,
     }
 

@@ -41,7 +41,7 @@ def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
     rate = (length[1] - length[0]) / (step * radar.cycle_duration_s)
     # The direction follows from the slope of the lengths along the line of receivers.
     line = max(radar.rx_lines, key=lambda own: np.ptp(radar.rx_m[own, 1]))
-    places, azimuth = radar.rx[line, 1], np.zeros(len(power))
+    places, azimuth = radar.rx_m[line, 1], np.zeros(len(power))
     if np.ptp(places) > 0:
         slope = np.polyfit(places, echoes.length[0, line], 1)[0]
         azimuth = np.arcsin(np.clip(-slope, -1, 1))

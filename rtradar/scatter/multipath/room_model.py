@@ -32,7 +32,13 @@ from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
-from rtradar.scatter.multipath.image_paths import Face, WallPath, corners, wall_paths
+from rtradar.scatter.multipath.image_paths import (
+    Face,
+    WallPath,
+    corners,
+    paths_seen,
+    wall_paths,
+)
 from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
@@ -185,10 +191,7 @@ class RoomModel:
         centre = np.array(self._radar.position_m)
         edges = self._around.walls.edges
         seen = {wall: wall_seen(wall, axes, origin, centre) for wall in edges.surfaces}
-        turned = [
-            WallPath(*(tuple(face._replace(wall=seen[face.wall]) for face in leg) for leg in legs))
-            for legs in ((path.out, path.back) for path in self.paths)
-        ]
+        turned = paths_seen(self.paths, seen.__getitem__)
         faces = tuple(Face(seen[wall], False) for wall in edges.surfaces[len(edges.walls) :])
         at = WallEdges.of(tuple(seen[wall] for wall in edges.walls), self._radar, faces)
         walls = WallResponse(at, self._every, self._around.walls.frequency)
@@ -350,13 +353,21 @@ class RoomModel:
             self._models[path] = self._before(ImageRadar.over(self._radar, self.paths[path]))
         return self._models[path]
 
-    def course(self, name: str, point: Array) -> Array:
-        """Return the corners (corner, 3) of a path over a point (3,) and back [m].
+    def paths_in_world(self, radar: Radar) -> tuple[WallPath, ...]:
+        """Return the paths in the axes of the world, where the radar may be turned."""
+        if self._moving is not None or not radar.is_turned:
+            return self.paths
+        centre, back = np.array(radar.position_m), radar.axes.T
+        return paths_seen(self.paths, lambda wall: wall_seen(wall, back, centre, centre))
 
-        The path, given by its name, begins and ends at the middle of the array.
+    def course(self, name: str, point: Array, radar: Radar) -> Array:
+        """Return the corners (corner, 3) of a path over a point (3,) and back, world [m].
+
+        The path, given by its name, begins and ends at the middle of the array of a radar at rest.
         """
-        path = next(path for path in self.paths if path.name == name)
-        middle = np.asarray(self._radar.position_m, dtype=np.float64)
+        paths = self.paths_in_world(radar)
+        path = next(path for path in paths if path.name == name)
+        middle = np.asarray(radar.position_m, dtype=np.float64)
         out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
         return np.array([*out, *reversed(back[:-1])])
 
