@@ -13,16 +13,14 @@ What a person takes from the clutter by their shadow is left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.returns import RoomEchoes
-from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.radar_axes import MovingScene
 from rtradar.signal.static_clutter import RoomIf
@@ -39,13 +37,26 @@ _MOST_TERMS = 4_000_000
 """Echoes of channels that are in memory at once."""
 
 
+class Traced(Protocol):
+    """The clutter of a room from one pose, as `rtradar.scatter.clutter.static_clutter.Clutter`."""
+
+    @property
+    def objects(self) -> Sequence[Any]:
+        """Echoes of each object, `rtradar.scatter.clutter.returns.RoomEchoes`."""
+        ...
+
+    def cycle(self) -> Iterator[Echoes]:
+        """Yield the echoes of one cycle, object by object."""
+        ...
+
+
 class _Keyframe(NamedTuple):
     """What the room returns at a keyframe, and the pose (3, 3) and (3,) of the radar.
 
     ``rest (tx, rx, echo)`` of each object is the length that no way of `_ways` holds [m].
     """
 
-    objects: tuple[RoomEchoes, ...]
+    objects: Sequence[Any]
     rest: tuple[_Array, ...]
     axes: _Array
     origin: _Array
@@ -62,7 +73,7 @@ class MovingRoomIf(RoomIf):
         radar: Radar,
         scene: MovingScene,
         duration_s: float,
-        trace: Callable[[MovingScene], Clutter],
+        trace: Callable[[MovingScene], Traced],
     ) -> None:
         self.scene, self._trace = scene, trace
         self.times = keyframe_times(scene.radar, duration_s)
@@ -135,7 +146,7 @@ def keyframe_times(radar: Radar, duration_s: float) -> _Array:
     return np.concatenate([*pieces, knots[-1:]])
 
 
-def _ways(own: RoomEchoes, tx: _Array, rx: _Array) -> _Array:
+def _ways(own: Any, tx: _Array, rx: _Array) -> _Array:
     """Ways (chirp, rx, echo) from Tx (chirp, 3) to Rx (chirp, rx, 3), over walls or points [m]."""
     if own.image is not None:
         turn, shift = own.image
