@@ -49,6 +49,9 @@ RATE_HZ = 120.0
 """Least rate of the motion that is made [Hz], for `Motion` interpolates its root by PCHIP, which
 flattens the crests of what is sampled more rarely."""
 
+_LEAST_KEPT = 1 / 3
+"""Least fraction of the frames that the longest stretch without a longer gap must have."""
+
 _EVEN = 0.01
 """Largest deviation of steps of time from their median, relative to it, that is rounding."""
 
@@ -196,7 +199,7 @@ def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Arr
             if len(whole) and whole[-1] + 1 - whole[0] > best.stop - best.start:
                 best = slice(int(whole[0]), int(whole[-1]) + 1)
     kept = best.stop - best.start
-    if kept < max(LEAST_FRAMES, 0.4 * len(times)):
+    if kept < max(LEAST_FRAMES, _LEAST_KEPT * len(times)):
         worst = NODES[int(np.argmax(unseen.sum(axis=0)))]
         raise InputError(
             f"{where}: too much is not seen: {kept} of {len(times)} frames are the longest stretch "
