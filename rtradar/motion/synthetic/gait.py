@@ -135,7 +135,7 @@ def _foot(
             # The swinging foot hurries less in the middle than in the least jerky move.
             even = gait.swing_even * bump(swung) * (0.5 - swung)
             ankle[swings] += even[:, None] * (ends[1][0] - ends[0][0])
-            late = after.vigour * bump(swung**1.5)[:, None]
+            late = after.vigour * bump(swung**gait.lame_end)[:, None]
             ankle[swings] += late * about(z=after.heading).apply(beyond)
         return ankle, pitch(t), yaw(t)
 

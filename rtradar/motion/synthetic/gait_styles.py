@@ -64,6 +64,8 @@ class Gait:
     lame_aside: float = 0.0
     lame_reach: float = 0.0
     """Ways of the swinging foot up, outward and forward, beyond those of a normal step."""
+    lame_end: float = 1.5
+    """They are largest in the middle of the swing with 1, and the later the larger it is."""
     lame_toe_off_deg: float = 0.0
     """Change of `toe_off_deg`."""
     lame_landing_deg: float = 0.0
@@ -182,9 +184,10 @@ GAITS = {
         "stance": (0.66, 0.69),
         "lame_stance": (-0.18, -0.14),
         "lame_late": (0.1, 0.2),
-        "lame_step": (0.12, 0.35),
-        "lame_lift": (0.04, 0.09),
-        "lame_reach": (0.1, 0.17),
+        "lame_step": (0.0, 0.16),
+        "lame_lift": (0.05, 0.1),
+        "lame_reach": (0.08, 0.15),
+        "lame_end": (2.6, 3.6),
         "lame_hike_deg": (6.0, 12.0),
         "lame_back_deg": (16.0, 30.0),
     },
