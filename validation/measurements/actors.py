@@ -57,6 +57,7 @@ JOINTS = {
     "root": "hips hipcenter spinebase",
     "thorax": "neck shouldercenter spineshoulder",
     "@_hip": "@upleg hip@",
+    "@_knee": "knee@ @leg",
     "@_ankle": "ankle@ @foot",
     "@_wrist": "wrist@ @hand",
     "@_hand": "handtip@ @handend hand@",
@@ -104,6 +105,19 @@ def apart(window: Window) -> Array:
     return np.asarray(np.linalg.norm((window["l_ankle"] - window["r_ankle"])[:, :2], axis=1))
 
 
+def ahead(window: Window) -> Array:
+    """How far the left ankle is before the right one."""
+    return np.asarray((window["r_ankle"] - window["l_ankle"])[:, 0])
+
+
+def knee(window: Window, side: str) -> Array:
+    hip, middle, ankle = (window[f"{side}_{node}"] for node in ("hip", "knee", "ankle"))
+    cosine = np.sum((middle - hip) * (ankle - middle), axis=1) / (
+        np.linalg.norm(middle - hip, axis=1) * np.linalg.norm(ankle - middle, axis=1)
+    )
+    return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+
+
 def largest_speed(node: str) -> Callable[[Window], float]:
     return lambda window: max(both(node, lambda places: speed(places).max())(window))
 
@@ -124,6 +138,12 @@ MEASURES: Mapping[str, tuple[str, Callable[[Window], float]]] = {
         "m",
         lambda w: min(both("ankle", lambda places: np.asarray(path(places)))(w)),
     ),
+    "ankle up and down": (
+        "m",
+        lambda w: max(both("ankle", lambda places: np.ptp(places[:, 2]))(w)),
+    ),
+    "steps unlike each other": ("m", lambda w: abs(float(ahead(w).max() + ahead(w).min()))),
+    "largest bend of a knee": ("deg", lambda w: max(knee(w, side).max() for side in "lr")),
     "change of the distance of the ankles": ("m", lambda w: float(np.ptp(apart(w)))),
     "wrist up and down": (
         "m",
@@ -167,6 +187,12 @@ LINES: Mapping[str, Mapping[str, Range | None]] = {
         "largest speed of a hand": (6.31, 5.71, 6.78),
         "largest radial speed of a hand": (3.07, 2.74, 3.3),
         "root up and down": (0.212, 0.194, 0.228),
+        "ankle up and down": (
+            "m",
+            lambda w: max(both("ankle", lambda places: np.ptp(places[:, 2]))(w)),
+        ),
+        "steps unlike each other": ("m", lambda w: abs(float(ahead(w).max() + ahead(w).min()))),
+        "largest bend of a knee": ("deg", lambda w: max(knee(w, side).max() for side in "lr")),
         "change of the distance of the ankles": (0.38, 0.336, 0.42),
         "largest tilt of the trunk": (4.66, 4.5, 4.88),
         "share at rest": (0.0833, 0.0625, 0.583),
@@ -262,7 +288,7 @@ def of_actors(activity: str, takes: int) -> Iterator[Window]:
         motion = rt.synthetic_motion(
             activity,
             seed,
-            duration_s=WALK_S if activity == "walk" else TAKE_S,
+            duration_s=WALK_S if activity.startswith("walk") else TAKE_S,
             height_m=float(random.uniform(1.55, 1.95)),
             side=("left", "right")[int(random.integers(2))],
         )

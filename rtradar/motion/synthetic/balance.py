@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -115,6 +116,22 @@ def over_feet(feet: Pose, height_m: float, pelvis: Rotation, forward: Array, leg
     up = np.sqrt(np.maximum((legs * height_m) ** 2 - aside**2 - away**2, (0.02 * height_m) ** 2))
     hips = xyz(forward, 0.0, ankle[:, 2] + up)
     return np.asarray(hips + pelvis.apply([0.0, 0.0, (ROOT - HIP) * height_m]))
+
+
+def restless(subject: Subject, t: Array, pose: Pose) -> Pose:
+    """The same pose with hips and shoulders that turn a little, and sway to the sides."""
+    turn, aside = (
+        np.sin(2 * np.pi * (subject.drawn(f"{name} rate", *rates) * t + subject.drawn(name, 0, 1)))
+        for name, rates in (("restless", (0.3, 0.7)), ("swaying", (0.2, 0.5)))
+    )
+    turn = math.radians(subject.drawn("turns", 0.7, 3.5)) * turn
+    sway_m = subject.drawn("sways", 0.001, 0.006) * subject.height_m * aside
+    return replace(
+        pose,
+        root=pose.root + xyz(0.0, sway_m, 0.0),
+        pelvis=about(z=turn) * pose.pelvis,
+        thorax=about(z=-0.6 * turn) * pose.thorax,
+    )
 
 
 Repetitions = Callable[[Array], Array]

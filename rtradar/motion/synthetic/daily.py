@@ -11,6 +11,7 @@ import numpy as np
 from rtradar.motion.synthetic.balance import (
     over_feet,
     repetitions,
+    restless,
     soles,
     standing,
 )
@@ -64,13 +65,13 @@ def bend(duration_s: float, subject: Subject) -> PosesAt:
     done = repetitions(
         subject,
         duration_s,
-        {"go": (0.8, 1.4), "stay": (0.0, 0.5), "back": (0.8, 1.4), "rest": (0.05, 0.6)},
+        {"go": (0.8, 1.3), "stay": (0.0, 0.25), "back": (0.8, 1.3), "rest": (0.0, 0.4)},
     )
-    deep = math.radians(drawn("bend", 60.0, 104.0)) * min(subject.amplitude, 1.0)
+    deep = math.radians(drawn("bend", 64.0, 110.0)) * min(subject.amplitude, 1.0)
     hips, knees = drawn("hips", 0.5, 0.72), drawn("knees", 0.93, 0.99)
     reach, elbows = drawn("reach", -0.1, 0.25), drawn("elbows", 6.0, 25.0)
     # Many raise their arms each time before they go down.
-    raised = math.radians(max(drawn("raised", -80.0, 160.0), 0.0))
+    raised = math.radians(max(drawn("raised", -50.0, 165.0), 0.0))
 
     def pose(bent: Array, forward: Array) -> Pose:
         straight = _upright(subject)
@@ -124,7 +125,7 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
     done = repetitions(
         subject,
         duration_s,
-        {"go": (1.0, 1.7), "stay": (0.5, 2.5), "back": (1.0, 1.6), "rest": (0.3, 1.2)},
+        {"go": (1.0, 1.7), "stay": (0.2, 1.7), "back": (1.0, 1.6), "rest": (0.1, 0.9)},
         extent=0.0,
     )
     down, behind = drawn("seat", 0.2, 0.27), drawn("seat behind", 0.19, 0.23)
@@ -155,7 +156,7 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
         # The feet carry until the seat does.
         carried = smooth((bent - 0.55) / 0.45)
         stood = standing(subject, lambda way: pose(np.minimum(bent, 1.0), way), 0.4 * bent * seated)
-        return pose(bent, stood + carried * (seated - stood))
+        return restless(subject, t, pose(bent, stood + carried * (seated - stood)))
 
     return poses
 
@@ -163,7 +164,8 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
 def _balanced(subject: Subject, pose: _Bent, done: Callable[[Array], Array]) -> PosesAt:
     def poses(t: Array) -> Pose:
         bent = done(t)
-        return pose(bent, standing(subject, lambda way: pose(bent, way), np.zeros(len(t))))
+        way = standing(subject, lambda way: pose(bent, way), np.zeros(len(t)))
+        return restless(subject, t, pose(bent, way))
 
     return poses
 
@@ -200,6 +202,6 @@ def wave(duration_s: float, subject: Subject) -> PosesAt:
             fore = upper * about(x=sign * np.radians(up * (elbow + swing * np.sin(beat - 0.3))))
             hand = fore * about(x=sign * np.radians(up * 0.5 * swing * np.sin(beat - 0.9)))
             arms[side] = Arm(upper, fore, hand)
-        return replace(body, arms=arms)
+        return restless(subject, t, replace(body, arms=arms))
 
     return poses

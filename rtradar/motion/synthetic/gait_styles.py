@@ -131,36 +131,37 @@ _NORMAL = {
 """Ranges of a normal walker; a subject is drawn from them."""
 
 _SLOW = {
-    "cycle_s": (1.35, 1.65),
-    "step": (0.23, 0.29),
+    "cycle_s": (1.22, 1.72),
+    "step": (0.215, 0.3),
     "stance": (0.61, 0.66),
     "track": (0.035, 0.055),
     "sway": (0.3, 0.7),
-    "bob": (0.002, 0.0045),
-    "pulse_mps": (0.12, 0.2),
+    "bob": (0.002, 0.009),
+    "pulse_mps": (0.08, 0.27),
     "toe_off_deg": (24.0, 38.0),
     "heel_strike_deg": (8.0, 18.0),
     "clearance": (0.02, 0.032),
-    "lateral_deg": (1.5, 4.0),
-    "arm_deg": (8.0, 16.0),
-    "hip_yaw_deg": (3.5, 7.5),
+    "lateral_deg": (1.5, 6.0),
+    "arm_deg": (10.0, 26.0),
+    "hip_yaw_deg": (4.0, 11.0),
     "unsteady": (0.015, 0.035),
     "lame_arm": (0.2, 0.7),
+    "lean_deg": (0.0, 7.0),
 }
 
 GAITS = {
     "normal": {},
     "antalgic": _SLOW
     | {
-        "cycle_s": (1.0, 1.45),
-        "step": (0.19, 0.24),
-        "lean_deg": (2.0, 7.0),
+        "cycle_s": (0.95, 1.5),
+        "step": (0.17, 0.27),
+        "lean_deg": (3.0, 11.0),
         "stance": (0.68, 0.71),
         "lame_stance": (-0.23, -0.2),
         "lame_late": (0.16, 0.27),
         "lame_step": (-0.65, -0.35),
         "lame_hike_deg": (2.0, 5.0),
-        "lame_away_deg": (3.0, 7.0),
+        "lame_away_deg": (4.0, 11.0),
         "lame_toe_off_deg": (-10.0, 5.0),
         "lame_landing_deg": (6.0, 14.0),
     },
@@ -179,7 +180,7 @@ GAITS = {
     },
     "lurch": _SLOW
     | {
-        "cycle_s": (1.4, 1.8),
+        "cycle_s": (1.3, 1.95),
         "step": (0.24, 0.3),
         "stance": (0.66, 0.69),
         "lame_stance": (-0.18, -0.14),
@@ -193,26 +194,26 @@ GAITS = {
     },
     "steppage": _SLOW
     | {
-        "step": (0.25, 0.3),
+        "step": (0.23, 0.32),
         "lame_stance": (-0.13, -0.1),
         "lame_late": (0.04, 0.1),
         "lame_lift": (0.045, 0.085),
         "lame_reach": (0.05, 0.09),
         "lame_landing_deg": (16.0, 30.0),
         "lame_hike_deg": (7.0, 12.0),
-        "lame_away_deg": (3.0, 7.0),
+        "lame_away_deg": (3.0, 10.0),
         "stance": (0.64, 0.68),
     },
     "trendelenburg": _SLOW
     | {
-        "cycle_s": (1.3, 1.8),
-        "step": (0.2, 0.26),
+        "cycle_s": (1.2, 1.9),
+        "step": (0.19, 0.3),
         "lame_stance": (-0.06, -0.01),
         "lame_late": (0.0, 0.1),
         "lame_step": (-0.2, 0.0),
         "lame_drop_deg": (4.0, 9.0),
-        "lame_leant_deg": (3.0, 10.0),
-        "lame_dip": (0.01, 0.022),
+        "lame_leant_deg": (3.0, 14.0),
+        "lame_dip": (0.01, 0.028),
         "lame_sway": (0.02, 0.04),
     },
 }
@@ -225,10 +226,11 @@ _IN_PLACE = {
     "stance": (0.56, 0.66),
     "sway": (0.4, 1.0),
     "pulse_mps": (0.0, 0.06),
-    "toe_off_deg": (20.0, 40.0),
+    "toe_off_deg": (10.0, 36.0),
     "heel_strike_deg": (-14.0, 2.0),
-    "clearance": (0.04, 0.15),
-    "hip_yaw_deg": (1.0, 5.0),
+    "clearance": (0.012, 0.12),
+    "hip_yaw_deg": (3.0, 9.0),
+    "lean_deg": (0.0, 8.0),
 }
 """Ranges of who walks in place, where they are not those of a normal walker."""
 
