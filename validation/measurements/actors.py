@@ -54,7 +54,7 @@ NAMES_IN_JOINTS = {"punching": "punch", "jumping_jacks": "jumping_jack"}
 USED = (
     "root",
     "thorax",
-    *(f"{side}_{node}" for side in "lr" for node in "hip knee ankle wrist hand".split()),
+    *(f"{side}_{node}" for side in "lr" for node in ["hip", "knee", "ankle", "wrist", "hand"]),
 )
 """Nodes that are looked at."""
 
