@@ -73,7 +73,7 @@ class PooledNet(_SmallNet):
         with torch.no_grad():
             return [
                 *(layer.folded(torch.zeros(0)) for layer in normed),
-                *((layer.weight, layer.bias) for layer in dense),
+                *((layer.weight.detach(), layer.bias.detach()) for layer in dense),
             ]
 
 

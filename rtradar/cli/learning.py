@@ -1,8 +1,9 @@
-"""``rtradar dataset``, ``train`` and ``evaluate``: labelled clouds, and classifiers of them."""
+"""``rtradar dataset``, ``train``, ``evaluate`` and ``predict``: labelled clouds, classifiers."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import TYPE_CHECKING
 
 from rtradar.cli.values import (
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def add(commands: Subcommands) -> None:
-    """Add the three commands."""
+    """Add the four commands."""
     add_command(
         commands,
         "dataset",
@@ -52,6 +53,13 @@ def add(commands: Subcommands) -> None:
         "say how well trained classifiers do, in tables and pictures",
         _add_evaluate,
         ("rtradar evaluate out/trained --baselines",),
+    )
+    add_command(
+        commands,
+        "predict",
+        "say which activity a run shows, by weights that have learnt from synthetic actors",
+        _add_predict,
+        ("rtradar predict out/walk", "rtradar predict out/walk --json answer.json"),
     )
 
 
@@ -196,6 +204,13 @@ def _add_evaluate(evaluate: OneLineParser) -> None:
     evaluate.set_defaults(command=_evaluate)
 
 
+def _add_predict(predict: OneLineParser) -> None:
+    predict.option("folder", "DIR", "folder that 'rtradar run --out DIR' made", type=there)
+    add_files(predict, json="write the answer there")
+    predict.flag("--quiet", QUIET_HELP)
+    predict.set_defaults(command=_predict)
+
+
 def _dataset_init(options: argparse.Namespace) -> int:
     from rtradar.campaign import write_template
 
@@ -292,4 +307,20 @@ def _evaluate(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, content)
     say(options, f"{table}\n\nsee {out}")
+    return 0
+
+
+def _predict(options: argparse.Namespace) -> int:
+    check_place(options.json)
+    from rtradar.recognition import predict_run
+
+    answer = predict_run(options.folder)
+    if options.json is not None:
+        write_json(options.json, answer)
+    chances = sorted(answer["probabilities"].items(), key=lambda one: -one[1])
+    shown = ", ".join(f"{name} {chance:.0%}" for name, chance in chances)
+    windows = f"{answer['windows']} window{'' if answer['windows'] == 1 else 's'}"
+    say(options, f"{answer['activity']} ({shown}; {windows})")
+    for warning in answer["warnings"]:
+        print(f"rtradar: warning: {warning}", file=sys.stderr)
     return 0

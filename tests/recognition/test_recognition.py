@@ -1,0 +1,132 @@
+"""Recognition of a run: the networks in NumPy, windows of clouds, and what is warned of."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtradar.classify.recipes import SMALL
+from rtradar.classify.small_networks import PooledNet
+from rtradar.cli import main
+from rtradar.clouds.files import save_cloud_npz
+from rtradar.errors import InputError
+from rtradar.motion import ACTIVITIES
+from rtradar.radar import Radar
+from rtradar.recognition import Recogniser, predict_run
+from rtradar.recognition.windows import EDGE_S, SCALES, WINDOW_S, cut_windows
+
+
+def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Points of somebody whose parts swing at 1 Hz."""
+    random = np.random.default_rng(0)
+    time, size = random.uniform(0, length_s, n_points), random.uniform(0, 0.3, n_points)
+    phase = 2 * np.pi * time
+    place, velocity = 4 + size * np.sin(phase), 2 * np.pi * size * np.cos(phase)
+    return np.stack([time, place, velocity], axis=1)
+
+
+def run_folder(folder: Path, radar: Radar, **parameters: Any) -> Path:
+    """Write what a run leaves of a cloud of 3 s."""
+    usual = {"scene": "free-space", "snr_db": 20.0, "radar": dataclasses.asdict(radar)}
+    content = {"parameters": usual | parameters, "capture_s": 3.0, "people": [{}]}
+    (folder / "summary.json").write_text(json.dumps(content))
+    save_cloud_npz(folder / "cloud_rdt.npz", cloud(3000))
+    return folder
+
+
+def test_networks_in_numpy_answer_as_they_do_in_torch(tmp_path: Path) -> None:
+    torch.manual_seed(0)
+    networks = [PooledNet(3, SMALL) for _ in range(2)]
+    points = torch.randn(8, 64, 3)
+    for network in networks:
+        network.train()(points)  # gives the norms a mean and a variance
+        network.eval()
+    layers = [[(w.numpy(), b.numpy()) for w, b in one.layers()] for one in networks]
+    card = {"classes": ["a", "b", "c"], "temperature": 1.0}
+    Recogniser(layers, card).save(tmp_path / "weights.npz")
+    recogniser = Recogniser.load(tmp_path / "weights.npz")
+    assert recogniser.classes == ("a", "b", "c")
+    middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
+    with torch.no_grad():
+        expected = torch.stack([one(points - middle)[0] for one in networks]).mean(0).softmax(1)
+    found = recogniser.probabilities([some * np.array(SCALES) for some in points.numpy()])
+    assert found == pytest.approx(expected.numpy(), abs=2e-3)  # half precision of the weights
+
+
+@given(st.floats(0.05, 60.0), st.integers(0, 400))
+def test_windows_are_alike_and_leave_only_the_edges_out(length_s: float, n_points: int) -> None:
+    points = cloud(n_points, length_s)
+    windows = cut_windows(points, length_s)
+    for window in windows:
+        assert np.ptp(window[:, 0]) < WINDOW_S if len(window) else True
+    inside = (points[:, 0] >= EDGE_S + 1e-9) & (points[:, 0] < length_s - EDGE_S - 1e-9)
+    kept = {tuple(point) for window in windows for point in window.tolist()}
+    assert {tuple(point) for point in points[inside].tolist()} <= kept
+
+
+def test_what_a_run_shows_is_one_of_the_actors_activities(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run_folder(tmp_path, Radar.preset("paper-12ghz"))
+    answer = tmp_path / "answer.json"
+    assert main(["predict", str(tmp_path), "--json", str(answer)]) == 0
+    found = json.loads(answer.read_text())
+    assert set(found) == {"activity", "probabilities", "windows", "warnings"}
+    assert set(found["probabilities"]) <= set(ACTIVITIES)
+    assert sum(found["probabilities"].values()) == pytest.approx(1)
+    assert found["probabilities"][found["activity"]] == max(found["probabilities"].values())
+    assert found["windows"] == 5
+    assert capsys.readouterr().out.startswith(found["activity"])
+    assert not any("radar" in warning for warning in found["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("radar", "parameters", "warning"),
+    [
+        ("iwr1443", {}, "radar 'iwr1443' is not like .* range resolution"),
+        ("paper-12ghz", {"scene": "living-room"}, "scene 'living-room': .* free space"),
+        ("paper-12ghz", {"snr_db": -10.0}, "SNR -10 dB"),
+        ("paper-12ghz", {"scene": None}, "measured samples"),
+    ],
+)
+def test_what_was_not_learnt_is_warned_of(
+    tmp_path: Path, radar: str, parameters: dict[str, Any], warning: str
+) -> None:
+    answer = predict_run(run_folder(tmp_path, Radar.preset(radar), **parameters))
+    assert any(re.search(warning, one) for one in answer["warnings"])
+
+
+def test_unusual_motion_and_few_points_are_warned_of(tmp_path: Path) -> None:
+    run_folder(tmp_path, Radar.preset("paper-12ghz"))
+    fast = cloud(60) * [1.0, 1.0, 3.0]
+    save_cloud_npz(tmp_path / "cloud_rdt.npz", fast)
+    warnings = " ".join(predict_run(tmp_path)["warnings"])
+    assert "unlike any that was learnt from" in warnings
+    assert "windows have 2" in warnings  # of 60 points 1.4 s of 3 s hold 28, half of the least
+
+
+@pytest.mark.parametrize("name", ["summary.json", "cloud_rdt.npz"])
+@pytest.mark.parametrize("damage", [None, b"", b"{}", b"[1]"])
+def test_damaged_runs_are_one_line(tmp_path: Path, name: str, damage: bytes | None) -> None:
+    run_folder(tmp_path, Radar.preset("paper-12ghz"))
+    (tmp_path / name).unlink()
+    if damage is not None:
+        (tmp_path / name).write_bytes(damage)
+    with pytest.raises(InputError, match=r"holds no run|is damaged"):
+        predict_run(tmp_path)
+
+
+def test_no_extra_is_needed() -> None:
+    asked = "import sys, rtradar.recognition; sys.exit(bool({'torch', 'sklearn'} & {*sys.modules}))"
+    assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

@@ -1,0 +1,345 @@
+"""Actors against recorded people: what a classifier that learns from actors knows of recordings.
+
+    python validation/measurements/people.py OUT [--only NAME,...]
+
+Builds the data sets that are not there yet: recordings of `RTRADAR_MOCAP` and `RTRADAR_JOINTS`, and
+actors, all in windows round the strikes, which begin at random. The radar has few channels; a part
+of the actors is seen by all 96, too, and what the two radars' clouds differ in is printed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import subprocess
+import sys
+from collections import Counter
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.metrics import confusion_matrix
+from sklearn.neighbors import NearestCentroid
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from rtradar.classify.baselines import axis_features, rdt_features
+from rtradar.classify.prepare import stack_clouds
+from rtradar.classify.recipes import EDGES, SMALL
+from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
+from rtradar.classify.splits import subjects_of
+from rtradar.classify.study import classes_of
+from rtradar.classify.training import Examples, predict, train_network
+from rtradar.clouds.collection import Collection
+from rtradar.recognition import Recogniser
+from rtradar.recognition.windows import cut_windows
+
+HEAD = """
+seed = 0
+folder = "{folder}"
+[windows]
+duration_s = 1.6
+place = "strike"
+count = 2
+[each]
+radar = ["few_channels.toml"]
+scene = ["free-space"]
+fidelity = ["analytic"]
+[drawn]
+heading_deg = [-30.0, 30.0]
+snr_db = [15.0, 25.0]
+offset_x_m = [-0.3, 0.3]
+offset_y_m = [-0.3, 0.3]
+"""
+FEW = Path(__file__).resolve().parents[1] / "few_channels.toml"
+ACTIVITIES = {
+    "walk": "walk",
+    "kick": "kick",
+    "punch": "punch",
+    "punching": "punch",
+    "jumping_jack": "jumping_jack",
+    "jumping_jacks": "jumping_jack",
+}
+"""Activities of an actor by the names that the recordings have."""
+
+WINDOW_S = 1.6
+
+
+def of_mocap(folder: Path) -> str:
+    """Specification of the recordings with skeletons; those too short for a window are left out."""
+    text = ""
+    for row in csv.DictReader((folder / "MANIFEST.csv").open()):
+        if row["activity"] not in ACTIVITIES or row["file"].endswith(".txt"):
+            continue
+        rate, frames = float(row["fps"]), int(row["frames"])
+        first, last = (int(row[key]) for key in ("start_frame", "end_frame"))
+        start_s, end_s, length_s = (first - 1) / rate, last / rate, (frames - 1) / rate
+        spare = max(0.0, WINDOW_S + 0.2 - (end_s - start_s)) / 2  # of an activity that is shorter
+        start_s, end_s = max(0.0, start_s - spare), min(length_s - 1e-4, end_s + spare)
+        if end_s - start_s < WINDOW_S:
+            continue
+        text += _recording(row["file"], row["activity"], row["subject"], start_s, end_s)
+        if row["skeleton_file"]:
+            text += f'skeleton = "{row["skeleton_file"]}"\n'
+    return text
+
+
+def of_joints(folder: Path, most: int) -> str:
+    """Specification of the recordings of joint positions, ``most`` of each person and activity."""
+    text, taken = "", Counter[tuple[str, str]]()
+    for row in csv.DictReader((folder / "MANIFEST.csv").open()):
+        if row["activity"] in ACTIVITIES and float(row["seconds"]) > WINDOW_S + 0.05:
+            taken[row["person"], row["activity"]] += 1
+            if taken[row["person"], row["activity"]] > most:
+                continue
+            text += _recording(
+                row["file"], row["activity"], f"{row['dataset']}_{row['person']}", 0.0
+            )
+    return text
+
+
+def _recording(
+    file: str, activity: str, subject: str, start_s: float, end_s: float | None = None
+) -> str:
+    until = "" if end_s is None else f"end_s = {end_s:.4f}\n"
+    return (
+        f'[[recordings]]\nfile = "{file}"\nlabel = "{ACTIVITIES[activity]}"\n'
+        f'subject = "{subject}"\nlicence = "see its folder"\nstart_s = {start_s:.4f}\n{until}'
+    )
+
+
+def data_sets(out: Path, takes: int, most: int) -> dict[str, str]:
+    """Text of the specification of every data set, by its name."""
+    (out / "few_channels.toml").write_bytes(FEW.read_bytes())
+    found = {}
+    for name, variable, those in (
+        ("mocap", "RTRADAR_MOCAP", of_mocap),
+        ("joints", "RTRADAR_JOINTS", partial(of_joints, most=most)),
+    ):
+        if folder := os.environ.get(variable):
+            found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
+    for place in ("strike", "random"):
+        text = (FEW.parent / f"actors_{place}.toml").read_text()
+        found[f"actors_{place}"] = text.replace("count = 200", f"count = {takes}")
+    few_takes = text.replace('place = "random"', 'place = "strike"').replace(
+        "count = 200", "count = 10"
+    )
+    found["channels_few"] = few_takes
+    found["channels_all"] = few_takes.replace("few_channels.toml", "paper-12ghz")
+    return found
+
+
+def build(out: Path, only: list[str] | None, takes: int, most: int) -> None:
+    """Build the data sets that are not complete."""
+    out.mkdir(parents=True, exist_ok=True)
+    for name, text in data_sets(out, takes, most).items():
+        if only is None or name in only:
+            spec = out / f"{name}.toml"
+            spec.write_text(text)
+            words = ["dataset", "build", str(spec), "--out", str(out / name), "--workers", "1"]
+            subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
+
+
+def answers_of(
+    clouds: Collection,
+    chances: NDArray[np.float64],
+    truth: NDArray[np.int64],
+    of: Any = slice(None),
+) -> Answers:
+    """Answers about the clouds with these indices."""
+    recordings, subjects = (
+        clouds.column(name).astype(str)[of] for name in ("recording", "subject")
+    )
+    return Answers(chances, truth[of], recordings, subjects)
+
+
+def told(title: str, answers: Answers) -> None:
+    """Print balanced accuracies, an interval over people and the error of calibration."""
+    recordings = answers.by_recording()
+    low, high = interval(recordings)
+    print(
+        f"{title:56} {balanced_accuracy(answers):6.1%} {balanced_accuracy(recordings):6.1%} "
+        f"({low:.1%} to {high:.1%}), calibration error {calibration_error(recordings):.1%}",
+        flush=True,
+    )
+
+
+def forest() -> Any:
+    return ExtraTreesClassifier(200, class_weight="balanced", min_samples_leaf=2, random_state=0)
+
+
+def centroid() -> Any:
+    return make_pipeline(StandardScaler(), NearestCentroid())
+
+
+def left_out(
+    features: NDArray[np.float64],
+    truth: NDArray[np.int64],
+    groups: Any,
+    make: Any,
+    more: Any = None,
+) -> NDArray[np.float64]:
+    """Chances (cloud, class) of each cloud from all of other groups, and from ``more`` beside."""
+    chances = np.zeros((len(truth), truth.max() + 1))
+    for group in np.unique(groups):
+        learn = groups != group
+        x, y = features[learn], truth[learn]
+        if more is not None:
+            x, y = np.concatenate([x, more[0]]), np.concatenate([y, more[1]])
+        model = make().fit(x, y)
+        chances[np.ix_(~learn, model.classes_)] = model.predict_proba(features[~learn])
+    return chances
+
+
+def one_axis(actors: Collection, recorded: Collection) -> None:
+    """What time, range or velocity alone tells, of actors and of recordings that are cut alike."""
+    for axis, name in enumerate(("time", "range", "velocity")):
+        for title, clouds in (("actors", actors), ("recorded", recorded)):
+            _, truth = classes_of(clouds)
+            groups = subjects_of(clouds) % 20  # twenty parts of people are enough
+            chances = left_out(axis_features(clouds, axis), truth, groups, forest)
+            told(f"{name} alone, {title}, other people", answers_of(clouds, chances, truth))
+
+
+def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
+    """Learn from actors and ask about recordings."""
+    _, learnt = classes_of(actors)
+    names, truth = classes_of(recorded)
+    x, asked = rdt_features(actors), rdt_features(recorded)
+    for title, make in (("nearest centroid", centroid), ("forest", forest)):
+        told(title, answers_of(recorded, make().fit(x, learnt).predict_proba(asked), truth))
+    for recipe in (SMALL, EDGES):
+        sets = [
+            Examples(stack_clouds(one, edge_s=recipe.edge_s), torch.from_numpy(those), names)
+            for one, those in ((actors, learnt), (recorded, truth))
+        ]
+        each = []
+        for seed in range(seeds):
+            network, _ = train_network(*sets, recipe, seed=seed)
+            each.append(np.exp(predict(network, sets[1], recipe)).astype(np.float64))
+            told(f"network '{recipe.name}', seed {seed}", answers_of(recorded, each[-1], truth))
+        mean = answers_of(recorded, np.mean(each, axis=0), truth)
+        by_source(f"network '{recipe.name}', {seeds} seeds averaged", mean, names)
+
+
+def by_source(title: str, answers: Answers, names: tuple[str, ...]) -> None:
+    """Print what is known of all recordings, of those of each source, and what is mistaken."""
+    told(title, answers)
+    whole = answers.by_recording()
+    sources = np.array([name.split("_")[0] for name in whole.subjects])
+    for source in np.unique(sources):
+        part = Answers(*(column[sources == source] for column in whole))
+        shown = ", ".join(names[one] for one in np.unique(part.truth))
+        told(f"    of which {source} ({shown})", part)
+    print(names, confusion_matrix(whole.truth, whole.probabilities.argmax(axis=1)), sep="\n")
+
+
+def shipped(recorded: Collection) -> None:
+    """Ask the weights that come with the package about recordings."""
+    names, truth = classes_of(recorded)
+    recogniser, windows_s = Recogniser.shipped(), recorded.column("duration_s").astype(float)
+    order = [recogniser.classes.index(name) for name in names]
+    each = [
+        recogniser.probabilities(cut_windows(recorded.points(index), length_s)).mean(axis=0)[order]
+        for index, length_s in enumerate(windows_s)
+    ]
+    by_source("weights of the package", answers_of(recorded, np.array(each), truth), names)
+
+
+def people_left_out(actors: Collection, recorded: Collection) -> None:
+    """Leave each person out, with and without actors; and what the data set alone tells."""
+    _, learnt = classes_of(actors)
+    _, truth = classes_of(recorded)
+    groups, more = subjects_of(recorded), (rdt_features(actors), learnt)
+    subjects = recorded.column("subject").astype(str)
+    sources = np.array([name.split("_")[0] for name in subjects])
+    features = rdt_features(recorded)
+    which = (sources[:, None] == np.unique(sources)).astype(float)
+    told("data set alone", answers_of(recorded, left_out(which, truth, groups, forest), truth))
+    for title, make in (("nearest centroid", centroid), ("forest", forest)):
+        for beside, those in (("", None), (", actors beside", more)):
+            chances = left_out(features, truth, groups, make, those)
+            told(f"leave one person out, {title}{beside}", answers_of(recorded, chances, truth))
+    common = np.flatnonzero(np.isin(recorded.labels, ["jumping_jack", "punch"]))
+    for beside, those in (("", None), (", actors beside", more)):
+        chances = left_out(features, truth, sources, forest, those)[common]
+        told(
+            f"leave one data set out, jacks and punches{beside}",
+            answers_of(recorded, chances, truth, common),
+        )
+
+
+def learning_curve(actors: Collection, recorded: Collection, draws: int = 6) -> None:
+    """Balanced accuracy by recording over the number of real people, with and without actors."""
+    _, learnt = classes_of(actors)
+    _, truth = classes_of(recorded)
+    x, features, groups = rdt_features(actors), rdt_features(recorded), subjects_of(recorded)
+    for count in (0, 2, 5, 10, 20, 30):
+        found: dict[bool, list[float]] = {False: [], True: []}
+        for draw in range(draws):
+            some = np.random.default_rng(draw).permutation(np.unique(groups))[:count]
+            learn = np.isin(groups, some)
+            for beside in (False, True):
+                rows, y = features[learn], truth[learn]
+                if beside:
+                    rows, y = np.concatenate([rows, x]), np.concatenate([y, learnt])
+                if not len(y):
+                    continue
+                model = forest().fit(rows, y)
+                chances = np.zeros((np.count_nonzero(~learn), truth.max() + 1))
+                chances[:, model.classes_] = model.predict_proba(features[~learn])
+                asked = answers_of(recorded, chances, truth, ~learn)
+                found[beside].append(balanced_accuracy(asked.by_recording()))
+        shown = ["-" if not some else f"{np.mean(some):.1%}" for some in found.values()]
+        print(f"{count} real people: {shown[0]} alone, {shown[1]} with actors", flush=True)
+
+
+def channels(out: Path) -> None:
+    """What clouds of few channels differ in from those of all, feature by feature."""
+    few, many = (rdt_features(Collection(out / f"channels_{name}")) for name in ("few", "all"))
+    spread = many.std(axis=0) + 1e-9
+    off = np.abs(few.mean(axis=0) - many.mean(axis=0)) / spread
+    print(
+        f"few channels: means of {off.size} features are off by {np.median(off):.2f} of their "
+        f"spread, at most {off.max():.2f}"
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder of data sets")
+    parser.add_argument("--only", metavar="NAME,...", help="build only these data sets")
+    parser.add_argument("--takes", type=int, default=200, help="takes of each activity of actors")
+    parser.add_argument("--seeds", type=int, default=3, help="trainings of each network")
+    parser.add_argument("--no-build", action="store_true", help="measure what is there")
+    parser.add_argument(
+        "--recordings", type=int, default=1000, help="most joint files of a person and activity"
+    )
+    options = parser.parse_args()
+    out = options.out
+    if not options.no_build:
+        build(out, options.only and options.only.split(","), options.takes, options.recordings)
+    if options.only:
+        return 0
+    strike = Collection(out / "actors_strike")
+    actors = Collection(out / "actors_strike", out / "actors_random")
+    recorded = Collection(*(out / name for name in ("mocap", "joints") if (out / name).exists()))
+    print("balanced accuracy of windows, of recordings (95 % over people)")
+    one_axis(strike, recorded)
+    print("learnt from actors, asked about recordings")
+    shipped(recorded)
+    to_recorded(actors, recorded, options.seeds)
+    people_left_out(actors, recorded)
+    learning_curve(actors, recorded)
+    if (out / "channels_all").exists():
+        channels(out)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
