@@ -24,13 +24,13 @@ from rtradar.kernels.nufft import closed_grid
 ANCHORS = 4
 """Anchors around a chirp through which the cubic goes."""
 
-_TAPS = 8
+_TAPS = 6
 """Cells over which a tone is spread."""
 
 _BEFORE = _TAPS // 2 - 1
 """Cells before that of the tone."""
 
-_RATIO = 1.25
+_RATIO = 1.4
 """Least number of cells for each sample."""
 
 _PLACES = 512
