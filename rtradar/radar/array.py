@@ -155,7 +155,20 @@ class Array(Waveform):
         return _rotation(angles), positions
 
     def path_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Give yaw, pitch and roll (time, 3) [deg] and the position (time, 3) [m] at some times."""
+        """Give angles and position of the radar at some times.
+
+        Parameters
+        ----------
+        times : (time,) float
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        angles_deg : (time, 3) float64
+            Yaw, pitch and roll [deg].
+        positions : (time, 3) float64
+            Positions, world [m].
+        """
         at = np.asarray(times, dtype=np.float64)
         positions, angles = np.empty((2, len(at), 3))
         positions[:] = self.position_m
