@@ -22,6 +22,7 @@ from rtradar.motion.synthetic.figure import (
     SHANK,
     SIDES,
     THIGH,
+    Arm,
     Array,
     Pose,
     PosesAt,
@@ -31,7 +32,6 @@ from rtradar.motion.synthetic.figure import (
     hermite,
     keyed,
     rolled,
-    swing_arm,
     xyz,
 )
 
@@ -66,6 +66,8 @@ class _Manner:
     """How much longer the arms move than in one hop."""
     elbow: float
     elbow_swing: float
+    overhead: float
+    """How far the elbows bend to bring the hands together over the head."""
     forward: float
     lean: float
     crouch: float
@@ -89,11 +91,12 @@ _RANGES = {
     "toes_out": (4.0, 20.0),
     "heels": (24.0, 36.0),
     "lift": (0.007, 0.016),
-    "highest": (112.0, 144.0),
+    "highest": (112.0, 150.0),
     "lowest": (8.0, 20.0),
     "late_s": (0.04, 0.16),
     "elbow": (6.0, 30.0),
-    "elbow_swing": (0.0, 16.0),
+    "elbow_swing": (0.0, 36.0),
+    "overhead": (0.0, 60.0),
     "forward": (0.0, 14.0),
     "lean": (1.0, 9.5),
     "crouch": (1.0, 9.0),
@@ -266,14 +269,15 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         across = sign * (close + (wide - close) * apart)
         ankles[side] = outward.apply(ankle) + across[:, None] * LEFT
         feet[side] = outward * about(y=pitch)
-        arms[side] = swing_arm(
-            thorax,
-            side,
-            forward=np.radians(manner.forward + swung) - lean,
-            outward=subject.uneven[side] * raised,
-            elbow=np.radians(manner.elbow + manner.elbow_swing * moving),
-            wrist=0.05,
+        upper = thorax * about(
+            x=sign * subject.uneven[side] * raised,
+            y=lean - np.radians(manner.forward + swung),
         )
+        fore = upper * about(
+            x=sign * math.radians(manner.overhead) * (raised - lowest) / (highest - lowest),
+            y=-np.radians(manner.elbow + manner.elbow_swing * moving),
+        )
+        arms[side] = Arm(upper, fore, fore)
     return Pose(
         root=xyz(0.03 * height * roll, 0.0, z),
         pelvis=about(z=turn, y=0.5 * lean),
