@@ -39,12 +39,10 @@ def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
     length = echoes.length.mean(axis=1)
     rate = (length[1] - length[0]) / (step * radar.cycle_duration_s)
-    # The direction follows from the slope of the lengths along the line of receivers.
-    line = max(radar.rx_lines, key=lambda own: np.ptp(radar.rx_m[own, 1]))
-    places, azimuth = radar.rx_m[line, 1], np.zeros(len(power))
-    if np.ptp(places) > 0:
-        slope = np.polyfit(places, echoes.length[0, line], 1)[0]
-        azimuth = np.arcsin(np.clip(-slope, -1, 1))
+    # The direction follows from the slope of the lengths over the receivers, in the radar's axes.
+    places = radar.rx_m[radar.rx_of_tx[0], 1:]
+    slope = np.linalg.pinv(places - places.mean(axis=0), rcond=1e-6)[0] @ echoes.length[0]
+    azimuth = np.arcsin(np.clip(-slope, -1, 1))
     values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
     names = np.array(model.path_names)
     found = []
