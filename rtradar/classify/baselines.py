@@ -23,10 +23,8 @@ from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
+from rtradar.recognition.windows import correlations, course, statistics
 from rtradar.system.seeds import word
-
-_PERCENTILES = (5, 25, 50, 75, 95)
-_TIME_BINS = 8
 
 METADATA = (
     "duration_s", "heading_deg", "snr_db", "height_m", "build", "tempo", "amplitude", "side",
@@ -99,13 +97,8 @@ def _rdt(points: NDArray[np.float64]) -> NDArray[np.float64]:
         points = np.zeros((1, 3))
     middle = np.array([points[:, 0].mean(), points[:, 1].mean(), 0.0])
     centred = points - middle
-    time, velocity = centred[:, 0], centred[:, 2]
-    edges = np.linspace(time.min(), time.max(), _TIME_BINS + 1)
-    place = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, _TIME_BINS - 1)
-    in_bins = [velocity[place == number] for number in range(_TIME_BINS)]
-    course = [(some.mean(), some.std()) if len(some) else (0.0, 0.0) for some in in_bins]
-    slow = np.mean(np.abs(velocity) < 0.5)
-    return np.concatenate([_shape(centred), [slow], np.ravel(course)])
+    slow = np.mean(np.abs(centred[:, 2]) < 0.5)
+    return np.concatenate([_shape(centred), [slow], course(centred).ravel()])
 
 
 def _spatial(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -115,14 +108,7 @@ def _spatial(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _shape(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    spread = points.std(axis=0)
-    safe = np.where(spread > 0, spread, 1.0)
-    unit = (points - points.mean(axis=0)) / safe
-    pairs = ((0, 1), (0, 2), (1, 2))
-    correlations = [float(np.mean(unit[:, one] * unit[:, other])) for one, other in pairs]
-    percentiles = np.percentile(points, _PERCENTILES, axis=0)
-    extremes = points.min(axis=0), points.max(axis=0)
-    return np.concatenate([spread, *extremes, *percentiles, correlations])
+    return np.concatenate([statistics(points).ravel(), correlations(points)])
 
 
 def _centroid(seed: int) -> BaseEstimator:

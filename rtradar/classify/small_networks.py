@@ -1,7 +1,7 @@
 """Small classifiers of point sets, whose sizes suit some thousands of clouds.
 
 `PooledNet` is PointNet without its T-Nets and with few layers, which takes the mean over the points
-beside the maximum; `rtradar.recognition` runs it in NumPy. `EdgeNet` looks at neighbours: the edge
+beside the maximum. `EdgeNet` looks at neighbours: the edge
 convolutions of Y. Wang et al., Dynamic graph CNN for learning on point clouds, ACM Trans. Graph. 38
 (2019) 146, on one graph of neighbours in scaled time, range and velocity.
 """
@@ -65,16 +65,6 @@ class PooledNet(_SmallNet):
         """Compute features of every point, (cloud, point, feature)."""
         found: Tensor = self.points(points)
         return found
-
-    def layers(self) -> list[tuple[Tensor, Tensor]]:
-        """Return weight and bias of all layers, the norms of a trained network folded in."""
-        normed = [layer for layer in self.points if isinstance(layer, PointwiseLayer)]
-        dense = [layer for layer in self.cloud if isinstance(layer, nn.Linear)]
-        with torch.no_grad():
-            return [
-                *(layer.folded(torch.zeros(0)) for layer in normed),
-                *((layer.weight.detach(), layer.bias.detach()) for layer in dense),
-            ]
 
 
 class EdgeNet(_SmallNet):

@@ -7,48 +7,37 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-import torch
-from tqdm import tqdm
+from numpy.typing import NDArray
+from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.classify.prepare import stack_clouds
-from rtradar.classify.recipes import SMALL, Recipe
-from rtradar.classify.scores import Answers, best_temperature
-from rtradar.classify.small_networks import PooledNet
+from rtradar.classify.scores import Answers, balanced_accuracy, best_temperature
 from rtradar.classify.splits import make_splits
-from rtradar.classify.study import classes_of
-from rtradar.classify.training import Examples, predict, train_network
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.recognition.recogniser import Recogniser
-from rtradar.recognition.windows import EDGE_S, describe
+from rtradar.recognition.windows import cut_windows, describe
+from rtradar.system.seeds import word
 
-USUAL = 0.995
-"""Fraction of the windows that are not called unusual."""
+MERGED = {"boxing": "punch"}
+"""Activities of actors that are answered by the name of another."""
+
+_TREES, _LEAST_IN_LEAF, _FOLDS = 300, 2, 5
+_USUAL = 0.995  # fraction of the windows that are not called unusual
+_RIDGE = 1e-2  # of the variance of each number, so that nearly dependent ones do no harm
 
 
-def train_recogniser(
-    clouds: Collection,
-    radar: Radar,
-    *,
-    networks: int = 5,
-    recipe: Recipe = SMALL,
-    seed: int = 0,
-) -> Recogniser:
-    """Train networks on clouds of actors, each without a part of them, which calibrates it.
+def train_recogniser(clouds: Collection, radar: Radar, *, seed: int = 0) -> Recogniser:
+    """Train a forest on clouds of actors; folds over people calibrate it.
 
     Parameters
     ----------
     clouds : Collection
-        Clouds in windows that begin at random.
+        Clouds in windows that begin at random, each as long as a capture.
     radar : Radar
         Radar for which the weights are good.
-    networks : int
-        Number of networks, whose answers are averaged, at least 2.
-    recipe : Recipe
-        Hyperparameters; the network must be ``pooled``.
     seed : int
-        Seed of the splits and the trainings.
+        Seed of the folds and the forest.
 
     Returns
     -------
@@ -57,55 +46,84 @@ def train_recogniser(
     Raises
     ------
     InputError
-        If a cloud is of a recording, or the recipe is of another network.
+        If a cloud is of a recording.
     """
-    sources = Counter(clouds.column("source").tolist())
-    if set(sources) != {"synthetic"} or recipe.network != "pooled":
-        raise InputError("weights that are given away learn from synthetic actors, by 'pooled'")
+    if set(clouds.column("source").tolist()) != {"synthetic"}:
+        raise InputError("weights that are given away learn from synthetic actors alone")
     began = time.process_time()
-    names, truth = classes_of(clouds)
-    stacked = stack_clouds(clouds, seed=seed, edge_s=recipe.edge_s)
-    examples = Examples(stacked, torch.from_numpy(truth), names)
-    trained, held_out = [], np.zeros((len(clouds), len(names)))
-    splits = make_splits(clouds, "subject", folds=networks, seed=seed)
-    for number, split in enumerate(tqdm(splits, unit="network", disable=None)):
-        test = examples[split.test]
-        network, _ = train_network(examples[split.train], test, recipe, seed=seed + number)
-        assert isinstance(network, PooledNet)
-        held_out[split.test] = np.exp(predict(network, test, recipe))
-        trained.append([(w.numpy(), b.numpy()) for w, b in network.layers()])
-    column = clouds.column("subject").astype(str)
-    answers = Answers(held_out, truth, clouds.column("recording").astype(str), column)
+    lengths = clouds.column("duration_s").astype(float)
+    described = np.array(
+        [
+            describe(cut_windows(clouds.points(index), length)[0])
+            for index, length in enumerate(lengths)
+        ]
+    )
+    labels = np.array([MERGED.get(label, label) for label in clouds.labels.tolist()])
+    names, truth = np.unique(labels, return_inverse=True)
+    held_out = np.zeros((len(clouds), len(names)))
+    for split in make_splits(clouds, "subject", folds=_FOLDS, seed=seed):
+        part = _forest(seed).fit(described[split.train], truth[split.train])
+        held_out[split.test] = part.predict_proba(described[split.test])
+    recordings, subjects = (clouds.column(name).astype(str) for name in ("recording", "subject"))
+    answers = Answers(held_out, truth, recordings, subjects)
     snr_db = clouds.column("snr_db").astype(float)
-    described = np.array([describe(_middle(clouds, index)) for index in range(len(clouds))])
     card = {
-        "classes": list(names),
+        "classes": names.tolist(),
         "temperature": best_temperature(answers),
         "radar": _limits(radar),
         "snr_db": [float(snr_db.min()), float(snr_db.max())],
         "usual": _usual(described),
         "clouds": dict(Counter(clouds.labels.tolist())),
-        "people": len(set(column.tolist())),
-        "held_out_accuracy": float(np.mean(held_out.argmax(axis=1) == truth)),
+        "people": len(set(subjects.tolist())),
+        "held_out_accuracy": balanced_accuracy(answers),
         "training_cpu_s": round(time.process_time() - began, 1),
-        "recipe": recipe.as_dict(),
         "seed": seed,
     }
-    return Recogniser(trained, card)
+    return Recogniser(arrays_of(_forest(seed).fit(described, truth)), card)
 
 
-def _middle(clouds: Collection, index: int) -> Any:
-    points = clouds.points(index)
-    return points[(points[:, 0] >= EDGE_S) & (points[:, 0] < points[:, 0].max() - EDGE_S)]
+def _forest(seed: int) -> ExtraTreesClassifier:
+    return ExtraTreesClassifier(
+        _TREES,
+        class_weight="balanced",
+        min_samples_leaf=_LEAST_IN_LEAF,
+        random_state=word(seed),
+    )
 
 
-def _usual(described: np.ndarray[Any, Any]) -> dict[str, Any]:
-    mean = described.mean(axis=0)
-    inverse = np.linalg.inv(np.cov(described.T) + 1e-6 * np.eye(described.shape[1]))
+def arrays_of(forest: ExtraTreesClassifier) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a `Recogniser` for a forest of scikit-learn."""
+    trees = [estimator.tree_ for estimator in forest.estimators_]
+    sizes = [tree.node_count for tree in trees]
+    roots = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    chances = np.concatenate([tree.value[:, 0] for tree in trees])
+    return {
+        "roots": roots,
+        "feature": np.concatenate([np.maximum(tree.feature, -1) for tree in trees]),
+        "threshold": np.concatenate([tree.threshold for tree in trees]),
+        "below": np.concatenate(
+            [
+                np.maximum(tree.children_left, 0) + root
+                for tree, root in zip(trees, roots, strict=True)
+            ]
+        ),
+        "above": np.concatenate(
+            [
+                np.maximum(tree.children_right, 0) + root
+                for tree, root in zip(trees, roots, strict=True)
+            ]
+        ),
+        "chances": chances / chances.sum(axis=1, keepdims=True),
+    }
+
+
+def _usual(described: NDArray[np.float64]) -> dict[str, Any]:
+    mean, covariance = described.mean(axis=0), np.cov(described.T)
+    inverse = np.linalg.inv(covariance + np.diag(_RIDGE * np.diag(covariance) + 1e-9))
     away = described - mean
     distances = np.sqrt(np.einsum("wi,ij,wj->w", away, inverse, away))
-    most = float(np.quantile(distances, USUAL))
-    return {"mean": mean.tolist(), "inverse_covariance": inverse.tolist(), "most": most}
+    most = float(np.quantile(distances, _USUAL))
+    return {"mean": mean, "inverse_covariance": inverse, "most": most}
 
 
 def _limits(radar: Radar) -> dict[str, Any]:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from rtradar.errors import InputError
-from rtradar.recognition.recogniser import N_POINTS, Recogniser
+from rtradar.recognition.recogniser import Recogniser
 from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
 from rtradar.system.files import read_arrays, read_json
 
 _TOLERANCE = 0.2  # relative difference of a radar's resolution that is not worth a warning
-_FEW_POINTS, _UNSURE = N_POINTS // 4, 0.5
+_FEW_POINTS, _UNSURE = 64, 0.5
 _NEEDED = "name a folder that 'rtradar run --out DIR' or 'rtradar process' made"
 
 

@@ -16,8 +16,8 @@ because the surface of which clouds are made is closed there."""
 EDGE_S = 0.1
 """Time at each end of a capture that no window reaches [s], twice that of a frame."""
 
-SCALES = (0.5, 0.5, 2.5)
-"""Time [s], range [m] and velocity [m/s] that are one for the network."""
+_PERCENTILES = (5, 25, 50, 75, 95)
+_TIME_BINS = 8
 
 
 def cut_windows(points: NDArray[np.float64], length_s: float) -> list[NDArray[np.float64]]:
@@ -33,24 +33,36 @@ def cut_windows(points: NDArray[np.float64], length_s: float) -> list[NDArray[np
     return [points[(times >= start) & (times < start + WINDOW_S)] for start in starts]
 
 
-def normalised(
-    points: NDArray[np.float64], n_points: int, random: np.random.Generator
-) -> NDArray[np.float64]:
-    """Scale ``n_points`` of a window (point, 3), or all that it has, for the network."""
-    if len(points) > n_points:
-        points = points[random.choice(len(points), n_points, replace=False)]
-    middle = np.array([points[:, 0].mean(), points[:, 1].mean(), 0.0])
-    return (points - middle) / SCALES
-
-
 def describe(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Describe a window (point, 3) in the numbers by which an unusual one is known, (8,).
+    """Describe a window (point, 3) in 36 numbers, of which none says when points lie in it.
 
-    The spreads of time, range and velocity, the 5th, 50th and 95th percentile of velocity, the
-    correlation of range and velocity, and the fraction of points slower than 0.5 m/s.
+    The statistics of range from its mean, and of velocity (`statistics`), the three correlations,
+    the fraction of points slower than 0.5 m/s, and the course of velocity (`course`).
     """
+    centred = points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]
+    together, slow = correlations(centred), np.mean(np.abs(points[:, 2]) < 0.5)
+    return np.concatenate(
+        [statistics(centred[:, 1:]).ravel(), together, [slow], course(centred).ravel()]
+    )
+
+
+def statistics(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Standard deviation, extremes and five percentiles of each column, (8, column)."""
+    extremes = points.min(axis=0), points.max(axis=0)
+    return np.stack([points.std(axis=0), *extremes, *np.percentile(points, _PERCENTILES, axis=0)])
+
+
+def correlations(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Correlations of the three pairs of columns; 0 where one does not vary."""
     spread = points.std(axis=0)
-    centred = points - points.mean(axis=0)
-    together = float(np.mean(centred[:, 1] * centred[:, 2]) / max(spread[1] * spread[2], 1e-9))
-    slow = float(np.mean(np.abs(points[:, 2]) < 0.5))
-    return np.array([*spread, *np.percentile(points[:, 2], (5, 50, 95)), together, slow])
+    unit = (points - points.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
+    return np.array([np.mean(unit[:, a] * unit[:, b]) for a, b in ((0, 1), (0, 2), (1, 2))])
+
+
+def course(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Mean and spread of velocity in each eighth of the time, (8, 2); 0 where no point lies."""
+    time, velocity = points[:, 0], points[:, 2]
+    edges = np.linspace(time.min(), time.max(), _TIME_BINS + 1)
+    place = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, _TIME_BINS - 1)
+    parts = [velocity[place == number] for number in range(_TIME_BINS)]
+    return np.array([(part.mean(), part.std()) if len(part) else (0.0, 0.0) for part in parts])

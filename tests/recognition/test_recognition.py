@@ -1,4 +1,4 @@
-"""Recognition of a run: the networks in NumPy, windows of clouds, and what is warned of."""
+"""Recognition of a run: the forest in NumPy, windows of clouds, and what is warned of."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
+from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.classify.recipes import SMALL
-from rtradar.classify.small_networks import PooledNet
+from rtradar.classify.weights import arrays_of
 from rtradar.cli import main
 from rtradar.clouds.files import save_cloud_npz
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.recognition import Recogniser, predict_run
-from rtradar.recognition.windows import EDGE_S, SCALES, WINDOW_S, cut_windows
+from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -45,23 +44,18 @@ def run_folder(folder: Path, radar: Radar, **parameters: Any) -> Path:
     return folder
 
 
-def test_networks_in_numpy_answer_as_they_do_in_torch(tmp_path: Path) -> None:
-    torch.manual_seed(0)
-    networks = [PooledNet(3, SMALL) for _ in range(2)]
-    points = torch.randn(8, 64, 3)
-    for network in networks:
-        network.train()(points)  # gives the norms a mean and a variance
-        network.eval()
-    layers = [[(w.numpy(), b.numpy()) for w, b in one.layers()] for one in networks]
-    card = {"classes": ["a", "b", "c"], "temperature": 1.0}
-    Recogniser(layers, card).save(tmp_path / "weights.npz")
+def test_the_forest_in_numpy_answers_as_scikit_learn_does(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    described = random.normal(size=(80, 5)).astype(np.float32)
+    forest = ExtraTreesClassifier(20, random_state=0).fit(described, random.integers(3, size=80))
+    usual = {"mean": np.zeros(5), "inverse_covariance": np.eye(5), "most": 1.0}
+    card = {"classes": ["a", "b", "c"], "temperature": 1.0, "usual": usual}
+    Recogniser(arrays_of(forest), card).save(tmp_path / "weights.npz")
     recogniser = Recogniser.load(tmp_path / "weights.npz")
     assert recogniser.classes == ("a", "b", "c")
-    middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
-    with torch.no_grad():
-        expected = torch.stack([one(points - middle)[0] for one in networks]).mean(0).softmax(1)
-    found = recogniser.probabilities([some * np.array(SCALES) for some in points.numpy()])
-    assert found == pytest.approx(expected.numpy(), abs=2e-3)  # half precision of the weights
+    asked = random.normal(size=(50, 5)).astype(np.float32)
+    found = np.array([recogniser.of_description(one) for one in asked])
+    assert found == pytest.approx(forest.predict_proba(asked), abs=1e-3)  # half precision
 
 
 @given(st.floats(0.05, 60.0), st.integers(0, 400))

@@ -35,6 +35,7 @@ from rtradar.classify.scores import Answers, balanced_accuracy, calibration_erro
 from rtradar.classify.splits import subjects_of
 from rtradar.classify.study import classes_of
 from rtradar.classify.training import Examples, predict, train_network
+from rtradar.classify.weights import MERGED
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
 from rtradar.recognition.windows import cut_windows
@@ -113,7 +114,7 @@ def _recording(
     )
 
 
-def data_sets(out: Path, takes: int, most: int) -> dict[str, str]:
+def data_sets(out: Path, most: int) -> dict[str, str]:
     """Text of the specification of every data set, by its name."""
     (out / "few_channels.toml").write_bytes(FEW.read_bytes())
     found = {}
@@ -123,26 +124,30 @@ def data_sets(out: Path, takes: int, most: int) -> dict[str, str]:
     ):
         if folder := os.environ.get(variable):
             found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
-    for place in ("strike", "random"):
-        text = (FEW.parent / f"actors_{place}.toml").read_text()
-        found[f"actors_{place}"] = text.replace("count = 200", f"count = {takes}")
-    few_takes = text.replace('place = "random"', 'place = "strike"').replace(
-        "count = 200", "count = 10"
-    )
-    found["channels_few"] = few_takes
-    found["channels_all"] = few_takes.replace("few_channels.toml", "paper-12ghz")
+    found["actors"] = (FEW.parent / "actors.toml").read_text()
+    found["channels_few"] = found["actors"].replace("count = 60", "count = 10")
+    found["channels_all"] = found["channels_few"].replace("few_channels.toml", "paper-12ghz")
     return found
 
 
-def build(out: Path, only: list[str] | None, takes: int, most: int) -> None:
+def build(out: Path, only: list[str] | None, most: int) -> None:
     """Build the data sets that are not complete."""
     out.mkdir(parents=True, exist_ok=True)
-    for name, text in data_sets(out, takes, most).items():
+    for name, text in data_sets(out, most).items():
         if only is None or name in only:
             spec = out / f"{name}.toml"
             spec.write_text(text)
             words = ["dataset", "build", str(spec), "--out", str(out / name), "--workers", "1"]
             subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
+
+
+class Merged(Collection):
+    """Actors under the names of activities that recordings are asked about."""
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """Activity of every cloud."""
+        return np.array([MERGED.get(label, label) for label in super().labels.tolist()])
 
 
 def answers_of(
@@ -314,7 +319,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of data sets")
     parser.add_argument("--only", metavar="NAME,...", help="build only these data sets")
-    parser.add_argument("--takes", type=int, default=200, help="takes of each activity of actors")
     parser.add_argument("--seeds", type=int, default=3, help="trainings of each network")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     parser.add_argument(
@@ -323,14 +327,13 @@ def main() -> int:
     options = parser.parse_args()
     out = options.out
     if not options.no_build:
-        build(out, options.only and options.only.split(","), options.takes, options.recordings)
+        build(out, options.only and options.only.split(","), options.recordings)
     if options.only:
         return 0
-    strike = Collection(out / "actors_strike")
-    actors = Collection(out / "actors_strike", out / "actors_random")
+    actors = Merged(out / "actors")
     recorded = Collection(*(out / name for name in ("mocap", "joints") if (out / name).exists()))
     print("balanced accuracy of windows, of recordings (95 % over people)")
-    one_axis(strike, recorded)
+    one_axis(actors, recorded)
     print("learnt from actors, asked about recordings")
     shipped(recorded)
     to_recorded(actors, recorded, options.seeds)
