@@ -316,7 +316,7 @@ def test_people_of_a_scene_belong_to_its_digest() -> None:
         (("count = 2", "count = 9"), "count = 9"),
         (("count = 2", "count = true"), "count = True"),
         (("count = 2\n", ""), "count"),
-        (('["stand"]', '["sit"]'), "labels = "),
+        (('["stand"]', '["fly"]'), "labels = "),
         (('["stand"]', '[["stand"]]'), "labels = "),
         (('["stand"]', "[]"), "labels = "),
         (("[-1, 1]", "[1, -1]"), r"\[others\] x_m"),
