@@ -189,7 +189,7 @@ class Outlines:
         grid = np.linspace(-6, 6, 60001)
         wave = np.exp((1j - FADE) * np.pi * grid**2) * (grid[1] - grid[0])
         self._grid, self._sums = grid, np.cumsum(wave) - wave / 2
-        self._rows = np.linspace(-4, 4, 81)
+        self._rows = np.linspace(-4, 4, 321)
 
     def _sum(self, u: Array) -> Field:
         place = np.clip((u - self._grid[0]) / (self._grid[1] - self._grid[0]), 0, 59999.5)

@@ -44,6 +44,7 @@ from rtradar.kernels.still_room import cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import small_facets
 from rtradar.scatter.clutter.point_shadow import (
+    CLOSE,
     FAINT,
     FINE,
     REACH,
@@ -223,14 +224,14 @@ class ClutterShadow:
     def _enough(
         self, near: SharedPoints, fields: Field, tx: Indices, allowed_m2: float
     ) -> tuple[Bools, Precision, float]:
-        """Find how few points need more than `FAINT`: which, and to what precision.
+        """Find how few points need more than `FAINT`, and whether `USUAL` or `CLOSE`.
 
         The mean power of the error of samples follows [m^2], beside those of `FINE`. Of weak points
         one in `_THIN` is looked at, whose errors add up as powers do.
         """
         group = np.searchsorted(_STRONG, near.shares(), side="right")
         poses = [own for (own,) in self._tests(_FEW, np.zeros(1))]
-        error = np.zeros((2, len(_STRONG) + 1, len(poses), *fields.shape[:-1]), np.complex128)
+        error = np.zeros((3, len(_STRONG) + 1, len(poses), *fields.shape[:-1]), np.complex128)
         for number in range(len(_STRONG) + 1):
             thin = 1 if number < 2 else _THIN
             which = np.flatnonzero(group == number)[::thin]
@@ -239,13 +240,14 @@ class ClutterShadow:
                 np.array([points.samples(own, posed) for posed in poses])
                 for points in (
                     PointShadow(self._radar, near.some(which), precision, tx)
-                    for precision in (FINE, USUAL, FAINT)
+                    for precision in (FINE, USUAL, CLOSE, FAINT)
                 )
             )
             error[:, number] = np.array(others) - fine
-        for strong in range(len(_STRONG) + 1):
-            weak = error[1, strong:].sum(axis=0)
-            for precision, wrong in ((USUAL, weak + error[0, :strong].sum(axis=0)), (FINE, weak)):
+        for strong in range(len(_STRONG) + 2):
+            weak = error[2, strong:].sum(axis=0)
+            for precision, own in zip((USUAL, CLOSE), error[:2], strict=True):
+                wrong = weak + own[:strong].sum(axis=0)
                 power_m2 = float((np.abs(wrong) ** 2).mean())
                 if power_m2 <= allowed_m2:
                     return group < strong, precision, power_m2

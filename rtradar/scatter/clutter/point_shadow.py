@@ -39,8 +39,10 @@ class Precision(NamedTuple):
     reach: float
 
 
-FINE = Precision(3, 99, 2, 40, REACH)
-"""Each approximation for itself is below -25 dB of the change of the samples in a walk."""
+FINE = Precision(3, 99, 2, 128, REACH)
+"""Each approximation for itself is below -25 dB of the change of the samples."""
+CLOSE = FINE._replace(lines=40)
+"""-12 dB of what changes in 0.1 s of a kick."""
 USUAL = Precision(3, 99, 2, 24, 2.0)
 """-20 dB of what strong points lose."""
 FAINT = Precision(1, 0, 0, 12, 2.0)
