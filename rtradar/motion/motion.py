@@ -83,8 +83,8 @@ class Motion:
       frames    361 at 120 Hz
       joints    22, from root to r_hand
       height    1.7 m from the lowest to the highest joint
-      place     root at x -1.79 to 1.79, y -0.02 to 0.02, z 0.95 to 0.99 m
-      path      3.59 m over the floor
+      place     root at x -1.57 to 1.66, y -0.02 to 0.02, z 0.95 to 0.99 m
+      path      3.24 m over the floor
 
     >>> motion = rt.synthetic_motion("walk", seed=1, duration_s=2.0)
     >>> positions, rotations = motion.at([0.0, 0.5])

@@ -282,7 +282,7 @@ def test_a_capture_too_short_for_a_spectrogram_is_shown_without(tmp_path: Path) 
         frame_duration_s=0.05,
     )
     rt.run(
-        rt.synthetic_motion("kick", seed=1, duration_s=1.0),
+        rt.synthetic_motion("stand", seed=1, duration_s=1.0),
         radar,
         out=tmp_path,
         fidelity="analytic",

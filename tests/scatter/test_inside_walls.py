@@ -28,7 +28,7 @@ RADAR = rt.Radar(
     samples_per_chirp=256,
     frame_duration_s=0.05,
 )
-MOTION = rt.synthetic_motion("punch", seed=0, duration_s=1.0)
+MOTION = rt.synthetic_motion("punch", seed=9, duration_s=1.0)
 BODY = Body.from_motion(place(MOTION))
 TIMES = np.arange(0, 1.0, 0.01)
 
@@ -126,7 +126,7 @@ def test_the_summary_tells(tmp_path: Path) -> None:
     )
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / "crate.ply")
-    motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
+    motion = rt.synthetic_motion("stand", seed=0, duration_s=0.2)
     with pytest.warns(rt.ValidityWarning, match="parts inside furniture"):
         rt.run(
             motion,
