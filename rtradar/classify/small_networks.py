@@ -1,14 +1,15 @@
 """Small classifiers of point sets, whose sizes suit some thousands of clouds.
 
 `PooledNet` is PointNet without its T-Nets and with few layers, which takes the mean over the points
-beside the maximum. `EdgeNet` looks at neighbours: the edge
-convolutions of Y. Wang et al., Dynamic graph CNN for learning on point clouds, ACM Trans. Graph. 38
-(2019) 146, on one graph of neighbours in scaled time, range and velocity.
+beside the maximum. `EdgeNet` looks at neighbours: the edge convolutions of Y. Wang et al., Dynamic
+graph CNN for learning on point clouds, ACM Trans. Graph. 38 (2019) 146, on one graph of neighbours
+in scaled time, range and velocity.
 """
 
 from __future__ import annotations
 
 import itertools
+from abc import ABC, abstractmethod
 
 import torch
 from torch import Tensor, nn
@@ -21,7 +22,7 @@ _POINT_WIDTHS, _CLOUD_WIDTH = (3, 64, 64, 128), 128
 _NEIGHBOURS = 12
 
 
-class _SmallNet(nn.Module):
+class _SmallNet(nn.Module, ABC):
     """Classifier of the largest and the mean value of the features of all points."""
 
     def __init__(self, n_classes: int, recipe: Recipe) -> None:
@@ -34,9 +35,9 @@ class _SmallNet(nn.Module):
             nn.Linear(_CLOUD_WIDTH, n_classes),
         )
 
+    @abstractmethod
     def features(self, points: Tensor) -> Tensor:
         """Compute features of every point, (cloud, point, feature)."""
-        raise NotImplementedError
 
     def forward(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Classify clouds as `PointNet` does; there is no transform that could be skewed."""

@@ -61,12 +61,12 @@ def make_splits(
     scheme : str
         Scheme of the splits. ``folds``: the paper's, stratified over clouds. ``recording``,
         ``subject``: each recording or subject is on one side only; a recording whose subject is
-        ``unknown`` counts as a subject of its own. ``leave-one-subject-out``: each recorded person
-        in turn is asked about, and all others are learnt from, actors among them; without
-        recordings each actor. ``recorded``: train on synthetic
-        motion, test on recorded motion. ``across:COLUMN`` (or ``across:A,B``): for every value of
-        the column(s) and every fold over recordings, train on the clouds of that value, test on
-        clouds of all values from other recordings.
+        ``unknown`` counts as a subject of its own. ``leave-one-subject-out``: test on one recorded
+        person after the other, train on all others and on all actors; if there are no recordings,
+        test on one actor after the other. ``recorded``: train on synthetic motion, test on recorded
+        motion. ``across:COLUMN`` (or ``across:A,B``): for every value of the column(s) and every
+        fold over recordings, train on the clouds of that value, test on clouds of all values from
+        other recordings.
     folds : int, optional
         Number of folds, at least 2. The default is 10 (``across``: 5), or the number of groups in
         the class with the fewest.
