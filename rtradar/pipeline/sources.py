@@ -32,9 +32,10 @@ _RATE_CYCLES = 2
 _WEAK = 0.1
 """Echoes with less power than this fraction of the noise of a cell are left out."""
 
-_FINE, _LEAST, _FARTHEST = 32, 1e-5, 32
+_FINE, _LEAST, _FARTHEST = 512, 1e-5, 32
 """Steps of a bin in which the spectrum of a range window is known; the power over that of its peak
-down to which it is followed, and the most bins for that."""
+down to which it is followed, and the most bins for that. As an echo goes on from step to step, its
+field jumps, which puts some power on all velocities: less than noise only if steps are fine."""
 
 _UNEXPECTED = 10.0
 """A cell with so many times the power of what is expected in it of anybody is nobody's: noise, the

@@ -71,13 +71,11 @@ def test_expected_power_is_that_of_the_map() -> None:
 
 
 def test_noise_is_nobody() -> None:
-    # Somebody who stands: who moves has side lobes in Doppler in rows of their own.
-    stands = rt.synthetic_motion("stand", seed=0, duration_s=1.0)
-    result = rt.run(stands, RADAR, duration_s=0.15, pfa=1e-2)
+    result = rt.run(WALKER, RADAR, duration_s=0.15, pfa=1e-2)
     detected = result.maps["detections"].values.astype(bool)
     source = result.maps["source"].values
     far = detected & (np.abs(result.maps["velocity"].values) > 8)
-    assert far.sum() > 20
+    assert far.sum() > 1000
     assert (source[far] == -1).all()
 
 
