@@ -109,6 +109,14 @@ def test_points_of_a_turned_moving_radar_in_frames_stay_where_the_person_is() ->
     np.testing.assert_allclose(found[1], found[0], atol=0.25)
 
 
+def test_a_radar_that_turns_several_times_is_at_rest_as_any_other() -> None:
+    spins = {"path_times_s": [0, 1], "path_angles_deg": [[0, 0, 0], [3600, 0, -720]]}
+    radar = dataclasses.replace(RADAR, **POSE, **spins)
+    for time in (0.0, 0.33, 1.0):
+        (axes,), _ = radar.poses_at([time])
+        np.testing.assert_allclose(radar.at(time).axes, axes, atol=1e-12)
+
+
 def test_the_view_moves_the_radar_along() -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", duration_s=1.0))
     times = np.array([0.0, 0.25, 0.75])

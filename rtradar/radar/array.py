@@ -142,14 +142,14 @@ class Array(Waveform):
         Parameters
         ----------
         times : (time,) float
-            Times since the start of the capture [s].
+            As for `path_at`.
 
         Returns
         -------
         axes : (time, 3, 3) float64
-            Axes as those of `axes`.
+            Each as `axes` is.
         positions : (time, 3) float64
-            Positions, world [m].
+            As of `path_at`.
         """
         angles, positions = self.path_at(times)
         return _rotation(angles), positions

@@ -11,7 +11,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
@@ -326,7 +326,7 @@ class Radar(Schedule):
         Parameters
         ----------
         time_s : float
-            Time since the start of the capture [s].
+            Time as of `path_at`.
 
         Returns
         -------
@@ -335,10 +335,10 @@ class Radar(Schedule):
         if not self.is_moving:
             return self
         (angles,), (place,) = self.path_at([time_s])
-        yaw, pitch, roll = angles.tolist()
-        still = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
-        pose = {"yaw_deg": yaw, "pitch_deg": pitch, "roll_deg": roll}
-        return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)  # type: ignore[arg-type]
+        # It may have turned more than once.
+        pose = dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), (angles % 360).tolist(), strict=True))
+        still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
+        return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)
 
     # -- powers (derived) --------------------------------------------------------------------------
 
