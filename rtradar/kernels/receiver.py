@@ -12,7 +12,7 @@ from rtradar.kernels.jit import compiled, inlined
 
 _ONE = np.float32(1)
 _LANES = 32
-"""Receivers of several rows that are filtered side by side, at least."""
+"""Most receivers that are filtered side by side, of several rows; those of one row always are."""
 _UNROLLED = 4
 """Samples that are added to a state at once, for the state is stored every time."""
 

@@ -199,10 +199,8 @@ class ClutterShadow:
 
     def _settle_weak(self, weak: SharedPoints, fields: Field, allowed_m2: float) -> None:
         """Choose the keyframes of weak points, by one in `_THIN`, whose powers add up."""
-        self._weak, some = (
-            PointShadow(self._radar, weak, FAINT),
-            np.arange(len(weak.power))[::_THIN],
-        )
+        self._weak = PointShadow(self._radar, weak, FAINT)
+        some = np.arange(len(weak.power))[::_THIN]
         points = PointShadow(self._radar, weak.some(some), FAINT)
         own = np.sqrt(_THIN / fields[..., 0].size) * fields[..., some]
         lost = [

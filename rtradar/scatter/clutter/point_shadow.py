@@ -40,7 +40,8 @@ class Precision(NamedTuple):
 
 
 FINE = Precision(3, 99, 2, 128, REACH)
-"""Each approximation for itself is below -25 dB of the change of the samples."""
+"""Each approximation for itself is below -25 dB of the change of the samples in a walk; of a kick,
+which changes more, all together are at -15 dB (``validation/other_methods/shadow.py``)."""
 CLOSE = FINE._replace(lines=40)
 """-12 dB of what changes in 0.1 s of a kick."""
 USUAL = Precision(3, 99, 2, 24, 2.0)
