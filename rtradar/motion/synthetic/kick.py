@@ -102,16 +102,17 @@ class Habits:
             rng = np.random.default_rng([subject.manner, 1])
             shares = rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
         drawn = subject.drawn
+        load = drawn("load", 0.0, 1.0)
         return cls(
             shares=tuple(shares.tolist()),
             alternating=drawn("alternating", 0.0, 0.9),
             forward=drawn("forward", 0.0, 0.9),
-            step=drawn("step", 0.04, 0.46) * min(subject.amplitude, 1.0),
+            step=drawn("step", 0.04, 0.62) * min(subject.amplitude, 1.0),
             swing=drawn("swing", 0.15, 1.0),
             tilt=drawn("tilt", 0.4, 1.5),
             turn=drawn("turn", 0.75, 1.25),
             height_deg=drawn("height", -22.0, 16.0) + 30 * (subject.amplitude - 1),
-            load=drawn("load", -0.01, 0.13),
+            load=-0.01 + 0.12 * load + 0.12 * load**4,
             recoil=drawn("recoil", 0.0, 0.2),
             pace=drawn("pace", 0.82, 1.18) * subject.tempo,
             rest_s=drawn("rest", 0.1, 1.0),
