@@ -20,6 +20,7 @@ from rtradar.errors import InputError
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.signal.multiplexing import tell_apart
+from rtradar.system.checks import brief
 
 ANGLE_BINS = 64
 """Bins of the azimuth FFT, which lie evenly over the sine from -1 to 1."""
@@ -27,6 +28,9 @@ ANGLE_BINS = 64
 _RANGE_GUARD, _RANGE_NOISE = 4, 8
 _DOPPLER_GUARD, _DOPPLER_NOISE = 2, 4
 """Guard and noise cells on either side (cfarCfg of the demo's default profile)."""
+
+_GROUPED = {"both": (3, 3), "range": (1, 3), "doppler": (3, 1), "none": (1, 1)}
+"""Cells (Doppler, range) about a cell among which it must be the strongest, by ``grouping``."""
 
 _SAME_ROW = 0.1  # of a wavelength: antennas so near in height are in one row
 
@@ -40,6 +44,8 @@ def ti_oob(
     window_functions: WindowFunctions = DEFAULT_WINDOWS,
     threshold_db: float = 15.0,
     max_points: int = 100,
+    cfar_axes: str = "both",
+    grouping: str = "both",
 ) -> tuple[NDArray[np.bool_], _Reals]:
     """Points of one frame as the chips of Texas Instruments make them.
 
@@ -52,10 +58,16 @@ def ti_oob(
     window_functions : WindowFunctions
         Window functions, of which that in slow time is applied.
     threshold_db : float
-        Level of a cell above the noise beside it, both over range and over Doppler [dB].
+        Level of a cell above the noise beside it, over the axes of ``cfar_axes`` [dB].
     max_points : int
         Largest number of points. The list is filled in the order of the chip: by Doppler bin, from
         that of no speed on, the receding ones first, then by range.
+    cfar_axes : {"both", "range"}
+        Axes over which a cell must exceed the noise. The first SDK of the IWR1443 has range alone.
+    grouping : {"both", "range", "doppler", "none"}
+        Axes along which a cell that is weaker than its neighbour is left out. The line
+        ``peakGrouping`` of a profile says it; without any, a strong echo gives a point for every
+        cell of its main lobe.
 
     Returns
     -------
@@ -81,6 +93,14 @@ def ti_oob(
         raise InputError(
             f"detector ti-oob: max_points = {max_points}; it must be a whole number, at least 1"
         )
+    for option, value, allowed in (
+        ("cfar_axes", cfar_axes, ("both", "range")),
+        ("grouping", grouping, tuple(_GROUPED)),
+    ):
+        if value not in allowed:
+            raise InputError(
+                f"detector ti-oob: {option} = {brief(value)}; allowed: {', '.join(allowed)}"
+            )
     n_cycles = len(cube)
     window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)
@@ -89,10 +109,13 @@ def ti_oob(
     still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
     spectra = tell_apart(spectra * still[:, :, None, None], radar)
     level_db = _heat_map(spectra)
-    detected = level_db > threshold_db + np.maximum(_beside(level_db), _along_range(level_db))
+    beside_db = _along_range(level_db)
+    if cfar_axes == "both":
+        beside_db = np.maximum(_beside(level_db), beside_db)
+    detected = level_db > threshold_db + beside_db
     # Peak grouping; the Doppler axis is a circle, and beyond the range axis there is nothing.
     beyond = np.pad(level_db, ((0, 0), (1, 1)), constant_values=-np.inf)
-    neighbours = maximum_filter(beyond, size=3, mode="wrap")[:, 1:-1]
+    neighbours = maximum_filter(beyond, size=_GROUPED[grouping], mode="wrap")[:, 1:-1]
     doppler, row = np.nonzero(detected & (level_db >= neighbours))
     doppler, row = doppler[: int(max_points)], row[: int(max_points)]
     column = (doppler + n_cycles // 2) % n_cycles

@@ -104,6 +104,28 @@ def test_of_neighbours_only_the_strongest_is_a_point() -> None:
         assert about.max() == power[doppler, row]
 
 
+def test_without_grouping_all_cells_of_a_main_lobe_are_points() -> None:
+    """Along an axis without grouping the neighbours of a peak are points too."""
+    cube = cube_of((2.0, 1.0, 0.2, 0.0))
+    found = {name: ti_oob(cube, RADAR, grouping=name)[0] for name in ("both", "none")}
+    for along, axis in (("range", 1), ("doppler", 0)):
+        mask, _ = ti_oob(cube, RADAR, grouping=along, cfar_axes="range")
+        assert mask.sum() > found["both"].sum()
+        assert np.ptp(np.nonzero(mask)[axis]) >= 2
+    assert not (found["both"] & ~found["none"]).any()
+    assert found["none"].sum() > 3
+
+
+def test_over_range_alone_an_echo_at_all_speeds_is_seen() -> None:
+    """A range bin that is full of echoes hides from CFAR over Doppler, not from that over range."""
+    targets = [(2.0, speed, 0.0, 0.0) for speed in np.linspace(-3.5, 3.5, 15)]
+    both, alone = (
+        ti_oob(cube_of(*targets), RADAR, cfar_axes=axes)[0].sum() for axes in ("both", "range")
+    )
+    assert both == 0
+    assert alone >= 8
+
+
 def test_the_list_ends_at_so_many_points_receding_ones_first() -> None:
     many = [(1.2 + 0.3 * k, speed, 0.0, 0.0) for k in range(8) for speed in (-2.0, 0.0, 2.0)]
     whole, _ = ti_oob(cube_of(*many), RADAR)
@@ -176,6 +198,8 @@ def test_azimuth_is_on_the_grid_of_measured_clouds() -> None:
         ({"threshold_db": 0.0}, {}, "threshold_db = 0.0; it must be above 0"),
         ({"max_points": 0}, {}, "max_points = 0; it must be a whole number"),
         ({"points": 3}, {}, "no option 'points'; allowed: threshold_db, max_points"),
+        ({"cfar_axes": "all"}, {}, "cfar_axes = 'all'; allowed: both, range"),
+        ({"grouping": 1}, {}, "grouping = 1; allowed: both, range, doppler, none"),
         ({}, {"multiplexing": "fdm"}, "multiplexing = 'fdm'; the chain is that of tdm"),
         ({}, {"frame_duration_s": 60e-6 * 4 * 5}, "5 Doppler bins leave no cell"),
     ],
