@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.echo_models import models_that
+from rtradar.scatter.full_wave import FULL_WAVE, full_wave_scattering
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.target import target_geometry
 from rtradar.scatter.validity import warn_of_small_radii
@@ -42,18 +43,21 @@ def scattering_length(
         Target. Its parts occlude each other where the model traces, and of parts that fill the same
         place one counts. Meshes, of perfect conductors, are for ``physical-optics``, ``reference``
         (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
+        ``full-wave`` takes ellipsoids of revolution about one common axis, which do not overlap.
     tx, rx : (n, 3) array_like
         Antennas, pair by pair, in the coordinates of the target [m]. One may be a single (3,).
     frequency : float or (n,) array_like
         Frequency of the wave, for all pairs or for each [Hz].
-    fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}
-        Name of the model.
+    fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays", \
+"full-wave"}
+        Name of the model; ``full-wave`` solves Maxwell's equations, and is here alone.
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
     **model_options
         Settings of that model: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that
         trace, ``shadow_rays`` of ``fresnel``, ``facets`` of ``physical-optics`` and ``reference``,
-        ``rays_per_wavelength`` and ``bounces`` of ``rays``.
+        ``rays_per_wavelength`` and ``bounces`` of ``rays``, and ``material`` of ``full-wave``, the
+        name of a material such as ``skin`` that fills the target.
 
     Returns
     -------
@@ -91,23 +95,28 @@ def scattering_length(
         raise InputError(
             f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h"
         )
-    model = _model_for(target, fidelity, model_options)
+    scattering, traces = _method_for(target, fidelity, model_options)
     if isinstance(target, Ellipsoids):
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
             _refuse_inside(target, name, antennas)
-    if isinstance(target, Ellipsoids) and model.traces:
+    if isinstance(target, Ellipsoids) and traces:
         target = target.without_repeats()
-    if isinstance(target, Ellipsoids) and len(tx_array):
+    if isinstance(target, Ellipsoids) and len(tx_array) and fidelity != FULL_WAVE:
         _, amplitude = far_field_echo(target_geometry(target, tx_array, rx_array))
         wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
         warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
     pairs = tx_array, rx_array, frequencies
-    return np.asarray(model.scattering(target, *pairs, polarization=polarization, **model_options))
+    return np.asarray(scattering(target, *pairs, polarization=polarization, **model_options))
 
 
-def _model_for(target: object, fidelity: str, options: Iterable[str]) -> Any:
-    """Class of a model that knows such targets and options."""
-    if fidelity not in (allowed := models_that("scattering")):
+def _method_for(
+    target: object, fidelity: str, options: Iterable[str]
+) -> tuple[Callable[..., NDArray[np.complex128]], bool]:
+    """Function of a model that knows such targets and options, and whether it traces."""
+    if fidelity == FULL_WAVE:
+        _refuse_unknown(fidelity, full_wave_scattering, options)
+        return full_wave_scattering, True
+    if fidelity not in (allowed := [*models_that("scattering"), FULL_WAVE]):
         raise InputError(
             f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(allowed)}"
         )
@@ -117,15 +126,20 @@ def _model_for(target: object, fidelity: str, options: Iterable[str]) -> Any:
             f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it "
             "needs curvature in closed form"
         )
-    taken = inspect.signature(model.scattering).parameters
-    known = [name for name in taken if name not in _COMMON]
+    _refuse_unknown(fidelity, model.scattering, options)
+    return model.scattering, model.traces
+
+
+def _refuse_unknown(
+    fidelity: str, scattering: Callable[..., object], options: Iterable[str]
+) -> None:
+    known = [name for name in inspect.signature(scattering).parameters if name not in _COMMON]
     for option in options:
         if option not in known:
             raise InputError(
                 f"scattering_length: '{fidelity}' has no option '{option}'; it has: "
                 f"{', '.join(known) or 'none'}"
             )
-    return model
 
 
 def _pairs(

@@ -1,0 +1,138 @@
+"""Azimuthal modes: the field of rings of sources at rings of a surface, mode by mode.
+
+A source is an electric current ``x`` (times the wave impedance) along a ring or along the
+generating curve, together with the magnetic current ``s n x x``, ``n`` the outward normal and ``s``
+plus or minus one: Huygens' source, which radiates to one side. Such a source of the other direction
+has the same field with E and H exchanged, so that H needs no integrals of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.full_wave.revolution_curves import Rings
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Waves between rings.
+
+    Parameters
+    ----------
+    wavenumber : complex
+        Wavenumber [rad/m]; its imaginary part is negative where waves are absorbed.
+    side : int
+        1 where the sources radiate along their outward normals, -1 against them.
+    modes : int
+        Number of azimuthal modes, from 0 on.
+    azimuths : int
+        Number of points around a ring of sources, even.
+    """
+
+    wavenumber: complex
+    side: int
+    modes: int
+    azimuths: int
+
+    def transform(self) -> tuple[Array, Array]:
+        """Weights (azimuth, mode) of the even and of the odd integrals over half a ring."""
+        half = self.azimuths // 2 + 1
+        angle = 2 * np.pi * np.arange(half) / self.azimuths
+        weight = np.full(half, 2.0 / self.azimuths)
+        weight[[0, -1]] /= 2
+        turned = angle[:, None] * np.arange(self.modes)
+        return weight[:, None] * np.cos(turned), weight[:, None] * np.sin(turned)
+
+    def electric(self, surface: Rings, sources: Rings) -> Field:
+        """Compute the tangential electric field of every source, mode by mode.
+
+        Parameters
+        ----------
+        surface, sources : Rings
+            Rings at which the field is wanted, and rings of the sources.
+
+        Returns
+        -------
+        (mode, component, ring, component, source) complex128
+            Components along the generating curve (0) and around the axis (1), of the field and of
+            the current; each for a current whose integral over the ring's azimuth is one.
+        """
+        even, odd = self.transform()
+        azimuth = 2 * np.pi * np.arange(len(even)) / self.azimuths
+        out = np.empty((self.modes, 2, len(surface), 2, len(sources)), dtype=np.complex128)
+        for ring in range(len(surface)):
+            tt, tp, pt, pp = self._fields_of_ring(surface, ring, sources, azimuth)
+            out[:, 0, ring, 0] = _integrated(tt, even).T
+            out[:, 0, ring, 1] = 1j * _integrated(tp, odd).T
+            out[:, 1, ring, 0] = 1j * _integrated(pt, odd).T
+            out[:, 1, ring, 1] = _integrated(pp, even).T
+        return out
+
+    def _fields_of_ring(
+        self, surface: Rings, ring: int, sources: Rings, azimuth: Array
+    ) -> tuple[Field, Field, Field, Field]:
+        """Fields (source, azimuth) at one point of a ring of the surface.
+
+        First the component along the generating curve, of a current along the curve and of one
+        around the axis; then the component around the axis, of the same two.
+        """
+        cosine, sine = np.cos(azimuth), np.sin(azimuth)
+        across, along = sources.tangent[:, :1], sources.tangent[:, 1:]
+        x = surface.radius[ring] - sources.radius[:, None] * cosine
+        y = -sources.radius[:, None] * sine
+        z = surface.height[ring] - sources.height[:, None]
+        own_across, own_along = surface.tangent[ring]
+        distance = np.sqrt(x**2 + y**2 + z**2)
+        k = self.wavenumber
+        inverse = 1 / (k * distance)
+        green = np.exp(-1j * k * distance) / (4 * np.pi * distance)
+        direct = -1j * k * green * (1 - 1j * inverse - inverse**2)
+        radial = 1j * k * green * (1 - 3j * inverse - 3 * inverse**2) / distance**2
+        curl = self.side * (1j * k + 1 / distance) * green / distance
+        # Products of the vector from the source with the tangents at both of its ends.
+        to_t, to_p = own_across * x + own_along * z, y
+        from_t = across * (x * cosine + y * sine) + along * z
+        from_p = y * cosine - x * sine
+        # u . (R x v) for the tangents u at the point, and v at the source.
+        t_p = own_across * (-z * cosine) + own_along * (x * cosine + y * sine)
+        p_p = -z * sine
+        t_t = own_across * (y * along - z * across * sine) + own_along * across * (
+            x * sine - y * cosine
+        )
+        p_t = z * across * cosine - x * along
+        return (
+            direct * (own_across * across * cosine + own_along * along)
+            + radial * to_t * from_t
+            + curl * t_p,
+            direct * (-own_across * sine) + radial * to_t * from_p - curl * t_t,
+            direct * across * sine + radial * to_p * from_t + curl * p_p,
+            direct * cosine + radial * to_p * from_p - curl * p_t,
+        )
+
+    def magnetic(self, electric: Field) -> Field:
+        """Derive the magnetic field, times the wave impedance of the medium, from the electric one.
+
+        Parameters
+        ----------
+        electric : (mode, component, ring, component, source) complex128
+            What `electric` gives.
+
+        Returns
+        -------
+        (mode, component, ring, component, source) complex128
+        """
+        out = np.empty_like(electric)
+        out[:, :, :, 0] = self.side * electric[:, :, :, 1]
+        out[:, :, :, 1] = -self.side * electric[:, :, :, 0]
+        return out
+
+
+def _integrated(field: Field, weights: Array) -> Field:
+    """Integrals (source, mode) of a field (source, azimuth); real weights save half of the work."""
+    return field.real @ weights + 1j * (field.imag @ weights)
