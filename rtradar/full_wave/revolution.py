@@ -16,6 +16,7 @@ computational electromagnetics", IEEE Antennas Propag. Mag. 44 (2002) 48-64.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -57,7 +58,7 @@ class Sampling:
         Rings at which the boundary condition is asked for, over rings of sources.
     """
 
-    per_wavelength: float = 5.0
+    per_wavelength: float = 4.0
     least: int = 24
     depth: float = 12.0
     oversampling: float = 1.5
@@ -137,9 +138,19 @@ class BodiesOfRevolution:
 
     # -- sizes -------------------------------------------------------------------------------------
 
+    @property
+    def _fields(self) -> int:
+        """Number of fields that are matched: E of a conductor, else E and H."""
+        return 1 if self.permittivity is None else 2
+
     @cached_property
     def _k(self) -> float:
         return wavenumber(self.frequency_hz)
+
+    @cached_property
+    def _inner_wavenumber(self) -> complex:
+        # The root with a positive real part absorbs where the permittivity does.
+        return self._k * complex(np.sqrt(complex(self.permittivity or 1.0)))
 
     @cached_property
     def modes(self) -> int:
@@ -156,59 +167,97 @@ class BodiesOfRevolution:
     @cached_property
     def unknowns(self) -> int:
         """Number of unknowns of a mode."""
-        return 2 * sum(len(sources) for sources in self._sources)
+        return 2 * sum(len(sources) for sources in (*self._outer, *self._inner))
 
     @cached_property
     def memory_bytes(self) -> int:
         """Memory of the factors of all modes [bytes]."""
-        rows = len(self._surface) * (2 if self.permittivity is None else 4)
+        rows = sum(len(rings) for rings in self._surfaces) * self._fields * 2
         return 16 * rows * self.unknowns * self.modes
 
     @cached_property
-    def _outer_counts(self) -> list[int]:
-        return self._counts(self._k)
+    def _outer(self) -> list[Rings]:
+        """Sources inside of each body, whose fields are outside."""
+        counts = self._counts(self._k)
+        return [
+            body.rings(count, -min(self.sampling.depth / count, 0.75 * body.innermost))
+            for body, count in zip(self.spheroids, counts, strict=True)
+        ]
 
     @cached_property
-    def _outer(self) -> Rings:
-        """Sources inside of the bodies, whose fields are outside."""
-        return Rings.joined(
-            [
-                body.rings(count, -min(self.sampling.depth / count, 0.75 * body.innermost))
-                for body, count in zip(self.spheroids, self._outer_counts, strict=True)
-            ]
-        )
-
-    @property
-    def _sources(self) -> list[Rings]:
-        return [self._outer]
+    def _inner(self) -> list[Rings]:
+        """Sources outside of each body, whose fields are inside; none where it conducts."""
+        if self.permittivity is None:
+            return []
+        counts = self._counts(self._inner_wavenumber.real)
+        return [
+            body.rings(count, self.sampling.depth / count)
+            for body, count in zip(self.spheroids, counts, strict=True)
+        ]
 
     @cached_property
-    def _surface(self) -> Rings:
-        return Rings.joined(
-            [
-                body.rings(int(np.ceil(count * self.sampling.oversampling)))
-                for body, count in zip(self.spheroids, self._outer_counts, strict=True)
-            ]
-        )
+    def _surfaces(self) -> list[Rings]:
+        """Rings of each body at which the boundary conditions are asked for."""
+        counts = [
+            max(len(rings) for rings in sources)
+            for sources in zip(self._outer, *filter(None, [self._inner]), strict=True)
+        ]
+        return [
+            body.rings(int(np.ceil(count * self.sampling.oversampling)))
+            for body, count in zip(self.spheroids, counts, strict=True)
+        ]
 
     @cached_property
     def _azimuths(self) -> int:
         """Points around rings of sources, dense enough for those nearest to the surface."""
-        return 2 * max(int(1.5 * max(self._outer_counts)), self.modes + 10)
+        return self._points_around(self._outer)
+
+    def _points_around(self, sources: list[Rings]) -> int:
+        return 2 * max(int(1.5 * max(len(rings) for rings in sources)), self.modes + 10)
 
     # -- the problem of each mode ------------------------------------------------------------------
 
     @cached_property
-    def _outside(self) -> Medium:
-        return Medium(self._k, 1, self.modes, self._azimuths)
-
-    @cached_property
     def _factors(self) -> list[_Factor]:
-        field = self._outside.electric(self._surface, self._outer)
-        field *= np.sqrt(self._surface.area)[:, None, None]
-        field *= np.sqrt(self._outer.area)
-        rows, columns = 2 * len(self._surface), 2 * len(self._outer)
-        return [_Factor.of(mode.reshape(rows, columns)) for mode in field]
+        return [_Factor.of(matrix) for matrix in self._matrices()]
+
+    def _matrices(self) -> Iterator[Field]:
+        """Tangential fields (row, unknown) of all sources, the matrix of each mode.
+
+        Rows are (field, component, ring), unknowns (component, source).
+        """
+        surface, sources = Rings.joined(self._surfaces), Rings.joined(self._outer)
+        outside = Medium(self._k, 1, self.modes, self._azimuths)
+        electric = outside.electric(surface, sources) * np.sqrt(sources.area)
+        fields = [electric] if self._fields == 1 else [electric, outside.magnetic(electric)]
+        blocks = [np.stack(fields, axis=1), *self._inner_fields()]
+        weight = np.sqrt(surface.area)[:, None, None]
+        for mode in range(self.modes):
+            rows = 2 * self._fields * len(surface)
+            columns = [(block[mode] * weight).reshape(rows, -1) for block in blocks]
+            yield np.concatenate(columns, axis=1)
+
+    def _inner_fields(self) -> Iterator[Field]:
+        """Fields (mode, field, component, ring, component, source) inside of each body, negative.
+
+        They are matched on that body's own rings. Each source has the same strength on them, for
+        those farther away lose more in the body.
+        """
+        whole, begin = sum(len(rings) for rings in self._surfaces), 0
+        if not self._inner:
+            return
+        k = self._inner_wavenumber
+        inside = Medium(k, -1, self.modes, self._points_around(self._inner))
+        for rings, sources in zip(self._surfaces, self._inner, strict=True):
+            electric = inside.electric(rings, sources)
+            size = np.sqrt(np.sum(np.abs(electric[0]) ** 2, axis=(0, 1, 2)))
+            electric /= -size
+            # H times the wave impedance of vacuum
+            both = np.stack([electric, k / self._k * inside.magnetic(electric)], axis=1)
+            block = np.zeros((*both.shape[:3], whole, *both.shape[4:]), dtype=np.complex128)
+            block[:, :, :, begin : begin + len(rings)] = both
+            yield block
+            begin += len(rings)
 
     def _fields_on(self, rings: Rings, antenna: Dipole) -> tuple[Field, Field]:
         """Tangential E and H (mode, component, ring) of an antenna; modes 0, 1, ... -1."""
@@ -223,23 +272,30 @@ class BodiesOfRevolution:
         return out[0], out[1]
 
     def _strengths(self, antennas: list[Dipole]) -> tuple[Field, Array]:
-        """Strengths (mode, component, source, antenna) and residuals (antenna,) of sources."""
-        rings = self._surface
-        given = np.stack([self._fields_on(rings, antenna)[0] for antenna in antennas], axis=-1)
-        given *= np.sqrt(rings.area)[:, None]
-        out = np.empty((self._azimuths, 2, len(self._outer), len(antennas)), dtype=np.complex128)
-        out[:] = 0.0
-        left = np.zeros(len(antennas))
+        """Strengths (mode, component, source, antenna) and residuals (antenna,) of the sources.
+
+        Those inside of the bodies, whose fields reach the antennas.
+        """
+        surface, sources = Rings.joined(self._surfaces), Rings.joined(self._outer)
+        arriving = [
+            np.stack(self._fields_on(surface, antenna)[: self._fields], axis=1)
+            for antenna in antennas
+        ]
+        given = np.stack(arriving, axis=-1) * np.sqrt(surface.area)[:, None]
+        shape = (self._azimuths, 2, len(sources), len(antennas))
+        out, left = np.zeros(shape, dtype=np.complex128), np.zeros(len(antennas))
         for number, factor in enumerate(self._factors):
             for mode in {number, -number}:
-                # Of the mode below zero the currents around the axis have the other sign.
-                sign = np.array([1, -1 if mode < 0 else 1])[:, None, None]
-                right = -(sign * given[mode]).reshape(-1, len(antennas))
-                solved, squares = factor.solve(right)
-                out[mode] = sign * solved.reshape(out.shape[1:])
+                # Reflected at a plane through the axis, the mode is that below zero: currents and
+                # E around the axis have the other sign then, and H along the curve.
+                sign = np.array([1, -1 if mode < 0 else 1])
+                rows = np.stack([sign, sign[::-1]])[: self._fields, :, None, None]
+                solved, squares = factor.solve(-(rows * given[mode]).reshape(-1, len(antennas)))
+                own = solved[: 2 * len(sources)].reshape(shape[1:])
+                out[mode] = sign[:, None, None] * own
                 left += squares
-        size = np.sum(np.abs(given) ** 2, axis=(0, 1, 2))
-        out *= np.sqrt(self._outer.area)[:, None]
+        size = np.sum(np.abs(given) ** 2, axis=(0, 1, 2, 3))
+        out *= np.sqrt(sources.area)[:, None]
         return out, np.sqrt(left / size)
 
     def _received(self, antenna: Dipole) -> Field:
@@ -247,7 +303,7 @@ class BodiesOfRevolution:
 
         It follows from the antenna's own field at the sources, by reciprocity.
         """
-        electric, magnetic = self._fields_on(self._outer, antenna)
+        electric, magnetic = self._fields_on(Rings.joined(self._outer), antenna)
         # The magnetic current of a source along the curve is around the axis, and of one around the
         # axis against the curve.
         both = np.stack([electric[:, 0] - magnetic[:, 1], electric[:, 1] + magnetic[:, 0]], axis=1)
@@ -276,7 +332,11 @@ class BodiesOfRevolution:
         return self.solve(tx, rx, polarization)[0]
 
     def solve(
-        self, tx: ArrayLike, rx: ArrayLike, polarization: Polarization = "v"
+        self,
+        tx: ArrayLike,
+        rx: ArrayLike,
+        polarization: Polarization = "v",
+        received: Polarization | None = None,
     ) -> tuple[Field, Array]:
         """Compute scattering lengths, and how well the boundary condition holds.
 
@@ -285,7 +345,9 @@ class BodiesOfRevolution:
         tx, rx : (n, 3) array_like
             Antennas outside of the bodies [m].
         polarization : {"v", "h"}
-            Polarisation of both.
+            Polarisation of the tx, and of the rx too unless ``received`` is given.
+        received : {"v", "h"}, optional
+            Polarisation of the rx.
 
         Returns
         -------
@@ -296,11 +358,13 @@ class BodiesOfRevolution:
             that of the incident field.
         """
         senders, sent = _distinct(np.atleast_2d(np.asarray(tx, np.float64)), polarization)
-        receivers, received = _distinct(np.atleast_2d(np.asarray(rx, np.float64)), polarization)
+        receivers, chosen = _distinct(
+            np.atleast_2d(np.asarray(rx, np.float64)), received or polarization
+        )
         strengths, residual = self._strengths(senders)
         length = np.empty(len(sent), dtype=np.complex128)
         for index, receiver in enumerate(receivers):
-            pairs = np.flatnonzero(received == index)
+            pairs = np.flatnonzero(chosen == index)
             at = self._received(receiver)
             fields = np.tensordot(at, strengths[..., sent[pairs]], axes=3)
             # The field of a flat conductor is against that which arrives, and counts as positive.

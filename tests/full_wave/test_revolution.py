@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import miepython
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.full_wave import BodiesOfRevolution, Spheroid
 
 FREQUENCY_HZ = 12e9
 WAVE_NUMBER = 2 * np.pi * FREQUENCY_HZ / SPEED_OF_LIGHT_MPS
@@ -41,6 +43,40 @@ def test_a_conducting_sphere_has_the_field_of_mie_at_resonances_of_its_inside_to
     # Far away is 1e7 m, 2.5e9 rad, of which float64 keeps 5e-7.
     mie = rt.rcs.sphere(radius, FREQUENCY_HZ)
     assert full_wave(sphere, far, far, polarization) == pytest.approx(mie, rel=1e-5)
+
+
+@pytest.mark.parametrize("permittivity", [4 - 0.5j, 29.3 - 15.5j])
+def test_a_penetrable_sphere_scatters_as_the_series_of_mie_says(permittivity: complex) -> None:
+    ka, angle = 2.0, np.radians([0.0, 50.0, 120.0, 180.0])
+    sphere = BodiesOfRevolution(
+        (Spheroid(ka / WAVE_NUMBER, ka / WAVE_NUMBER),), FREQUENCY_HZ, permittivity=permittivity
+    )
+    tx = np.array([1e7, 0.0, 0.0])
+    rx = -1e7 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    # Its mean square over polarisations and directions is the scattering efficiency over 4 pi.
+    series = miepython.S1_S2(complex(np.sqrt(permittivity)), ka, np.cos(angle), norm="qsca")
+    for polarization, amplitude in zip(("v", "h"), series, strict=True):
+        length = sphere.scattering_length(np.tile(tx, (4, 1)), rx, polarization)
+        expected = 2 * np.pi * ka / WAVE_NUMBER * np.abs(amplitude)
+        np.testing.assert_allclose(np.abs(length), expected, rtol=1e-5)
+
+
+def test_a_conductor_scatters_all_that_it_takes_from_the_wave() -> None:
+    pair = BodiesOfRevolution((Spheroid(0.003, 0.004), Spheroid(0.004, 0.004, 0.01)), FREQUENCY_HZ)
+    cosine, weight = np.polynomial.legendre.leggauss(12)
+    azimuth = 2 * np.pi * np.arange(20) / 20
+    up, around = (grid.ravel() for grid in np.meshgrid(cosine, azimuth, indexing="ij"))
+    level = np.sqrt(1 - up**2)
+    rx = 1e7 * np.stack([level * np.cos(around), level * np.sin(around), up], axis=1)
+    tx = 1e7 * np.array([0.8, 0.0, 0.6])
+    scattered = 0.0
+    for received in ("v", "h"):
+        length = pair.solve(np.tile(tx, (len(rx), 1)), rx, "v", received)[0]
+        scattered += float(np.mean(np.abs(length.reshape(12, 20)) ** 2, axis=1) @ weight) / 2
+    # The optical theorem; the forward field of exp(+j omega t), positive where it is opposed.
+    forward = pair.scattering_length(tx, -tx, "v")[0]
+    taken = np.sqrt(4 * np.pi) / WAVE_NUMBER * forward.imag
+    assert scattered == pytest.approx(taken, rel=1e-5)
 
 
 def test_tx_and_rx_may_be_swapped_for_a_pair_of_bodies_nearby() -> None:
