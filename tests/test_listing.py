@@ -71,7 +71,7 @@ def test_without_a_command_the_help_is_shown(words: list[str], capsys: Capture) 
 COMMANDS = ["run", "compare", "list scenes", "view", "export", "dataset", "train", "evaluate"]
 
 
-@pytest.mark.parametrize("command", [*COMMANDS, "doctor", "validate", "bench"])
+@pytest.mark.parametrize("command", [*COMMANDS, "doctor", "validate", "bench", "paper"])
 def test_every_help_ends_with_examples_of_the_command(command: str, capsys: Capture) -> None:
     assert main([*command.split(), "--help"]) == 0
     examples = capsys.readouterr().out.partition("\nexamples:\n")[2].splitlines()

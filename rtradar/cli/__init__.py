@@ -137,7 +137,7 @@ def _show_warning(
 
 def _parser() -> argparse.ArgumentParser:
     from rtradar import __version__
-    from rtradar.cli import captures, checks, learning, listing, results, samples
+    from rtradar.cli import captures, checks, learning, listing, paper, results, samples
     from rtradar.cli.values import OneLineParser
 
     parser = OneLineParser(
@@ -154,6 +154,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rtradar {__version__}")
     commands = parser.commands()
-    for module in (captures, samples, listing, results, learning, checks):
+    for module in (captures, samples, listing, results, learning, checks, paper):
         module.add(commands)
     return parser

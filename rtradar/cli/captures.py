@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
@@ -79,6 +80,7 @@ def add(commands: Subcommands) -> None:
             "rtradar run walk.amc --skeleton walk.asf --scene living-room --out out/room",
             "rtradar run synthetic:walk synthetic:kick --at 0.5,1 --at -1,-0.5,90 --out out/two",
             "rtradar run kick.bvh --radar paper-77ghz --fidelity analytic --out out/kick",
+            "rtradar run synthetic:walk --as-paper --out out/as-paper",
         ),
     )
     add_command(
@@ -124,6 +126,7 @@ def _add_run(run: OneLineParser) -> None:
         action="store_false",
         help="draw no PNG files, for many runs; the report is made without them",
     )
+    run.flag("--as-paper", "make the paper's own choices, with a warning for each that is a fault")
     run.set_defaults(command=_run)
 
 
@@ -240,6 +243,8 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.as_paper:
+        _choose_as_paper(options)
     capture = _capture(options)
     from rtradar.pipeline import run
     from rtradar.pipeline.timing import lines_shown
@@ -252,6 +257,24 @@ def _run(options: argparse.Namespace) -> int:
         summary = run(**capture, model_options=model_options, pictures=options.pictures).summary
     tell(options, summary)
     return 0
+
+
+def _choose_as_paper(options: argparse.Namespace) -> None:
+    """Set the paper's choices and warn of its faults; InputError where another choice is given."""
+    from rtradar.paper.choices import AS_PAPER, paper_warnings
+    from rtradar.settings import RunSettings
+
+    defaults = RunSettings()
+    for name, value in AS_PAPER.items():
+        given, default = getattr(options, name), getattr(defaults, name)
+        if given and given not in (default, value):
+            raise InputError(
+                f"--as-paper sets {name} = {value!r}, and {given!r} is given; leave one of both out"
+            )
+        setattr(options, name, value)
+    if not options.quiet:
+        for text in paper_warnings():
+            print(f"rtradar: warning: {text}", file=sys.stderr)
 
 
 def tell(options: argparse.Namespace, summary: Mapping[str, Any]) -> None:

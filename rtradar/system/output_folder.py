@@ -198,6 +198,27 @@ def exclusive_lock(folder: Path) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def resumable_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> Iterator[None]:
+    """Make or open a folder that a command fills file by file, and lock it meanwhile.
+
+    The command writes its listing first, with all files that it will make, so that it goes on after
+    it was killed. InputError if the folder cannot be written, another command has it, or it holds
+    files under names of this command's files that the listing there does not name, unless
+    ``overwrite`` allows that they are replaced.
+    """
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+        ) from None
+    with exclusive_lock(out):
+        with Directory.at(out) as place:
+            _refuse_foreign(place, kind, overwrite)
+        yield
+
+
 def check_whole(folder: Path, listing: str = "summary.json") -> None:
     """Raise InputError if the list of a folder says that a killed run left files of two runs."""
     try:

@@ -1,0 +1,9 @@
+"""The paper beside what this package gives: its items one by one, and its own choices of a run."""
+
+from __future__ import annotations
+
+from rtradar.paper.choices import AS_PAPER, paper_warnings
+from rtradar.paper.items import Item
+from rtradar.paper.make import make_paper
+
+__all__ = ["AS_PAPER", "Item", "make_paper", "paper_warnings"]

@@ -1,0 +1,207 @@
+"""The four activities before the paper's radar: its pictures 4, 5 and 8 to 12, side by side."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from rtradar.clouds.rdt import RdtCloud
+from rtradar.errors import ValidityWarning
+from rtradar.paper.sources import ACTIVITIES, TITLES, Sources
+from rtradar.pipeline import Result, run
+from rtradar.radar import Radar
+from rtradar.report.figures.canvas import add_colour_bar, bin_edges
+from rtradar.system.figure_style import DIVERGING, LIGHT, dress, new_figure, save_figure
+
+Results = Mapping[str, Result]
+
+_WIDTH_IN, _HEIGHT_IN = 9.0, 7.4
+_BELOW_DB = 40.0
+_TRIANGLES = 30_000
+_CLASS_S = {"jumping_jack": 1.0, "kick": 1.5, "punch": 1.0, "walk": 1.5}
+
+
+def activity_figures(sources: Sources) -> dict[str, Any]:
+    """Simulate the four activities by `specular`, draw them, and measure their clouds.
+
+    Parameters
+    ----------
+    sources : Sources
+        Who moves, and the folder of the pictures.
+
+    Returns
+    -------
+    dict
+        Figures by their names.
+    """
+    radar = Radar.preset("paper-12ghz")
+    results: dict[str, Result] = {}
+    cpu_s = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ValidityWarning)
+        for activity, longest_s in ACTIVITIES.items():
+            motion = sources.motion(activity)
+            duration_s = min(longest_s, motion.duration_s)
+            began_s = time.process_time()
+            results[activity] = run(motion, radar, duration_s=duration_s)
+            cpu_s.append(time.process_time() - began_s)
+    flat: dict[str, Callable[[Result, Axes], Any]] = {
+        "figure-4": lambda result, axes: result.plot.range_time(axes),
+        "figure-5": lambda result, axes: result.plot.range_doppler(ax=axes),
+        "figure-8": lambda result, axes: result.plot.spectrogram(axes),
+    }
+    solid = {
+        "figure-10": _draw_first_points,
+        "figure-11": _draw_surface,
+        "figure-12": lambda result, axes: result.plot.rdt(axes),
+    }
+    for name, draw in (flat | solid).items():
+        _side_by_side(sources, name, results, draw, projection="3d" if name in solid else None)
+    _draw_angles_in_metres(sources, results["jumping_jack"])
+    # The first run also compiles what all of them need.
+    return {"who": sources.named, "ours_cpu_s": max(cpu_s[1:])} | _findings(results)
+
+
+def _side_by_side(
+    sources: Sources,
+    name: str,
+    results: Results,
+    draw: Callable[[Result, Any], Any],
+    projection: str | None,
+) -> None:
+    """Draw all activities in one picture, each with its name alone as its title."""
+    figure = new_figure(_HEIGHT_IN, width_in=_WIDTH_IN)
+    panels = figure.subplots(2, 2, subplot_kw={"projection": projection})
+    for (activity, result), axes in zip(results.items(), panels.flat, strict=True):
+        draw(result, axes)
+        for text in list(axes.texts):
+            text.remove()
+        dress(axes, title=TITLES[activity], grid=projection is not None)
+    save_figure(figure, sources.out / f"{name}.png")
+
+
+def _draw_first_points(result: Result, axes: Any) -> None:
+    """Draw the spatial cloud of the first frame."""
+    cloud = result.spatial.strongest()
+    first = cloud.time == result.maps["time"].values[0]
+    fastest = float(np.abs(cloud.velocity[first]).max(initial=0.1))
+    style: dict[str, Any] = {"cmap": DIVERGING, "vmin": -fastest, "vmax": fastest, "s": 6}
+    dots = axes.scatter(*cloud.points[first].T, c=cloud.velocity[first], **style)
+    middle = np.median(cloud.points[first], axis=0) if first.any() else np.zeros(3)
+    sides = [(middle[axis] - 0.8, middle[axis] + 0.8) for axis in range(2)]
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    axes.set(xlim=sides[0], ylim=sides[1], zlim=(0, 2.2))
+    axes.set_box_aspect((1, 1, 1.4), zoom=0.9)
+    _few_ticks(axes)
+    add_colour_bar(dots, [axes], "Velocity [m/s]", shrink=0.7, pad=0.14)
+
+
+def _draw_surface(result: Result, axes: Any) -> None:
+    """Draw the isosurface of the detections over time, range and velocity."""
+    detected = np.pad(result.maps["detections"].values > 0, 1)
+    places, faces, _, _ = marching_cubes(detected.astype(np.float32), 0.5)
+    axis = [result.maps[name].values for name in ("time", "range", "velocity")]
+    steps = [values[1] - values[0] for values in axis]
+    places = np.array([values[0] for values in axis]) + (places - 1) * steps
+    # A false alarm far away would leave the body in a corner.
+    low, high = np.quantile(places, (0.002, 0.998), axis=0)
+    corners = places[faces]
+    corners = corners[((corners >= low) & (corners <= high)).all(axis=(1, 2))]
+    shown = corners[:: -(-len(corners) // _TRIANGLES)]
+    axes.add_collection3d(
+        Poly3DCollection(shown, facecolor=LIGHT.cycle[0], alpha=0.5, linewidths=0)
+    )
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]")
+    axes.set_box_aspect((1.6, 1, 1), zoom=0.9)
+    _few_ticks(axes)
+
+
+def _few_ticks(axes: Any) -> None:
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(4))
+
+
+def _draw_angles_in_metres(sources: Sources, result: Result) -> None:
+    """Draw power of the first frame from above and from the side, in metres from the radar."""
+    figure = new_figure(4.2, width_in=_WIDTH_IN)
+    for axes, name, label in zip(
+        figure.subplots(1, 2), ("azimuth", "elevation"), ("Y [m]", "Z [m]"), strict=True
+    ):
+        power = result.maps[f"range_{name}"].values[0]
+        distance = _edges(result.maps["range"].values)[:, None]
+        angle = _edges(result.maps[name].values)
+        level = 10 * np.log10(np.maximum(power / power.max(), 1e-30))
+        across = "X [m]" if name == "azimuth" else "D [m]"
+        picture = axes.pcolormesh(
+            distance * np.cos(angle),
+            distance * np.sin(angle),
+            np.maximum(level, -_BELOW_DB),
+            rasterized=True,
+        )
+        axes.set(xlabel=across, ylabel=label, xlim=(2.5, 5.5), ylim=(-2, 2), aspect="equal")
+        dress(axes, title=f"Range and {name}", grid=False)
+        add_colour_bar(picture, [axes], "Power [dB re maximum]", extend="min")
+    save_figure(figure, sources.out / "figure-9.png")
+
+
+def _edges(centres: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the edges between even centres, one more than these."""
+    return np.linspace(*bin_edges(centres), len(centres) + 1)
+
+
+def _findings(results: Results) -> dict[str, Any]:
+    """Measure clouds, times and parts of the body."""
+    found: dict[str, Any] = {}
+    for activity, result in results.items():
+        speed = np.abs(result.points[:, 2])
+        found |= {
+            f"{activity}_fastest": float(np.quantile(speed, 0.99)),
+            f"{activity}_points": result.summary["rdt_triangles"],
+            f"{activity}_first": _first_points(result),
+        }
+        for name, limit_mps in (("60", 1.61), ("77", 1.27)):
+            found[f"{activity}_beyond_{name}"] = 100 * float(np.mean(speed > limit_mps))
+    jack = results["jumping_jack"]
+    found["triangles_25"], found["triangles_75"] = (_triangles(jack, every) for every in (1, 3))
+    found["slices_25"], found["slices_75"] = (len(jack.maps["time"][::every]) for every in (1, 3))
+    for name in ("azimuth", "elevation"):
+        found[f"{name}_deg"] = _strongest_deg(jack, name)
+    of_parts = [list(result.summary["part_power_m2"].values()) for result in results.values()]
+    power = np.mean(of_parts, axis=0)
+    change_db = 10 * np.log10(1 - power / power.sum())
+    found["part_least_db"], found["part_most_db"] = float(-change_db.max()), float(-change_db.min())
+    times = [result.summary for result in results.values()]
+    found["ours_s"] = max(one["wall_s"] for one in times)
+    found["ours_capture_s"] = max(one["capture_s"] for one in times)
+    found["ours_mb"] = max(one["peak_memory_mb"] for one in times)
+    found["lengths"] = ", ".join(f"{TITLES[k].lower()} {v:.1f} s" for k, v in _CLASS_S.items())
+    return found
+
+
+def _first_points(result: Result) -> int:
+    return int(np.sum(result.spatial.time == result.maps["time"].values[0]))
+
+
+def _triangles(result: Result, every: int) -> int:
+    """Count the triangles of the isosurface of every so many slices."""
+    cloud = RdtCloud(result.radar)
+    for frame in range(0, len(result.maps["time"]), every):
+        mask = result.maps["detections"].values[frame] > 0
+        cloud.push(mask, float(result.maps["time"].values[frame]))
+    return cloud.finish().n_triangles
+
+
+def _strongest_deg(result: Result, name: str) -> float:
+    """Find the angle of most power in the first frame [degree]."""
+    power = result.maps[f"range_{name}"].values[0].sum(axis=0)
+    return float(np.degrees(result.maps[name].values[power.argmax()]))
