@@ -152,7 +152,8 @@ def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> N
     seconds = sum(part["wall_s"] for part in content["parts"].values())
     about = f"Who moves: {sources.named}. Measured in {seconds:.0f} s"
     about += ", quickly: with fewer cases of table 3 and 77 GHz." if sources.quick else "."
-    titles = Titles("The paper beside rtradar", "4D radar simulator for human activity recognition", about)
+    name = "4D radar simulator for human activity recognition"
+    titles = Titles("The paper beside rtradar", name, about)
     links = {item.id: _link(item.title) for item in items}
     write_page(folder / "paper.html", titles, contents(links), sections)
 
