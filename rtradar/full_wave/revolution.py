@@ -37,6 +37,12 @@ Field = NDArray[np.complex128]
 LARGEST_BYTES = 3 * 2**30
 """Memory of the factors beyond which bodies are refused."""
 
+_OF_THE_WAY = 0.75
+"""How far sources stand between the surface and the line between the foci, at most."""
+
+_LEAST_DEPTH = 0.6
+"""Least depth of sources over `Sampling.depth`: nearer ones would be seen one by one."""
+
 _NEGLIGIBLE = 1e-13
 """Pivot, relative to the largest one, below which a source adds nothing but rounding."""
 
@@ -158,6 +164,21 @@ class BodiesOfRevolution:
         size = self._k * max(body.radius for body in self.spheroids)
         return int(np.ceil(size + 4.05 * size ** (1 / 3) + 6))
 
+    def _deepest(self, body: Spheroid) -> float:
+        """Largest depth of sources in a body, in the elliptic coordinate.
+
+        Sources stand around the line between the foci, and around the image of the neighbour's
+        tip in the tip of this body, for the scattered field has no sources outside of those.
+        """
+        gaps = [
+            max(other.span[0] - body.span[1], body.span[0] - other.span[1])
+            for other in self.spheroids
+            if other is not body
+        ]
+        # At the tip a change of the coordinate is that of the depth over the radius.
+        image = body.image_depth(min(gaps)) / body.radius if gaps else np.inf
+        return min(_OF_THE_WAY * body.innermost, image)
+
     def _counts(self, wavenumber: float) -> list[int]:
         """Rings of sources of each body, for waves of that wavenumber."""
         longest = [max(body.radius, body.half_length) for body in self.spheroids]
@@ -178,11 +199,13 @@ class BodiesOfRevolution:
     @cached_property
     def _outer(self) -> list[Rings]:
         """Sources inside of each body, whose fields are outside."""
-        counts = self._counts(self._k)
-        return [
-            body.rings(count, -min(self.sampling.depth / count, 0.75 * body.innermost))
-            for body, count in zip(self.spheroids, counts, strict=True)
-        ]
+        depth = self.sampling.depth
+        found = []
+        for body, count in zip(self.spheroids, self._counts(self._k), strict=True):
+            deepest = self._deepest(body)
+            enough = max(count, int(np.ceil(_LEAST_DEPTH * depth / deepest)))
+            found.append(body.rings(enough, -min(depth / enough, deepest)))
+        return found
 
     @cached_property
     def _inner(self) -> list[Rings]:

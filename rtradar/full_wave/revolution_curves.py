@@ -72,6 +72,22 @@ class Spheroid:
             area=2 * np.pi * a * sine * stretch * np.pi / count,
         )
 
+    def image_depth(self, distance: float) -> float:
+        """Compute the depth of the image of a point before the tip.
+
+        Parameters
+        ----------
+        distance : float
+            Distance of the point from the tip, on the axis [m].
+
+        Returns
+        -------
+        float
+            Depth of its image in the sphere that osculates the tip [m].
+        """
+        curvature = self.radius**2 / self.half_length
+        return curvature * distance / (curvature + distance)
+
     @property
     def innermost(self) -> float:
         """Depth at which the confocal spheroids end in the line or the disc between the foci."""
