@@ -12,13 +12,13 @@ range     places x, y, z are 240 / 256 of the column "range": the chip pads 240 
           long, as is the preset's bin, which is that column's
 
 Reported, because the people, their places and the room are others: points in a frame that move,
-spread of distance, of speed and of level. What differs by construction: the recorded profile has
-no clutter removal, CFAR over range alone (``cfarCfg 0 2 8 4 3 0 768``: the smaller of both sides, 8
-noise and 4 guard cells, 9 dB) and groups peaks over Doppler alone (``peakGrouping 1 0 1``); the
-chain here, which is that of later SDKs, asks for both axes. Points that stand still are the room in
-the files, and are left out in both. Levels are 512 log2 of the magnitude, of which the driver keeps
-10 log10(1 + level). The profile is ``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes
-and threshold are those of TI's mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
+spread of distance, of speed and of level. As the recorded profile has it, clutter is not removed,
+CFAR is over range alone (``cfarCfg 0 2 8 4 3 0 768``: the smaller of both sides, 8 noise and 4
+guard cells, 9 dB), and peaks are grouped over Doppler alone (``peakGrouping 1 0 1``). Points that
+stand still are the room in the files, and are left out in both. Levels are 512 log2 of the
+magnitude, of which the driver keeps 10 log10(1 + level). The profile is
+``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes and threshold are those of TI's
+mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
 
 Without the folder only the grids of simulated points are judged.
 
@@ -89,7 +89,11 @@ def simulated(activity: str, seconds: float) -> Cloud:
         fidelity="specular",
         snr_db="physical",
         detector="ti-oob",
-        detector_options={"threshold_db": THRESHOLD_DB},
+        detector_options={
+            "threshold_db": THRESHOLD_DB,
+            "cfar_axes": "range",
+            "grouping": "doppler",
+        },
     )
     cloud = result.spatial
     moving = cloud.velocity != 0
