@@ -74,7 +74,8 @@ def warn_of_small_radii(
     The antennas (n, 3) are given pair by pair [m], with their wavenumbers (n,) [1/m] and the
     amplitudes (n, part) of each part's echo, of which only the ratio counts. A `ValidityWarning` is
     issued if such radii, taken where the normal halves the angle between both antennas, give more
-    than 5 % of the power. ``stacklevel`` is counted from the caller; see `warnings.warn`.
+    than 5 % of the power. A radius counts less by the cosine of incidence, half the angle between
+    both antennas. ``stacklevel`` is counted from the caller; see `warnings.warn`.
 
     Equation :eq:`validity` of the theory page.
     """
@@ -83,13 +84,15 @@ def warn_of_small_radii(
         sight = np.einsum("pji,npj->npi", target.frames, antennas[:, None] - target.centres)
         normal += sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     # Opposite antennas have no such normal, and no echo.
-    ka = wavenumber[:, None] * smaller_radius(target.semi_axes, normal)
+    cosine = np.linalg.norm(normal, axis=-1) / 2
+    ka = wavenumber[:, None] * smaller_radius(target.semi_axes, normal) * cosine
     power, small = np.abs(amplitude) ** 2, ka < MINIMUM_KA
     concerned, whole = float(power[small].sum()), float(power.sum())
     if whole > 0 and concerned > WARN_FRACTION * whole:
         warnings.warn(
             f"{concerned / whole:.0%} of the echo power is from places whose wavenumber times "
-            f"radius of curvature is below {MINIMUM_KA:g}, down to {float(ka[small].min()):.3g}, "
+            "radius of curvature times cosine of incidence is below "
+            f"{MINIMUM_KA:g}, down to {float(ka[small].min()):.3g}, "
             "where optics is off by decibels; rtradar.rcs.sphere(method='mie') is exact",
             ValidityWarning,
             stacklevel=stacklevel + 1,

@@ -2,9 +2,12 @@
 
     F = jk / sqrt(pi) * sum over lit facets of  o w / (R_T R_R)  Int exp(-jk (R_T + R_R - L)) dS
 
-with the reciprocal obliquity o = (n.s_T + n.s_R) / 2, which is n.s where Tx and Rx are one: the
-Fresnel-Kirchhoff factor (Born and Wolf, *Principles of Optics*, section 8.3.2). Path lengths are
-exact at the three vertices, in float64, and taken as linear between them.
+For a radar, whose Tx and Rx are near each other, the sum is over facets that face both, and o is
+the reciprocal obliquity (n.s_T + n.s_R) / 2: the Fresnel-Kirchhoff factor (Born and Wolf,
+*Principles of Optics*, section 8.3.2). For antennas anywhere it is over all that Tx lights, and o =
+(e_R.e_T)(n.s_T) - (e_R.s_T)(n.e_T) is what the current 2 n x H radiates to Rx, where e are the
+polarisations (Knott, Shaeffer and Tuley, *Radar Cross Section*, section 5.3). For one antenna both
+are n.s. Path lengths are exact at the three vertices, in float64, and taken as linear between them.
 """
 
 from __future__ import annotations
@@ -65,13 +68,16 @@ class Waves(NamedTuple):
 
     ``pairs (pair, 2)`` int64, Tx and Rx among the antennas of a task; ``carrier (task, pair)`` the
     path whose phase is taken out [m]; ``wavenumber (task, node)`` [rad/m]; ``spreading``, whether
-    each facet's field is divided by R_T R_R, normalised to 1 m.
+    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 4)`` are
+    e_R.e_T and, in the axes of the part, the vector -(e_R.s_T) e_T; without any, (0, 0, 4), the
+    obliquity is the reciprocal one.
     """
 
     pairs: NDArray[np.int64]
     carrier: Array
     wavenumber: Array
     spreading: bool
+    currents: Array = np.empty((0, 0, 4))
 
 
 class _Chosen(NamedTuple):
@@ -176,13 +182,9 @@ def _see(antenna, distance, excess, chosen, seen, view):
 
 
 @inlined(fastmath=FAST)
-def _light(tx, rx, chosen, both, far_t, far_r, carrier, spreading, terms):
-    """Fill the terms of facets under two views."""
-    tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
-    rx_mean, rx_u, rx_v, rx_facing, rx_seen = rx[0], rx[1], rx[2], rx[3], rx[4]
-    areas, bend = chosen.areas, chosen.bend
-    mean, u, v, strength = terms
-    for i in range(len(mean)):
+def _facing_both(tx_facing, rx_facing, bend, both, out):
+    """Fill in the reciprocal obliquity of facets that face Tx and Rx, 0 for the others."""
+    for i in range(len(out)):
         low, high = min(tx_facing[i], rx_facing[i]), max(tx_facing[i], rx_facing[i])
         behind = both and high < 0
         low, high = (-high, -low) if behind else (low, high)
@@ -190,7 +192,33 @@ def _light(tx, rx, chosen, both, far_t, far_r, carrier, spreading, terms):
         # has to be led there.
         h = max(bend[i], 1e-300)
         over = min(1.0, max(0.0, (low + h) / (2 * h)))
-        size = (max(low, 0.0) + over * (high - low) / 2) * min(tx_seen[i], rx_seen[i]) * areas[i]
+        out[i] = max(low, 0.0) + over * (high - low) / 2
+
+
+@inlined(fastmath=FAST)
+def _lit_by_tx(tx_facing, chosen, both, currents, out):
+    """Fill in the obliquity of the currents on facets that Tx lights, 0 for the others."""
+    n0, n1, n2, bend = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.bend
+    along, x, y, z = currents[0], currents[1], currents[2], currents[3]
+    for i in range(len(out)):
+        side = -1.0 if both and tx_facing[i] < 0 else 1.0
+        facing = side * tx_facing[i]
+        # What does not fall to 0 at the terminator by itself is led there.
+        h = max(bend[i], 1e-300)
+        over = min(1.0, max(0.0, (facing + h) / (2 * h)))
+        across = x * n0[i] + y * n1[i] + z * n2[i]
+        out[i] = along * max(facing, 0.0) + over * side * across
+
+
+@inlined(fastmath=FAST)
+def _light(tx, rx, chosen, far_t, far_r, carrier, spreading, terms):
+    """Fill the terms of facets under two views; their strength is the obliquity before."""
+    tx_mean, tx_u, tx_v, tx_seen = tx[0], tx[1], tx[2], tx[4]
+    rx_mean, rx_u, rx_v, rx_seen = rx[0], rx[1], rx[2], rx[4]
+    areas = chosen.areas
+    mean, u, v, strength = terms
+    for i in range(len(mean)):
+        size = strength[i] * min(tx_seen[i], rx_seen[i]) * areas[i]
         if spreading:
             size /= (far_t + tx_mean[i]) * (far_r + rx_mean[i])
         mean[i] = tx_mean[i] + rx_mean[i] - carrier
@@ -221,9 +249,13 @@ def integrate(begin, end, facets, views, waves, out):
         for pair in range(len(waves.pairs)):
             t, r = waves.pairs[pair, 0], waves.pairs[pair, 1]
             offset = waves.carrier[task, pair] - far[t] - far[r]
-            both, spreading = facets.both_sides, waves.spreading
-            _light(view[t], view[r], chosen, both, far[t], far[r], offset, spreading, terms)
             mean, u, v, strength = terms
+            both, facing = facets.both_sides, view[t][3]
+            if len(waves.currents) > 0:
+                _lit_by_tx(facing, chosen, both, waves.currents[task, pair], strength)
+            else:
+                _facing_both(facing, view[r][3], chosen.bend, both, strength)
+            _light(view[t], view[r], chosen, far[t], far[r], offset, waves.spreading, terms)
             largest = largest_spread(u, v, room)
             for node in range(waves.wavenumber.shape[1]):
                 k = waves.wavenumber[task, node]
@@ -235,7 +267,7 @@ def integrate(begin, end, facets, views, waves, out):
 
 
 def integrate_reference(facets, views, waves):
-    """`integrate` over flat facets that are lit, by middles of small triangles, in plain NumPy."""
+    """`integrate` without currents over facets that are lit, by middles of small triangles."""
     corners = facets.vertices[:, facets.faces]
     out = np.empty((*waves.carrier.shape, waves.wavenumber.shape[1]), dtype=complex)
     for task, part in enumerate(views.part):

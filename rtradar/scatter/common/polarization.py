@@ -129,6 +129,22 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
     return np.asarray(np.where(known, fraction, 1.0))
 
 
+def driven_currents(
+    to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]
+) -> tuple[Array, Array]:
+    """Compute what the currents of physical optics radiate, as a function of the normal n.
+
+    The current 2 n x H radiates the co-polar obliquity ``along (...)`` times n.s_T plus n times the
+    vector ``across (..., 3)``: e_R.e_T and -(e_R.s_T) e_T for unit vectors of polarisation e and
+    unit vectors s to the antennas. Where v has no direction it is n.s_T.
+    """
+    tx, rx = unit(to_tx), unit(to_rx)
+    sent, received = antenna_field(tx, polarization), antenna_field(rx, polarization)
+    known = sent.any(axis=-1) & received.any(axis=-1)
+    along = np.where(known, np.sum(sent * received, axis=-1), 1.0)
+    return along, -np.sum(received * tx, axis=-1, keepdims=True) * sent
+
+
 # -- the body's surface ----------------------------------------------------------------------------
 
 

@@ -55,17 +55,23 @@ class FacetShadows:
         self._margin = 3 * float(facets.bend.max())
 
     def seen(
-        self, centres: Array, frames: Array, antennas: Array, parts: NDArray[np.int64]
+        self,
+        centres: Array,
+        frames: Array,
+        antennas: Array,
+        parts: NDArray[np.int64],
+        apart: float = 0.0,
     ) -> Seen:
         """Fraction of each facet of some parts (n,) that antennas (antenna, 3) see past the others.
 
         ``centres (part, 3)`` and ``frames (part, 3, 3)`` are the pose of the whole body, world [m].
+        Facets that face an antenna away, by a cosine of more than ``apart``, are not looked at.
         """
         facets, row = self._facets, np.zeros((len(antennas), len(parts)), dtype=np.int64)
         if len(centres) == 1:
             return Seen(np.ones((1, len(facets.faces)), dtype=np.float32), row)
         hidden_by = self._tracer.occluders(
-            centres, frames, antennas, parts, self._places, self._margin
+            centres, frames, antennas, parts, self._places, self._margin + apart
         )
         fraction = np.empty((1 + row.size, len(facets.faces)), dtype=np.float32)
         given = (

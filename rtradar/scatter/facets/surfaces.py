@@ -22,6 +22,22 @@ from rtradar.system.threads import thread_map
 MAXIMUM_FACETS = 20 * 4**MAXIMUM_SUBDIVISIONS
 """Facets of one ellipsoid beyond which no icosphere is built."""
 
+LARGEST_KA = 400.0
+"""Facets for 0.1 dB are chosen up to here; above, the user names them, or gives a finer mesh."""
+
+FACETS_PER_SQUARE_KA = 6.0
+"""Facets of a sphere over (ka)^2 for 0.07 dB of the closed form, which its terminator takes."""
+
+WIDE = 0.2
+"""Distance between the directions to Tx and Rx above which it matters which of them lights.
+
+Then there are four times as many facets: the current does not fall to nothing at the edge of the
+lit side.
+"""
+
+_EDGE = 0.5
+"""Angle between the normals of a triangle and a vertex [rad] above which a mesh has an edge."""
+
 _PARALLEL_TERMS = 4_000_000
 """Facets times pairs times frequencies, 12 ms, below which waking threads costs as much as work."""
 
@@ -71,16 +87,42 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], subdivisions: int) -> Facet
 
 
 def mesh_facets(
-    vertices: NDArray[np.float64], faces: NDArray[np.integer], *, both_sides: bool
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    *,
+    both_sides: bool,
+    bend: NDArray[np.float64] | None = None,
 ) -> Facets:
-    """Facets of a mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``, without empty ones."""
+    """Facets of a mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``, without empty ones.
+
+    Their ``bend (facet,)`` is that of `smooth_bend`, or none.
+    """
     whole = np.asarray(vertices, dtype=np.float64)[None]
     chosen = np.asarray(faces, dtype=np.int32)
     normals, areas = facet_normals(whole, chosen)
     solid = areas[0] > 0
-    flat = np.zeros((1, int(solid.sum())))
+    swing = np.zeros(int(solid.sum())) if bend is None else bend[solid]
     chosen = np.ascontiguousarray(chosen[solid])
-    return Facets(whole, chosen, normals[:, solid], areas[:, solid], flat, both_sides)
+    swing = np.ascontiguousarray(swing[None])
+    return Facets(whole, chosen, normals[:, solid], areas[:, solid], swing, both_sides)
+
+
+def smooth_bend(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Estimate how far the normal swings over the surface that a flat triangle stands for (facet,).
+
+    See `Facets`. The normal at a vertex is the mean of those around it, weighted by area; where one
+    of them is more than half a radian off, the mesh has an edge, which is sharp.
+    """
+    corners = np.asarray(faces, dtype=np.int32)
+    (normals,), (areas,) = facet_normals(vertices[None], corners)
+    total = np.zeros_like(vertices)
+    np.add.at(total, corners, (normals * areas[:, None])[:, None])
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    total /= np.where(size > 0, size, 1.0)
+    apart = np.sum((total[corners] - normals[:, None]) ** 2, axis=2)
+    farthest = np.zeros(len(vertices))
+    np.maximum.at(farthest, corners, apart)
+    return np.sqrt(np.where(farthest[corners] < _EDGE**2, apart, 0.0).sum(axis=1) / 8)
 
 
 def facet_normals(
@@ -111,6 +153,7 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
         np.ascontiguousarray(waves.carrier, dtype=np.float64),
         np.require(waves.wavenumber, np.float64, ["C", "W"]),
         waves.spreading,
+        np.require(waves.currents, np.float64, ["C", "W"]),
     )
     tasks = len(views.part)
     shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
