@@ -11,6 +11,7 @@ from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.specular_point import Geometry, solve_reference
+from rtradar.kernels.surface_currents import Equation
 from rtradar.scatter.facets.surfaces import ellipsoid_facets
 
 # -- tracing ---------------------------------------------------------------------------------------
@@ -380,3 +381,43 @@ def _add_blended(k: Any) -> Calls:
     tx, out = np.arange(500) % 4, np.zeros((500, 3000), dtype=np.complex64)
     call = filled(k.add_blended, tx, weights, keyframes, whole, out=(out,), adds=True)
     return call, lambda: (k.add_blended_reference(tx, weights, keyframes, whole),)
+
+
+# -- full wave -------------------------------------------------------------------------------------
+
+
+def _octahedron() -> Any:
+    """Octahedron with two mirror planes, whose opposite triangles are near without touching."""
+    from rtradar.full_wave.surfaces_mesh import ClosedMesh
+    from rtradar.full_wave.surfaces_quadrature import rules
+
+    vertices = np.array([[1.2, 0, 0], [-0.9, 0, 0], *np.eye(3)[1:], *-np.eye(3)[1:]])
+    ring = [2, 3, 4, 5]
+    faces = [
+        face
+        for one, other in zip(ring, np.roll(ring, -1), strict=True)
+        for face in ((0, one, other), (1, other, one))
+    ]
+    return ClosedMesh(vertices, np.array(faces)), rules(3)
+
+
+@kernel_case(
+    "surface_integrals.fill_matrices", "matrices of an octahedron with two mirror planes", 1e-9
+)
+def _fill_matrices(k: Any) -> Calls:
+    mesh, rules = _octahedron()
+    given = mesh.triangles, mesh.orbits, rules, Equation(3.0, 0.8)
+    count = 1 + int(mesh.orbits.unknown.max())
+    out = np.zeros((4, count, count), dtype=np.complex128)
+    call = filled(k.fill_matrices, *given, out=(out,), adds=True)
+    return call, lambda: k.matrices_reference(*given)
+
+
+@kernel_case("surface_currents.fill_moments", "fields of two dipoles on 8 triangles", 1e-9)
+def _fill_moments(k: Any) -> Calls:
+    mesh, rules = _octahedron()
+    dipoles = np.array([[[2.0, 1.0, 1.0], [0.0, 0.6, 0.8]], [[30.0, 20.0, -1.0], [1.0, 0.0, 0.0]]])
+    given = mesh.triangles, mesh.edge_of, rules, Equation(3.0, 0.8), dipoles
+    out = np.zeros((2, 2, mesh.unknowns), dtype=np.complex128)
+    call = filled(k.fill_moments, *given, out=(out,), adds=True)
+    return call, lambda: k.moments_reference(*given)

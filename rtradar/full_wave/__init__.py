@@ -2,5 +2,7 @@
 
 from rtradar.full_wave.revolution import BodiesOfRevolution, Sampling
 from rtradar.full_wave.revolution_curves import Spheroid
+from rtradar.full_wave.surfaces import ConductingSurface
+from rtradar.full_wave.surfaces_mesh import ClosedMesh
 
-__all__ = ["BodiesOfRevolution", "Sampling", "Spheroid"]
+__all__ = ["BodiesOfRevolution", "ClosedMesh", "ConductingSurface", "Sampling", "Spheroid"]

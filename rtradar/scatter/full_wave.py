@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from rtradar.body import Ellipsoids
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.full_wave import BodiesOfRevolution, Spheroid
+from rtradar.full_wave import BodiesOfRevolution, ClosedMesh, ConductingSurface, Spheroid
+from rtradar.scatter.target import target_mesh
 from rtradar.scene import material as material_of
 
 if TYPE_CHECKING:
@@ -45,9 +46,11 @@ def full_wave_scattering(
     for one in np.unique(frequency):
         own = np.flatnonzero(frequency == one)
         permittivity = _permittivity(material, float(one))
-        out[own] = _of_ellipsoids(
-            target, float(one), permittivity, (tx[own], rx[own]), polarization
-        )
+        given = float(one), permittivity, (tx[own], rx[own]), polarization
+        if isinstance(target, Ellipsoids):
+            out[own] = _of_ellipsoids(target, *given)
+        else:
+            out[own] = _of_mesh(target, *given)
     return out
 
 
@@ -58,18 +61,13 @@ def _permittivity(material: str, frequency_hz: float) -> complex | None:
 
 
 def _of_ellipsoids(
-    target: object,
+    target: Ellipsoids,
     frequency_hz: float,
     permittivity: complex | None,
     antennas: tuple[Array, Array],
     polarization: Literal["v", "h"],
 ) -> NDArray[np.complex128]:
     """Field of coaxial ellipsoids of revolution, at one frequency."""
-    if not isinstance(target, Ellipsoids):
-        raise InputError(
-            f"scattering_length: '{FULL_WAVE}' takes rt.Ellipsoids of revolution about one axis, "
-            f"not {type(target).__name__}"
-        )
     bodies = coaxial_bodies(target, frequency_hz, permittivity)
     length, residual = bodies.solve(*antennas, polarization)
     if (worst := residual.max(initial=0.0)) > _POOR:
@@ -80,6 +78,29 @@ def _of_ellipsoids(
             stacklevel=4,
         )
     return length
+
+
+def _of_mesh(
+    target: object,
+    frequency_hz: float,
+    permittivity: complex | None,
+    antennas: tuple[Array, Array],
+    polarization: Literal["v", "h"],
+) -> NDArray[np.complex128]:
+    """Field of closed conducting meshes, at one frequency."""
+    mesh = target_mesh(target, *antennas)
+    if not mesh.closed:
+        raise InputError(
+            f"scattering_length: the mesh is open; '{FULL_WAVE}' takes closed meshes: close its "
+            "holes, or give a sheet a thickness"
+        )
+    if permittivity is not None:
+        raise InputError(
+            f"scattering_length: '{FULL_WAVE}' takes meshes of perfect conductors alone; leave "
+            "material out, or take ellipsoids of revolution"
+        )
+    surface = ConductingSurface(ClosedMesh(mesh.vertices, mesh.faces), frequency_hz)
+    return surface.scattering_length(*antennas, polarization)
 
 
 def coaxial_bodies(

@@ -43,7 +43,8 @@ def scattering_length(
         Target. Its parts occlude each other where the model traces, and of parts that fill the same
         place one counts. Meshes, of perfect conductors, are for ``physical-optics``, ``reference``
         (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
-        ``full-wave`` takes ellipsoids of revolution about one common axis, which do not overlap.
+        ``full-wave`` takes ellipsoids of revolution about one common axis, which do not overlap,
+        and closed meshes of up to some 17 000 edges of an eighth of a wavelength.
     tx, rx : (n, 3) array_like
         Antennas, pair by pair, in the coordinates of the target [m]. One may be a single (3,).
     frequency : float or (n,) array_like

@@ -1,0 +1,183 @@
+"""Any closed conducting mesh, by the combined field integral equation over its surface.
+
+What is unknown are the currents over the edges of the triangles (S. M. Rao, D. R. Wilton, A. W.
+Glisson, IEEE Trans. Antennas Propag. 30, 1982). The tangential electric field on the surface is
+zero, and the tangential magnetic field is the current; the sum of both conditions, unlike each
+alone, has no resonances of the inside (J. R. Mautz, R. F. Harrington, A.E.U. 32, 1978).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
+
+from rtradar.errors import InputError
+from rtradar.full_wave.antennas import Polarization, antenna_moments, wavenumber
+from rtradar.full_wave.surfaces_mesh import ClosedMesh
+from rtradar.full_wave.surfaces_quadrature import rules
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+
+MOST_UNKNOWNS = 17_000
+"""Largest number of edges of a mesh without mirror planes: a matrix of 2.3 GB.
+
+Each mirror plane divides the matrix into two with half the unknowns each, so that a mesh may have
+sqrt(2) times as many edges."""
+
+LONGEST_EDGE = 1 / 8
+"""Root mean square of the lengths of edges, in wavelengths, above which triangles are divided."""
+
+_ELECTRIC = 0.8
+"""Weight of the electric field's equation. It is the more accurate one; a fifth of the other is
+enough at resonances of the inside."""
+
+_DOUBLE_UP_TO = 4000
+"""Number of edges up to which matrices are complex128; larger ones are complex64."""
+
+_ORDER = 4
+"""Points an axis where triangles touch, which leaves 1e-4 of the static integrals."""
+
+_TOGETHER = 64
+"""Number of antennas whose fields are kept at once."""
+
+
+@dataclass(frozen=True)
+class ConductingSurface:
+    """Scattering by perfect conductors with closed surfaces, at one frequency.
+
+    The matrix is factorised once, when it is first needed, for all antennas.
+
+    Parameters
+    ----------
+    mesh : ClosedMesh
+        Surface of the conductors. Its triangles are divided until their edges are short enough
+        (`LONGEST_EDGE`); they stay flat.
+    frequency_hz : float
+        Frequency of the wave [Hz].
+
+    Raises
+    ------
+    InputError
+        Where there are too many unknowns.
+
+    Notes
+    -----
+    The error falls with the square of the lengths of the edges. That of a curved surface is mostly
+    that of the flat triangles if their corners lie on it: with the corners moved outward, so that
+    the triangles are on average on the surface, it is several times smaller.
+    """
+
+    mesh: ClosedMesh
+    frequency_hz: float
+
+    def __post_init__(self) -> None:
+        mesh = self.mesh
+        wavelength = 2 * np.pi / wavenumber(self.frequency_hz)
+        while np.sqrt(np.mean(mesh.lengths**2)) > LONGEST_EDGE * wavelength:
+            mesh = mesh.divided()
+            _refuse_large(mesh, self.frequency_hz)
+        _refuse_large(mesh, self.frequency_hz)
+        object.__setattr__(self, "mesh", mesh)
+
+    @property
+    def memory_bytes(self) -> int:
+        """Memory of the matrices [bytes]."""
+        size = 16 if self.mesh.unknowns <= _DOUBLE_UP_TO else 8
+        return size * _entries(self.mesh)
+
+    @cached_property
+    def _equation(self) -> Any:
+        from rtradar.kernels.surface_currents import Equation  # slow to import
+
+        return Equation(wavenumber(self.frequency_hz), _ELECTRIC)
+
+    @cached_property
+    def _factors(self) -> list[Any]:
+        """Factors of the transposed matrix of each parity."""
+        from rtradar.kernels.surface_integrals import fill_matrices
+
+        orbits = self.mesh.orbits
+        shape = len(orbits.parity), *2 * (1 + int(orbits.unknown.max()),)
+        kind = np.complex128 if self.mesh.unknowns <= _DOUBLE_UP_TO else np.complex64
+        matrices = np.zeros(shape, dtype=kind)
+        fill_matrices(self.mesh.triangles, orbits, rules(_ORDER), self._equation, matrices)
+        factors = []
+        for matrix, sums in zip(matrices, self.mesh.sums_of_edges, strict=True):
+            # Some currents cannot have this parity, being their own mirror images.
+            none = np.flatnonzero(abs(sums).sum(axis=1) == 0)
+            matrix[none, none] = 1.0
+            # Transposed, rows are columns as LAPACK stores them, and nothing is copied.
+            factors.append(lu_factor(matrix.T, overwrite_a=True, check_finite=False))
+        return factors
+
+    def scattering_length(self, tx: Array, rx: Array, polarization: Polarization) -> Field:
+        """Compute the co-polar scattering length between each Tx and Rx.
+
+        Parameters
+        ----------
+        tx, rx : (n, 3) float64
+            Positions of the antennas, pair by pair [m]; they stand outside the conductors.
+        polarization : {"v", "h"}
+            v is world z projected across the line of sight, h is across both.
+
+        Returns
+        -------
+        (n,) complex128
+            Scattering length [m], see `rtradar.scattering_length`. Antennas are dipoles across
+            the line of sight from the origin, with their near fields.
+        """
+        out = np.empty(len(tx), dtype=np.complex128)
+        for first in range(0, len(tx), _TOGETHER):
+            some = slice(first, first + _TOGETHER)
+            out[some] = self._some(tx[some], rx[some], polarization)
+        # The radiated field is -jk/(4 pi) times the product of the current and the field of the
+        # receiving dipole; the scattering length has sqrt(4 pi) and the sign of `copolar`.
+        return 1j * wavenumber(self.frequency_hz) / math.sqrt(4 * math.pi) * out
+
+    def _some(self, tx: Array, rx: Array, polarization: Polarization) -> Field:
+        antennas, index = np.unique(np.concatenate([tx, rx]), axis=0, return_inverse=True)
+        received, sent = self._products(antennas, polarization)
+        sources = np.unique(index[: len(tx)])
+        currents = np.zeros_like(sent)
+        for factors, sums in zip(self._factors, self.mesh.sums_of_edges, strict=True):
+            # The matrix counts each set of mirror images once.
+            right = (sums @ sent[sources].T) / len(self._factors)
+            solved = lu_solve(factors, right, trans=1, check_finite=False)
+            currents[sources] += (sums.T @ solved).T
+        ends = index[: len(tx)], index[len(tx) :]
+        return np.asarray(np.sum(currents[ends[0]] * received[ends[1]], axis=1))
+
+    def _products(self, antennas: Array, polarization: Polarization) -> Field:
+        """Products of each current with the fields of antennas, see `fill_moments`."""
+        from rtradar.kernels.surface_currents import fill_moments
+
+        out = np.zeros((2, len(antennas), self.mesh.unknowns), dtype=np.complex128)
+        dipoles = np.stack([antennas, antenna_moments(antennas, polarization)], axis=1)
+        fill_moments(
+            self.mesh.triangles, self.mesh.edge_of, rules(_ORDER), self._equation, dipoles, out
+        )
+        return out
+
+
+def _entries(mesh: ClosedMesh) -> int:
+    """Number of matrix elements."""
+    orbits = mesh.orbits
+    return len(orbits.parity) * (1 + int(orbits.unknown.max())) ** 2
+
+
+def _refuse_large(mesh: ClosedMesh, frequency_hz: float) -> None:
+    planes = len(mesh.mirror_axes)
+    most = round(MOST_UNKNOWNS * math.sqrt(2) ** planes)
+    if mesh.unknowns > most:
+        raise InputError(
+            f"full-wave: at {frequency_hz / 1e9:g} GHz the mesh has {mesh.unknowns} edges, each "
+            f"with an unknown current; with {planes} mirror planes {most} are allowed: take a "
+            "lower frequency, a coarser mesh or a smaller body"
+        )

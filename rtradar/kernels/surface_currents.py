@@ -1,0 +1,129 @@
+"""Currents over the edges of flat triangles, and their products with the fields of antennas.
+
+A current flows across each edge, from one triangle into the other (S. M. Rao, D. R. Wilton, A. W.
+Glisson, IEEE Trans. Antennas Propag. 30, 1982).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtradar.kernels.elementary import dot, fast_phasor
+from rtradar.kernels.jit import compiled, inlined
+
+
+class Triangles(NamedTuple):
+    """Triangles, and the currents over their edges: edge i is opposite to corner i."""
+
+    corners: Any  # (triangle, corner, 3) [m]
+    faces: Any  # (triangle, corner) int64: which corners are one and the same
+    normals: Any  # (triangle, 3), outward
+    areas: Any  # (triangle,) [m^2]
+    scales: Any  # (triangle, edge): length of the edge over twice the area, signed [1/m]
+
+
+class Orbits(NamedTuple):
+    """How the currents combine to ones of even or odd parity at the mirror planes."""
+
+    tested: Any  # (tested,) int64: one triangle of each set of mirror images
+    weights: Any  # (tested,): one over the number of reflections that keep it
+    unknown: Any  # (triangle, edge) int64
+    parity: Any  # (parity, triangle, edge): 1, -1, or 0 where there is no such current
+
+
+class Rules(NamedTuple):
+    """Quadrature of one triangle, and of two."""
+
+    places: Any  # (point, corner): barycentric
+    weights: Any  # (point,), their sum is 1
+    pairs: Any  # four of (pair of points, 7): barycentric on both, and weights whose sum is 1, for
+    # triangles that share nothing, a corner, an edge, or all
+
+
+class Equation(NamedTuple):
+    """Wavenumber [1/m], and the weight of the electric field beside the magnetic one."""
+
+    wavenumber: float
+    electric: float
+
+
+@inlined()
+def place_on(corners, place, axis):
+    """One coordinate of the point that has these barycentric coordinates."""
+    return corners[0, axis] * place[0] + corners[1, axis] * place[1] + corners[2, axis] * place[2]
+
+
+@compiled(fastmath={"reassoc", "contract", "nsz", "arcp"})
+def fill_moments(triangles, edge_of, rules, equation, antennas, out):
+    """Add to ``out (2, antenna, edge)`` the products of each current with the field of a dipole.
+
+    The ``antennas (antenna, 2, 3)`` are positions [m] and unit moments; their fields are those of
+    `rtradar.full_wave.antennas.Dipole`. First is the product with the electric field, then that
+    with the field that the equation has on its other side.
+    """
+    k, electric = equation.wavenumber, equation.electric
+    point = np.empty(3)
+    for antenna in range(len(antennas)):
+        position, moment = antennas[antenna, 0], antennas[antenna, 1]
+        from_origin = math.sqrt(dot(position, position))
+        for t in range(len(triangles.areas)):
+            corners, normal = triangles.corners[t], triangles.normals[t]
+            n_moment = dot(normal, moment)
+            for p in range(len(rules.weights)):
+                for axis in range(3):
+                    point[axis] = place_on(corners, rules.places[p], axis)
+                away = point[0] - position[0], point[1] - position[1], point[2] - position[2]
+                distance = math.sqrt(dot(away, away))
+                # The path beyond that to the origin, without the cancellation of far antennas.
+                squares = dot(point, point) - 2 * dot(point, position)
+                cosine, sine = fast_phasor(-k * squares / (distance + from_origin))
+                wave = complex(cosine, sine) * (from_origin / distance)
+                inverse = 1 / (k * distance)
+                n_unit, along = dot(normal, away) / distance, dot(moment, away) / distance
+                # Parts along the moment and along the ray, of both fields.
+                magnetic = (1 - electric) * complex(1.0, -inverse)
+                by_moment = complex(1 - inverse**2, -inverse)
+                by_ray = -along * complex(1 - 3 * inverse**2, -3 * inverse)
+                weight = rules.weights[p] * triangles.areas[t]
+                for i in range(3):
+                    x, y, z = (
+                        point[0] - corners[i, 0], point[1] - corners[i, 1], point[2] - corners[i, 2]
+                    )  # fmt: skip
+                    m = x * moment[0] + y * moment[1] + z * moment[2]
+                    u = (x * away[0] + y * away[1] + z * away[2]) / distance
+                    shape = wave * (weight * triangles.scales[t, i])
+                    field = by_moment * m + by_ray * u
+                    jump = magnetic * (u * n_moment - m * n_unit)
+                    out[0, antenna, edge_of[t, i]] += shape * field
+                    out[1, antenna, edge_of[t, i]] += shape * (electric * field + jump)
+
+
+def moments_reference(triangles, edge_of, rules, equation, antennas):
+    """Products of `fill_moments`, antenna by antenna in plain NumPy."""
+    electric = equation.electric
+    out = np.zeros((2, len(antennas), int(edge_of.max()) + 1), dtype=np.complex128)
+    points = np.einsum("pc,tcx->tpx", rules.places, triangles.corners)
+    currents = (points[:, None] - triangles.corners[:, :, None]) * triangles.scales[..., None, None]
+    for antenna, (position, moment) in enumerate(antennas):
+        field, magnetic = _dipole_reference(points, position, moment, equation.wavenumber)
+        jump = np.cross(triangles.normals[:, None], magnetic)
+        both = np.stack([field, electric * field + (1 - electric) * jump])
+        products = np.einsum("tipx,ftpx,p,t->fti", currents, both, rules.weights, triangles.areas)
+        for side in range(2):
+            np.add.at(out[side, antenna], edge_of, products[side])
+    return out
+
+
+def _dipole_reference(points, position, moment, k):
+    """Electric field of a dipole, and magnetic field times the impedance of free space."""
+    ray = points - position
+    distance = np.linalg.norm(ray, axis=-1, keepdims=True)
+    ray, j_by_kr = ray / distance, 1j / (k * distance)
+    wave = np.exp(-1j * k * (distance - np.linalg.norm(position)))
+    wave = wave * np.linalg.norm(position) / distance
+    along = (ray @ moment)[..., None] * ray
+    field = (1 - j_by_kr + j_by_kr**2) * moment - (1 - 3 * j_by_kr + 3 * j_by_kr**2) * along
+    return wave * field, wave * (1 - j_by_kr) * np.cross(ray, moment)

@@ -1,0 +1,168 @@
+"""Closed conducting meshes by the combined field: against Mie, modes, and the laws of fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.full_wave import ClosedMesh, ConductingSurface
+from rtradar.full_wave.surfaces_quadrature import rules
+
+RADIUS_M = 0.1
+FAR = np.array([[1e5, 0.0, 0.0]])
+
+
+def frequency_of(ka: float) -> float:
+    return ka / RADIUS_M * SPEED_OF_LIGHT_MPS / (2 * np.pi)
+
+
+def ball(subdivisions: int) -> Any:
+    """A sphere whose flat triangles have its volume."""
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=RADIUS_M)
+    mesh.apply_scale((4 / 3 * np.pi * RADIUS_M**3 / mesh.volume) ** (1 / 3))
+    return mesh
+
+
+def closed(mesh: Any) -> ClosedMesh:
+    return ClosedMesh(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int64))
+
+
+def decibels(ratio: Any) -> float:
+    return float(np.abs(20 * np.log10(np.abs(ratio))).max())
+
+
+# 2.7437 and 4.4934 are resonances of the inside: TM 101 and TE 101.
+@pytest.mark.parametrize(("ka", "tolerance_db"), [(1.0, 0.05), (2.7437, 0.1), (3.0, 0.1)])
+@pytest.mark.parametrize("polarization", ["v", "h"])
+def test_a_sphere_scatters_as_mie_has_it(ka: float, tolerance_db: float, polarization: Any) -> None:
+    """480 edges, of 0.05 to 0.14 wavelengths; the error goes as their square."""
+    frequency = frequency_of(ka)
+    found = ConductingSurface(closed(ball(2)), frequency).scattering_length(FAR, FAR, polarization)
+    mie = rt.rcs.sphere(RADIUS_M, frequency)
+    assert decibels(found / mie) <= tolerance_db
+    assert abs(found[0] / mie - 1) <= 0.02
+
+
+def test_the_error_falls_with_the_square_of_the_edges() -> None:
+    frequency = frequency_of(2.5)
+    errors = [
+        abs(
+            ConductingSurface(closed(ball(level)), frequency).scattering_length(FAR, FAR, "v")[0]
+            / rt.rcs.sphere(RADIUS_M, frequency)
+            - 1
+        )
+        for level in (2, 3)
+    ]
+    assert 3 < errors[0] / errors[1] < 5
+
+
+def test_mirror_planes_change_nothing_but_the_cost() -> None:
+    """A turn about z leaves one of the three mirror planes of the mesh."""
+    turned = ball(1)
+    turn = trimesh.transformations.rotation_matrix(0.3, [0, 0, 1])
+    turned.apply_transform(turn)
+    fields = []
+    for mesh, rotation in ((ball(1), np.eye(3)), (turned, turn[:3, :3])):
+        surface = ConductingSurface(closed(mesh), frequency_of(1.0))
+        fields.append(
+            surface.scattering_length(
+                np.array([[2.0, 0.4, 0.3]]) @ rotation.T, np.array([[-1.0, 2, 1]]) @ rotation.T, "v"
+            )[0]
+        )
+    assert closed(ball(1)).mirror_axes == (0, 1, 2)
+    assert closed(turned).mirror_axes == (2,)
+    # Triangles that touch begin at other corners, and their integrals are good to 1e-4.
+    assert fields[0] == pytest.approx(fields[1], rel=1e-4)
+
+
+def test_tx_and_rx_may_be_exchanged() -> None:
+    block = trimesh.creation.box((0.1, 0.07, 0.05)).subdivide().subdivide()
+    surface = ConductingSurface(closed(block), 1e9)
+    tx, rx = np.array([[1.0, 0.3, 0.2]]), np.array([[0.4, -0.8, 0.5]])
+    there = surface.scattering_length(tx, rx, "v")
+    # Equations of the magnetic field, tested so, keep reciprocity only up to the mesh.
+    assert there == pytest.approx(surface.scattering_length(rx, tx, "v"), rel=0.01)
+
+
+def test_near_antennas_see_what_the_modes_give() -> None:
+    sphere = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], np.full((1, 3), RADIUS_M))
+    near, beside = [0.4, 0.1, 0.2], [0.2, 0.35, -0.1]
+    by_modes, by_surface = (
+        rt.scattering_length(target, near, beside, frequency_of(2.0), fidelity="full-wave")
+        for target in (sphere, ball(2))
+    )
+    assert by_surface == pytest.approx(by_modes, rel=0.02)
+
+
+def test_coarse_meshes_are_divided() -> None:
+    block = closed(trimesh.creation.box((0.1, 0.1, 0.1)))
+    surface = ConductingSurface(block, 2e9)  # edges of 115 mm, of which an eighth is allowed: 19
+    assert surface.mesh.unknowns == 4**3 * block.unknowns
+    corners = surface.mesh.triangles.corners
+    volume = np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert volume == pytest.approx(1e-3)
+
+
+def test_integrals_of_touching_triangles() -> None:
+    """Polynomials exactly, and the mean of 1/R on one triangle by its closed form.
+
+    The closed form is that of T. F. Eibert, V. Hansen, IEEE Trans. Antennas Propag. 43, 1995.
+    """
+    for pairs in rules(6).pairs[1:]:
+        one, other, weights = pairs[:, :3], pairs[:, 3:6], pairs[:, 6]
+        moment = np.sum(weights * one[:, 0] * one[:, 1] ** 2 * other[:, 0] * other[:, 2] ** 2)
+        assert moment == pytest.approx((2 * 2 / 120) ** 2)  # 2 a! b! c! / (a + b + c + 2)! squared
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    sides = np.array([1, 1, np.sqrt(2)])
+    mean = -4 / 3 * np.sum(np.log(1 - sides / (sides.sum() / 2)) / sides)
+    same = rules(6).pairs[3]
+    distance = np.linalg.norm((same[:, :3] - same[:, 3:6]) @ corners, axis=1)
+    assert np.sum(same[:, 6] / distance) == pytest.approx(mean, rel=1e-5)
+
+
+def open_box() -> Any:
+    mesh = trimesh.creation.box((0.1, 0.1, 0.1))
+    mesh.update_faces(np.arange(len(mesh.faces)) > 1)
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"target": open_box()}, "the mesh is open; .*close its holes"),
+        ({"material": "skin"}, "perfect conductors alone"),
+        ({"frequency": 100e9}, r"at 100 GHz the mesh has \d+ edges.*48083 are allowed"),
+    ],
+)
+def test_what_cannot_be_solved_is_refused(options: dict[str, Any], message: str) -> None:
+    given: dict[str, Any] = {"target": ball(1), "tx": FAR, "rx": FAR, "frequency": 1e9} | options
+    with pytest.raises(InputError, match=message):
+        rt.scattering_length(fidelity="full-wave", **given)
+
+
+def test_meshes_must_be_closed_and_face_outward() -> None:
+    vertices, faces = np.eye(4, 3), np.array([[3, 1, 0], [3, 2, 1], [3, 0, 2], [0, 1, 2]])
+    assert ClosedMesh(vertices, faces).unknowns == 6
+    with pytest.raises(InputError, match="not closed"):
+        ClosedMesh(vertices, faces[:3])
+    with pytest.raises(InputError, match="clockwise"):
+        ClosedMesh(vertices, faces[:, ::-1])
+
+
+def test_two_bodies_are_one_problem() -> None:
+    """Far apart they scatter as the sum of both, each with its own phase."""
+    frequency, place = frequency_of(1.0), np.array([0.0, 40 * RADIUS_M, 0.0])
+    one, other = ball(1), ball(1)
+    other.apply_translation(place)
+    both = ConductingSurface(closed(trimesh.util.concatenate([one, other])), frequency)
+    tx: NDArray[np.float64] = FAR
+    alone = ConductingSurface(closed(one), frequency).scattering_length(tx, tx, "v")
+    # What they send each other falls with the distance: here by 1/40.
+    assert both.scattering_length(tx, tx, "v") == pytest.approx(2 * alone, rel=0.05)
