@@ -49,12 +49,14 @@ def facet_scattering(
     """Co-polar scattering length (n,) by physical optics.
 
     Where Tx and Rx are up to 0.2 rad apart as the target sees them it is the reciprocal form of
-    :eq:`po`, of what both see, as in a radar, with :eq:`facet` for each facet. Farther apart it is that of :eq:`po-bistatic`: the
+    :eq:`po`, of what both see, as in a radar. Farther apart it is that of :eq:`po-bistatic`: the
     currents on all that Tx lights radiate to Rx wherever other parts do not stand between, through
     their own part too. Of a closed mesh, what stands between is what is met after the way has left
     it. There Tx and Rx may not be exchanged; from one form to the other the field changes by up to
-    1 %. Parameters, returns and errors are those of `scattering_length`; ``facets`` is the least
-    number per ellipsoid, None for 0.1 dB up to ka = 400.
+    1 %. For each facet it is :eq:`facet`.
+
+    Parameters, returns and errors are those of `scattering_length`; ``facets`` is the least number
+    per ellipsoid, None for 0.1 dB up to ka = 400.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
