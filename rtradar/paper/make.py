@@ -147,7 +147,8 @@ def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> N
         rows = [(_LABELS[name], getattr(item, name).replace("`", "")) for name in TEXTS]
         drawn = "" if item.picture is None else picture(item.title, folder / item.picture)
         sections.append(
-            f'<section id="{item.id}"><h2>{item.title}</h2>{table(rows)}{drawn}</section>\n'
+            f'<section id="{item.id}"><h2>{item.title}</h2>'
+            f'<div class="item">{table(rows)}</div>{drawn}</section>\n'
         )
     seconds = sum(part["wall_s"] for part in content["parts"].values())
     about = f"Who moves: {sources.named}. Measured in {seconds:.0f} s"

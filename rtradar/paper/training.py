@@ -34,17 +34,7 @@ class SpatialClouds(Collection):
     """
 
     def points(self, index: int) -> NDArray[np.float64]:
-        """Read x, y and z [m] of points of the spatial cloud, in random order.
-
-        Parameters
-        ----------
-        index : int
-            Number of the sample, from 0.
-
-        Returns
-        -------
-        (point, 3) float64
-        """
+        """Draw x, y and z [m] of points of the spatial cloud, (point, 3), for one sample."""
         points = self.spatial(index)
         random = np.random.default_rng(stream(0, index))
         count = int(SIZES[-1])
