@@ -14,8 +14,9 @@ from rtradar.classify.splits import make_splits
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.recognition.description import OUTLINE, describe
 from rtradar.recognition.recogniser import Recogniser
-from rtradar.recognition.windows import cut_windows, describe
+from rtradar.recognition.windows import cut_windows
 from rtradar.system.seeds import word
 
 MERGED = {"boxing": "punch"}
@@ -70,7 +71,7 @@ def train_recogniser(clouds: Collection, radar: Radar, *, seed: int = 0) -> Reco
         "temperature": best_temperature(answers),
         "radar": _limits(radar),
         "snr_db": [float(snr_db.min()), float(snr_db.max())],
-        "usual": _usual(described),
+        "usual": _usual(described[:, :OUTLINE]),
         "clouds": dict(Counter(clouds.labels.tolist())),
         "people": len(set(subjects.tolist())),
         "held_out_accuracy": balanced_accuracy(answers),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.recognition.windows import describe
+from rtradar.recognition.description import describe, outline
 from rtradar.system.files import atomic_file, read_arrays
 
 WEIGHTS = Path(__file__).with_name("weights.npz")
@@ -28,7 +28,7 @@ LEAST_POINTS = 24
 
 _MOST_BYTES = 5_000_000
 _TYPES = {
-    "roots": "i4", "feature": "i1", "threshold": "f4", "below": "i4", "above": "i4",
+    "roots": "i4", "feature": "i2", "threshold": "f4", "below": "i4", "above": "i4",
     "chances": "f2",
 }  # fmt: skip
 """Arrays of a forest: the first node of each tree, and of each node the number that is compared (-1
@@ -48,7 +48,7 @@ class Recogniser:
     card : dict
         ``classes``, ``temperature`` by which the logarithms of probabilities are divided, ``radar``
         (`range_bin_m`, `velocity_bin_mps`, `max_velocity_mps`), ``snr_db`` (least, most),
-        ``usual`` (``mean``, ``inverse_covariance``, ``most`` distance of `describe`), and texts.
+        ``usual`` (``mean``, ``inverse_covariance``, ``most`` distance of outlines), and texts.
     """
 
     forest: dict[str, NDArray[Any]]
@@ -117,10 +117,10 @@ class Recogniser:
     def distance(self, windows: list[NDArray[np.float64]]) -> float:
         """Return how unusual the windows are: 1 for one of 200 of those that were learnt from.
 
-        It is the median Mahalanobis distance of their descriptions, relative to that limit.
+        It is the median Mahalanobis distance of their outlines, relative to that limit.
         """
         usual = self.card["usual"]
-        found = [describe(window) for window in windows if len(window) >= LEAST_POINTS]
+        found = [outline(window) for window in windows if len(window) >= LEAST_POINTS]
         if not found:
             return np.inf
         away = np.array(found) - usual["mean"]

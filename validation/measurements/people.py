@@ -22,13 +22,14 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from sklearn.ensemble import ExtraTreesClassifier
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.ensemble import ExtraTreesClassifier, VotingClassifier
 from sklearn.metrics import confusion_matrix
 from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from rtradar.classify.baselines import axis_features, rdt_features
+from rtradar.classify.baselines import axis_features
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import EDGES, SMALL
 from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
@@ -38,6 +39,7 @@ from rtradar.classify.training import Examples, predict, train_network
 from rtradar.classify.weights import MERGED
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
+from rtradar.recognition.description import describe
 from rtradar.recognition.windows import cut_windows
 
 HEAD = """
@@ -175,11 +177,40 @@ def told(title: str, answers: Answers) -> None:
 
 
 def forest() -> Any:
+    """Extremely randomised trees, as those of the weights of the package."""
     return ExtraTreesClassifier(200, class_weight="balanced", min_samples_leaf=2, random_state=0)
 
 
+def linear() -> Any:
+    """Linear discriminant analysis, whose covariance is shrunk as Ledoit and Wolf say."""
+    return make_pipeline(
+        StandardScaler(), LinearDiscriminantAnalysis(solver="lsqr", shrinkage="auto")
+    )
+
+
+def both() -> Any:
+    """The mean of both, which err in different ways."""
+    return VotingClassifier([("forest", forest()), ("linear", linear())], voting="soft")
+
+
 def centroid() -> Any:
+    """The class whose mean description is nearest."""
     return make_pipeline(StandardScaler(), NearestCentroid())
+
+
+MODELS = {"forest": forest, "linear": linear, "both": both}
+"""What learns from descriptions, by name."""
+
+
+def windows_of(clouds: Collection) -> list[NDArray[np.float64]]:
+    """Cut the ends off each cloud, as is done for the weights of the package."""
+    lengths = clouds.column("duration_s").astype(float)
+    return [cut_windows(clouds.points(k), length_s)[0] for k, length_s in enumerate(lengths)]
+
+
+def described(clouds: Collection) -> NDArray[np.float64]:
+    """Describe each cloud, (cloud, number), as is done for the weights of the package."""
+    return np.array([describe(window) for window in windows_of(clouds)])
 
 
 def left_out(
@@ -201,33 +232,58 @@ def left_out(
     return chances
 
 
-def one_axis(actors: Collection, recorded: Collection) -> None:
-    """What time, range or velocity alone tells, of actors and of recordings that are cut alike."""
+def one_axis(actors: Collection, recorded: Collection, draws: int = 5) -> None:
+    """What time, range or velocity alone tells, of actors and of recordings that are cut alike.
+
+    More clouds teach more. So the forest learns from as many of each activity: of as many as the
+    rarer side has, drawn some times.
+    """
+    sides = {"actors": actors, "recorded": recorded}
+    truths = {title: classes_of(clouds)[1] for title, clouds in sides.items()}
+    least = np.min([np.bincount(truth) for truth in truths.values()], axis=0)
     for axis, name in enumerate(("time", "range", "velocity")):
-        for title, clouds in (("actors", actors), ("recorded", recorded)):
-            _, truth = classes_of(clouds)
-            groups = subjects_of(clouds) % 20  # twenty parts of people are enough
-            chances = left_out(axis_features(clouds, axis), truth, groups, forest)
-            told(f"{name} alone, {title}, other people", answers_of(clouds, chances, truth))
+        for title, clouds in sides.items():
+            features, truth = axis_features(clouds, axis), truths[title]
+            groups, found = subjects_of(clouds) % 20, []  # twenty parts of people are enough
+            for draw in range(draws):
+                some = alike(truth, least, draw)
+                chances = left_out(features[some], truth[some], groups[some], forest)
+                found.append(balanced_accuracy(answers_of(clouds, chances, truth, some)))
+            print(
+                f"{name} alone, {title}, other people, {least.tolist()} clouds: "
+                f"{np.mean(found):.1%}, of {draws} draws {min(found):.1%} to {max(found):.1%}",
+                flush=True,
+            )
+
+
+def alike(truth: NDArray[np.int64], counts: NDArray[np.int64], seed: int) -> NDArray[np.int64]:
+    """Draw so many clouds of each class; return their indices."""
+    random = np.random.default_rng(seed)
+    drawn = [
+        random.permutation(np.flatnonzero(truth == one))[:count] for one, count in enumerate(counts)
+    ]
+    return np.concatenate(drawn)
 
 
 def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
     """Learn from actors and ask about recordings."""
     _, learnt = classes_of(actors)
     names, truth = classes_of(recorded)
-    x, asked = rdt_features(actors), rdt_features(recorded)
-    for title, make in (("nearest centroid", centroid), ("forest", forest)):
+    x, asked = described(actors), described(recorded)
+    for title, make in (("nearest centroid", centroid), *MODELS.items()):
         told(title, answers_of(recorded, make().fit(x, learnt).predict_proba(asked), truth))
     for recipe in (SMALL, EDGES):
         sets = [
             Examples(stack_clouds(one, edge_s=recipe.edge_s), torch.from_numpy(those), names)
             for one, those in ((actors, learnt), (recorded, truth))
         ]
-        each = []
+        each: list[NDArray[np.float64]] = []
         for seed in range(seeds):
             network, _ = train_network(*sets, recipe, seed=seed)
             each.append(np.exp(predict(network, sets[1], recipe)).astype(np.float64))
             told(f"network '{recipe.name}', seed {seed}", answers_of(recorded, each[-1], truth))
+        if not each:
+            continue
         mean = answers_of(recorded, np.mean(each, axis=0), truth)
         by_source(f"network '{recipe.name}', {seeds} seeds averaged", mean, names)
 
@@ -259,31 +315,54 @@ def shipped(recorded: Collection) -> None:
 def people_left_out(actors: Collection, recorded: Collection) -> None:
     """Leave each person out, with and without actors; and what the data set alone tells."""
     _, learnt = classes_of(actors)
-    _, truth = classes_of(recorded)
-    groups, more = subjects_of(recorded), (rdt_features(actors), learnt)
+    names, truth = classes_of(recorded)
+    groups, more = subjects_of(recorded), (described(actors), learnt)
     subjects = recorded.column("subject").astype(str)
     sources = np.array([name.split("_")[0] for name in subjects])
-    features = rdt_features(recorded)
+    features = described(recorded)
     which = (sources[:, None] == np.unique(sources)).astype(float)
     told("data set alone", answers_of(recorded, left_out(which, truth, groups, forest), truth))
-    for title, make in (("nearest centroid", centroid), ("forest", forest)):
-        for beside, those in (("", None), (", actors beside", more)):
-            chances = left_out(features, truth, groups, make, those)
-            told(f"leave one person out, {title}{beside}", answers_of(recorded, chances, truth))
+    for beside, those in (("", None), (", actors beside", more)):
+        each = {
+            title: left_out(features, truth, groups, make, those)
+            for title, make in (("forest", forest), ("linear", linear))
+        }
+        each["both"] = (each["forest"] + each["linear"]) / 2
+        answers = {title: answers_of(recorded, some, truth) for title, some in each.items()}
+        for title, some in answers.items():
+            told(f"leave one person out, {title}{beside}", some)
+        by_source(f"leave one person out, chosen{beside}", chosen_on_others(answers), names)
     common = np.flatnonzero(np.isin(recorded.labels, ["jumping_jack", "punch"]))
     for beside, those in (("", None), (", actors beside", more)):
-        chances = left_out(features, truth, sources, forest, those)[common]
+        chances = left_out(features, truth, sources, both, those)[common]
         told(
             f"leave one data set out, jacks and punches{beside}",
             answers_of(recorded, chances, truth, common),
         )
 
 
+def chosen_on_others(each: dict[str, Answers]) -> Answers:
+    """For each person, take the answers of the model that knows most recordings of the others.
+
+    So what the best of several models knows is not flattered by the choice.
+    """
+    titles, first = list(each), next(iter(each.values()))
+    chances = np.zeros_like(first.probabilities)
+    for person in np.unique(first.subjects):
+        own = first.subjects == person
+        known = [
+            balanced_accuracy(Answers(*(column[~own] for column in each[title])).by_recording())
+            for title in titles
+        ]
+        chances[own] = each[titles[int(np.argmax(known))]].probabilities[own]
+    return first._replace(probabilities=chances)
+
+
 def learning_curve(actors: Collection, recorded: Collection, draws: int = 6) -> None:
     """Balanced accuracy by recording over the number of real people, with and without actors."""
     _, learnt = classes_of(actors)
     _, truth = classes_of(recorded)
-    x, features, groups = rdt_features(actors), rdt_features(recorded), subjects_of(recorded)
+    x, features, groups = described(actors), described(recorded), subjects_of(recorded)
     for count in (0, 2, 5, 10, 20, 30):
         found: dict[bool, list[float]] = {False: [], True: []}
         for draw in range(draws):
@@ -295,7 +374,7 @@ def learning_curve(actors: Collection, recorded: Collection, draws: int = 6) -> 
                     rows, y = np.concatenate([rows, x]), np.concatenate([y, learnt])
                 if not len(y):
                     continue
-                model = forest().fit(rows, y)
+                model = both().fit(rows, y)
                 chances = np.zeros((np.count_nonzero(~learn), truth.max() + 1))
                 chances[:, model.classes_] = model.predict_proba(features[~learn])
                 asked = answers_of(recorded, chances, truth, ~learn)
@@ -306,7 +385,7 @@ def learning_curve(actors: Collection, recorded: Collection, draws: int = 6) -> 
 
 def channels(out: Path) -> None:
     """What clouds of few channels differ in from those of all, feature by feature."""
-    few, many = (rdt_features(Collection(out / f"channels_{name}")) for name in ("few", "all"))
+    few, many = (described(Collection(out / f"channels_{name}")) for name in ("few", "all"))
     spread = many.std(axis=0) + 1e-9
     off = np.abs(few.mean(axis=0) - many.mean(axis=0)) / spread
     print(
@@ -319,7 +398,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of data sets")
     parser.add_argument("--only", metavar="NAME,...", help="build only these data sets")
-    parser.add_argument("--seeds", type=int, default=3, help="trainings of each network")
+    parser.add_argument("--seeds", type=int, default=3, help="trainings of each network, or 0")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
