@@ -38,7 +38,7 @@ _ELECTRIC = 0.8
 """Weight of the electric field's equation. It is the more accurate one; a fifth of the other is
 enough at resonances of the inside."""
 
-_DOUBLE_UP_TO = 4000
+_DOUBLE_UP_TO = 6000
 """Number of edges up to which matrices are complex128; larger ones are complex64."""
 
 _ORDER = 4

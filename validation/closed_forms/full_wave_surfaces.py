@@ -122,7 +122,7 @@ def limb_rows(quick: bool) -> Iterator[Row]:
     angle = np.radians(np.linspace(0, 90, 19))
     radar = 4 * np.stack([np.cos(angle), 0.6 * np.sin(angle), 0.8 * np.sin(angle)], axis=1)
     limb = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], [[half_length, radius, radius]])
-    edges_m = (7.5e-3,) if quick else (6e-3, 4.5e-3)
+    edges_m = (6e-3,) if quick else (6e-3, 4.5e-3)
     for edge_m, polarization in product(edges_m, ("v", "h")):
         modes, surface = (
             rt.scattering_length(
