@@ -69,9 +69,10 @@ class ConductingSurface:
 
     Notes
     -----
-    The error falls with the square of the lengths of the edges. That of a curved surface is mostly
-    that of the flat triangles if their corners lie on it: with the corners moved outward, so that
-    the triangles are on average on the surface, it is several times smaller.
+    Equations :eq:`combined-field`, whose alpha is 0.8, and :eq:`received-current` of the theory
+    page. The error falls with the square of the lengths of the edges. That of a curved surface is
+    mostly that of the flat triangles if their corners lie on it: with the corners moved outward, so
+    that the triangles are on average on the surface, it is several times smaller.
     """
 
     mesh: ClosedMesh
