@@ -48,7 +48,7 @@ _TOGETHER = 64
 """Number of antennas whose fields are kept at once."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ConductingSurface:
     """Scattering by perfect conductors with closed surfaces, at one frequency.
 
@@ -81,10 +81,12 @@ class ConductingSurface:
     def __post_init__(self) -> None:
         mesh = self.mesh
         wavelength = 2 * np.pi / wavenumber(self.frequency_hz)
-        while np.sqrt(np.mean(mesh.lengths**2)) > LONGEST_EDGE * wavelength:
+        edge = float(np.sqrt(np.mean(mesh.lengths**2))) / wavelength
+        # Each division halves the edges, and makes four of each.
+        divisions = max(0, math.ceil(math.log2(edge / LONGEST_EDGE)))
+        _refuse_large(mesh, 4**divisions, self.frequency_hz)
+        for _ in range(divisions):
             mesh = mesh.divided()
-            _refuse_large(mesh, self.frequency_hz)
-        _refuse_large(mesh, self.frequency_hz)
         object.__setattr__(self, "mesh", mesh)
 
     @property
@@ -173,12 +175,12 @@ def _entries(mesh: ClosedMesh) -> int:
     return len(orbits.parity) * (1 + int(orbits.unknown.max())) ** 2
 
 
-def _refuse_large(mesh: ClosedMesh, frequency_hz: float) -> None:
-    planes = len(mesh.mirror_axes)
+def _refuse_large(mesh: ClosedMesh, parts: int, frequency_hz: float) -> None:
+    planes, edges = len(mesh.mirror_axes), parts * mesh.unknowns
     most = round(MOST_UNKNOWNS * math.sqrt(2) ** planes)
-    if mesh.unknowns > most:
+    if edges > most:
         raise InputError(
-            f"full-wave: at {frequency_hz / 1e9:g} GHz the mesh has {mesh.unknowns} edges, each "
+            f"full-wave: at {frequency_hz / 1e9:g} GHz the mesh has {edges} edges, each "
             f"with an unknown current; with {planes} mirror planes {most} are allowed: take a "
             "lower frequency, a coarser mesh or a smaller body"
         )

@@ -20,7 +20,7 @@ _SAME_PLACE = 1e-6
 """Distance over the size of the mesh below which a corner is the mirror image of another one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ClosedMesh:
     """A closed surface of triangles, whose corners run anticlockwise as seen from outside.
 

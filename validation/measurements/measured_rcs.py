@@ -245,8 +245,9 @@ def draw(_: list[Row], path: Path) -> None:
     )  # fmt: skip
     for row, (name, (aspect_deg, found)) in zip(grid, CURVES.items(), strict=False):
         for axes, polarization in zip(row, "VH", strict=True):
-            for level in LEVELS:
-                axes.plot(aspect_deg, found[level][polarization], linewidth=0.9, label=level)
+            # Both levels are nearly one curve.
+            for level, style in zip(LEVELS, ("-", "--"), strict=True):
+                axes.plot(aspect_deg, found[level][polarization], style, linewidth=1, label=level)
             own = found["full-wave"][polarization]
             axes.plot(aspect_deg, own, "black", linewidth=1.4, label="full-wave")
             if folder().is_dir():
