@@ -26,6 +26,7 @@ PACKAGES = {
     "rtradar.signal": "Signals",
     "rtradar.process": "Processing",
     "rtradar.rcs": "Closed forms",
+    "rtradar.full_wave": "Full wave",
     "rtradar.paper": "The paper",
 }
 """Packages with a page, and their titles, in the order of use."""

@@ -9,6 +9,7 @@ for exp(+j omega t)). The centres are on the z axis, so that every azimuthal mod
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -102,25 +103,31 @@ class SpherePair:
         right = -np.concatenate([project @ field for field in arriving])
         return np.linalg.solve(matrix, right).reshape(2, len(own), -1)
 
-    def plane_wave(self, tx: Array, field: Array, azimuths: int) -> Complex:
-        """Tangential field (mode, sphere, 2 nodes) of a plane wave from the unit vector ``tx``."""
+    def tangential(self, field: Callable[[Array], Complex], azimuths: int) -> Complex:
+        """Tangential part (mode, sphere, 2 nodes) of a field (..., 3) of points (..., 3)."""
         cosine, _ = self.nodes
         sine, angle = np.sqrt(1 - cosine**2)[:, None], 2 * np.pi * np.arange(azimuths) / azimuths
         out = []
         for height in self.heights:
-            x, y = self.radius * sine * np.cos(angle), self.radius * sine * np.sin(angle)
-            z = height + self.radius * cosine[:, None]
-            wave = np.exp(1j * self.wavenumber * (tx[0] * x + tx[1] * y + tx[2] * z))
-            level = field[0] * np.cos(angle) + field[1] * np.sin(angle)
-            theta = wave * (cosine[:, None] * level - sine * field[2])
-            phi = wave * (field[1] * np.cos(angle) - field[0] * np.sin(angle))
+            along = np.broadcast_to(height + self.radius * cosine[:, None], (len(sine), azimuths))
+            across = self.radius * sine
+            at = np.stack([across * np.cos(angle), across * np.sin(angle), along], axis=-1)
+            x, y, z = np.moveaxis(field(at), -1, 0)
+            theta = cosine[:, None] * (x * np.cos(angle) + y * np.sin(angle)) - sine * z
+            phi = y * np.cos(angle) - x * np.sin(angle)
             out.append(np.fft.fft(np.concatenate([theta, phi]), axis=1).T / azimuths)
         return np.stack(out, axis=1)
+
+    def plane_wave(self, case: Case) -> Callable[[Array], Complex]:
+        """Field of a plane wave from a far Tx, with the phase 0 at the origin."""
+        return lambda at: np.exp(1j * self.wavenumber * (at @ case.tx))[..., None] * case.sent
 
     def scattering_lengths(self, cases: list[Case]) -> Complex:
         """Scattering lengths (case,) [m] of far Tx and Rx."""
         azimuths = 2 * self.orders + 16
-        arriving = np.stack([self.plane_wave(one.tx, one.sent, azimuths) for one in cases], axis=-1)
+        arriving = np.stack(
+            [self.tangential(self.plane_wave(one), azimuths) for one in cases], axis=-1
+        )
         total = np.zeros(len(cases), dtype=np.complex128)
         for mode in range(self.orders + 1):
             # A mode below zero is that above, reflected in the plane of x and z.
@@ -133,6 +140,44 @@ class SpherePair:
                     waves = solved[:, :, number * len(cases) + index]
                     total[index] += self._far(mode, flip, waves, one)
         return -np.sqrt(4 * np.pi) * total / self.wavenumber
+
+    def near_scattering_length(self, case: Case) -> complex:
+        """Scattering length [m] of dipoles at places (3,) of a case, not in directions."""
+        azimuths = 2 * self.orders + 16
+        ranges = [float(np.linalg.norm(antenna)) for antenna in (case.tx, case.rx)]
+
+        def dipole(at: Array) -> Complex:
+            # Jackson, Classical Electrodynamics, eq. 9.18, over k^2.
+            away = at - case.tx
+            distance = np.linalg.norm(away, axis=-1, keepdims=True)
+            unit, x = away / distance, self.wavenumber * distance
+            along = (unit @ case.sent)[..., None] * unit
+            near = (3 * along - case.sent) * (1 / x**2 + 1j / x)
+            return (case.sent - along + near) * np.exp(-1j * x) / distance
+
+        arriving = self.tangential(dipole, azimuths)
+        around = float(np.arctan2(case.rx[1], case.rx[0]))
+        total = 0j
+        for mode in range(-self.orders, self.orders + 1):
+            flip = 1 if mode >= 0 else -1
+            sign = np.repeat([1, flip], len(self.nodes[0]))
+            solved = self.solve(abs(mode), (sign * arriving[mode])[..., None])[..., 0]
+            for height, waves in zip(self.heights, solved, strict=True):
+                away = case.rx - np.array([0.0, 0.0, height])
+                distance = float(np.linalg.norm(away))
+                cosine = np.array([away[2] / distance])
+                fields = self.waves(abs(mode), np.array([self.wavenumber * distance]), cosine)
+                radial, theta, phi = (complex(field[0] @ waves) for field in fields)
+                level = np.array([np.cos(around), np.sin(around), 0.0])
+                sine = float(np.hypot(*away[:2])) / distance
+                vector = (
+                    radial * away / distance
+                    + theta * (cosine * level - np.array([0.0, 0.0, sine]))
+                    + flip * phi * np.array([-level[1], level[0], 0.0])
+                )
+                total += np.exp(1j * mode * around) * (vector @ case.received)
+        path = np.exp(1j * self.wavenumber * sum(ranges)) * np.prod(ranges)
+        return complex(-np.sqrt(4 * np.pi) * path * total)
 
     def _far(self, mode: int, flip: int, waves: Complex, case: Case) -> complex:
         """Received field of the waves (sphere, wave) of a mode, or of that below zero (flip -1)."""

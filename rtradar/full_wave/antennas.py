@@ -85,7 +85,7 @@ class Dipole:
 
         Notes
         -----
-        C. A. Balanis, *Antenna Theory*, section 4.2: the infinitesimal dipole.
+        Equation :eq:`antenna-dipole` of the theory page.
         """
         at = np.asarray(points, dtype=np.float64)
         away = at - self.position

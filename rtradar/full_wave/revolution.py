@@ -6,7 +6,8 @@ there are unknowns. Every azimuthal mode is a problem of its own, and small. The
 solution of Maxwell's equations outside; only the boundary condition is approximate, and its
 `residual` says how well it holds. For the exterior problem has one solution at every frequency, a
 resonance of the interior does no harm. Of a penetrable body, sources outside of it make the field
-inside, and the tangential electric and magnetic fields are matched.
+inside, and the tangential electric and magnetic fields are matched. The fields of the sources are
+those of :eq:`huygens-source`.
 
 References
 ----------
@@ -20,21 +21,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import qr, solve_triangular
 
 from rtradar.errors import InputError
 from rtradar.full_wave.antennas import Dipole, Polarization, antenna_moments, wavenumber
+from rtradar.full_wave.least_squares import LeastSquares
 from rtradar.full_wave.revolution_curves import Rings, Spheroid
 from rtradar.full_wave.revolution_modes import Medium
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 
-LARGEST_BYTES = 3 * 2**30
+LARGEST_BYTES = 2 * 2**30
 """Memory of the factors beyond which bodies are refused."""
 
 _OF_THE_WAY = 0.75
@@ -42,9 +42,6 @@ _OF_THE_WAY = 0.75
 
 _LEAST_DEPTH = 0.6
 """Least depth of sources over `Sampling.depth`: nearer ones would be seen one by one."""
-
-_NEGLIGIBLE = 1e-13
-"""Pivot, relative to the largest one, below which a source adds nothing but rounding."""
 
 
 @dataclass(frozen=True)
@@ -62,36 +59,17 @@ class Sampling:
         fields, and a problem that rounding spoils sooner.
     oversampling : float
         Rings at which the boundary condition is asked for, over rings of sources.
+    inner_per_wavelength, inner_oversampling : float
+        The same two for the sources of the field inside of a penetrable body and for its shorter
+        wavelength. Its field on the surface is smoother than they are.
     """
 
     per_wavelength: float = 4.0
     least: int = 24
     depth: float = 12.0
     oversampling: float = 1.5
-
-
-class _Factor(NamedTuple):
-    """Pivoted orthogonal factors of one mode."""
-
-    q: Field  # (row, rank)
-    r: Field  # (rank, rank)
-    columns: NDArray[np.int64]  # (rank,)
-    unknowns: int
-
-    @classmethod
-    def of(cls, matrix: Field) -> _Factor:
-        """Factorise a matrix (row, unknown), and leave out what rounding has spoiled."""
-        q, r, pivots = qr(matrix, mode="economic", pivoting=True, check_finite=False)
-        size = np.abs(np.diagonal(r))
-        rank = int(np.count_nonzero(size > _NEGLIGIBLE * size[0]))
-        return cls(q[:, :rank], r[:rank, :rank], pivots[:rank], matrix.shape[1])
-
-    def solve(self, right: Field) -> tuple[Field, Array]:
-        """Least-squares solutions (unknown, case), and squares of what they leave (case,)."""
-        seen = self.q.conj().T @ right
-        out = np.zeros((self.unknowns, right.shape[1]), dtype=np.complex128)
-        out[self.columns] = solve_triangular(self.r, seen, check_finite=False)
-        return out, np.sum(np.abs(right - self.q @ seen) ** 2, axis=0)
+    inner_per_wavelength: float = 3.0
+    inner_oversampling: float = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +118,7 @@ class BodiesOfRevolution:
                 f"{self.frequency_hz / 1e9:g} GHz take {self.unknowns} unknowns in each of "
                 f"{self.modes} modes, {self.memory_bytes / 2**30:.1f} GiB; allowed are "
                 f"{LARGEST_BYTES / 2**30:.0f} GiB: take a smaller body or a lower frequency"
+                f"{', or bodies farther apart' if len(self.spheroids) > 1 else ''}"
             )
 
     # -- sizes -------------------------------------------------------------------------------------
@@ -179,10 +158,10 @@ class BodiesOfRevolution:
         image = body.image_depth(min(gaps)) / body.radius if gaps else np.inf
         return min(_OF_THE_WAY * body.innermost, image)
 
-    def _counts(self, wavenumber: float) -> list[int]:
+    def _counts(self, wavenumber: float, per_wavelength: float) -> list[int]:
         """Rings of sources of each body, for waves of that wavenumber."""
         longest = [max(body.radius, body.half_length) for body in self.spheroids]
-        wanted = [self.sampling.per_wavelength * wavenumber * size / 2 for size in longest]
+        wanted = [per_wavelength * wavenumber * size / 2 for size in longest]
         return [max(self.sampling.least, int(np.ceil(count))) for count in wanted]
 
     @cached_property
@@ -199,9 +178,9 @@ class BodiesOfRevolution:
     @cached_property
     def _outer(self) -> list[Rings]:
         """Sources inside of each body, whose fields are outside."""
-        depth = self.sampling.depth
-        found = []
-        for body, count in zip(self.spheroids, self._counts(self._k), strict=True):
+        depth, found = self.sampling.depth, []
+        counts = self._counts(self._k, self.sampling.per_wavelength)
+        for body, count in zip(self.spheroids, counts, strict=True):
             deepest = self._deepest(body)
             enough = max(count, int(np.ceil(_LEAST_DEPTH * depth / deepest)))
             found.append(body.rings(enough, -min(depth / enough, deepest)))
@@ -212,7 +191,7 @@ class BodiesOfRevolution:
         """Sources outside of each body, whose fields are inside; none where it conducts."""
         if self.permittivity is None:
             return []
-        counts = self._counts(self._inner_wavenumber.real)
+        counts = self._counts(self._inner_wavenumber.real, self.sampling.inner_per_wavelength)
         return [
             body.rings(count, self.sampling.depth / count)
             for body, count in zip(self.spheroids, counts, strict=True)
@@ -221,12 +200,12 @@ class BodiesOfRevolution:
     @cached_property
     def _surfaces(self) -> list[Rings]:
         """Rings of each body at which the boundary conditions are asked for."""
-        counts = [
-            max(len(rings) for rings in sources)
-            for sources in zip(self._outer, *filter(None, [self._inner]), strict=True)
-        ]
+        counts = [self.sampling.oversampling * len(rings) for rings in self._outer]
+        if self._inner:
+            within = [self.sampling.inner_oversampling * len(rings) for rings in self._inner]
+            counts = [max(pair) for pair in zip(counts, within, strict=True)]
         return [
-            body.rings(int(np.ceil(count * self.sampling.oversampling)))
+            body.rings(int(np.ceil(count)))
             for body, count in zip(self.spheroids, counts, strict=True)
         ]
 
@@ -241,8 +220,8 @@ class BodiesOfRevolution:
     # -- the problem of each mode ------------------------------------------------------------------
 
     @cached_property
-    def _factors(self) -> list[_Factor]:
-        return [_Factor.of(matrix) for matrix in self._matrices()]
+    def _factors(self) -> list[LeastSquares]:
+        return [LeastSquares.of(matrix) for matrix in self._matrices()]
 
     def _matrices(self) -> Iterator[Field]:
         """Tangential fields (row, unknown) of all sources, the matrix of each mode.

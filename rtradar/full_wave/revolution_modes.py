@@ -3,7 +3,8 @@
 A source is an electric current ``x`` (times the wave impedance) along a ring or along the
 generating curve, together with the magnetic current ``s n x x``, ``n`` the outward normal and ``s``
 plus or minus one: Huygens' source, which radiates to one side. Such a source of the other direction
-has the same field with E and H exchanged, so that H needs no integrals of its own.
+has the same field with E and H exchanged, so that H needs no integrals of its own. The fields are
+those of :eq:`huygens-source`.
 """
 
 from __future__ import annotations

@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.full_wave import BodiesOfRevolution, Spheroid
+from rtradar.scene import material
 
 FREQUENCY_HZ = 12e9
 WAVE_NUMBER = 2 * np.pi * FREQUENCY_HZ / SPEED_OF_LIGHT_MPS
@@ -113,6 +114,29 @@ def test_axes_in_any_order_are_the_same_body() -> None:
 def test_targets_that_it_does_not_take_are_refused(target: rt.Ellipsoids, says: str) -> None:
     with pytest.raises(InputError, match=says):
         full_wave(target, [9.0, 0.0, 0.0], [9.0, 0.0, 0.0])
+
+
+def test_an_antenna_too_near_is_warned_of() -> None:
+    sphere = bodies(0.0, axes=(0.02,) * 3, turn=Rotation.identity())
+    with pytest.warns(ValidityWarning, match=r"leaves .*% of the incident field"):
+        full_wave(sphere, [0.022, 0.0, 0.0], [1.0, 0.0, 0.0])
+
+
+def test_each_pair_of_antennas_may_have_its_own_frequency() -> None:
+    sphere = bodies(0.0, turn=ALONG_X)
+    frequencies, at = np.array([8e9, 12e9, 8e9]), np.array([[1.0, 0.0, 0.2]] * 3)
+    several = rt.scattering_length(sphere, at, at, frequencies, "full-wave")
+    single = [rt.scattering_length(sphere, at[0], at[0], f, "full-wave")[0] for f in frequencies]
+    np.testing.assert_allclose(several, single, rtol=1e-12)
+
+
+def test_a_body_of_skin_is_one_of_its_permittivity() -> None:
+    sphere = bodies(0.0, axes=(0.008,) * 3, turn=Rotation.identity())
+    at = [1.0, 0.2, 0.1]
+    length = rt.scattering_length(sphere, at, at, FREQUENCY_HZ, "full-wave", material="skin")
+    eta = complex(material("skin").eta(FREQUENCY_HZ))
+    same = BodiesOfRevolution((Spheroid(0.008, 0.008),), FREQUENCY_HZ, permittivity=eta)
+    assert length == pytest.approx(same.scattering_length(at, at), rel=1e-12)
 
 
 def test_options_it_does_not_have_are_refused() -> None:

@@ -1,0 +1,117 @@
+"""Every fidelity level against full wave: single parts of a body, and coaxial pairs of spheres.
+
+The truth is `full-wave`, which ``full_wave.py`` holds against Mie's series and against multipoles;
+no level has a part in it. Parts of a synthetic walker are perfect conductors at the origin, seen by
+one antenna at 4 m from along their axis to across it; frequencies are 12, 14 and 16 GHz. Figures
+are root mean squares over aspects and frequencies, of decibels and of the complex difference over
+the root mean square of the field. `reference` is here the same as `physical-optics`: nothing is
+interpolated. Figures are reported, not judged: optics is what it is.
+
+    python validation/other_methods/levels_against_full_wave.py [--quick] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterator
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.validate import rows
+from rtradar.validate.rows import Row, main
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import field_db, one_ellipsoid, rms
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+reported = partial(rows.reported, key="levels-against-full-wave")
+
+RANGE_M = 4.0
+LEVELS = ("analytic", "specular", "fresnel", "physical-optics", "reference", "rays")
+ASPECTS_DEG = (10.0, 30.0, 50.0, 70.0, 90.0)
+PAIR_ASPECTS_DEG = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
+PARTS = ("thigh", "forearm", "foot", "head", "upper torso")
+Polarization = Literal["v", "h"]
+
+
+def antennas(angles_deg: tuple[float, ...]) -> Array:
+    """Antennas (aspect, 3) at angles from the z axis, in the plane of x and z [m]."""
+    angle = np.radians(angles_deg)
+    return RANGE_M * np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=1)
+
+
+def field(
+    target: rt.Ellipsoids, at: Array, frequency: float, level: str, polarization: Polarization
+) -> Complex:
+    # Limits of validity are what is measured here.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rt.ValidityWarning)
+        return rt.scattering_length(target, at, at, frequency, level, polarization=polarization)
+
+
+def parts() -> dict[str, rt.Ellipsoids]:
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0))
+    names = [name.removeprefix("left ") for name in body.part_names]
+    return {name: one_ellipsoid(body.semi_axes[names.index(name)]) for name in PARTS}
+
+
+def part_rows(quick: bool) -> Iterator[Row]:
+    shapes = parts()
+    if quick:
+        shapes = {"head": shapes["head"]}
+    frequencies = (12e9,) if quick else (12e9, 14e9, 16e9)
+    at, gathered = antennas(ASPECTS_DEG), {}
+    for (name, target), polarization in product(shapes.items(), ("v", "h")):
+        truth = [field(target, at, f, "full-wave", polarization) for f in frequencies]
+        for level in LEVELS:
+            found = [field(target, at, f, level, polarization) for f in frequencies]
+            pair = np.concatenate(found), np.concatenate(truth)
+            gathered.setdefault(level, []).append(pair)
+            yield from compared(f"{name}, {polarization.upper()}, `{level}`", *pair)
+    for level, pairs in gathered.items():
+        decibels = rms(np.concatenate([field_db(found / truth) for found, truth in pairs]))
+        relative = rms([rms(found - truth) / rms(truth) for found, truth in pairs])
+        yield reported(f"all parts, `{level}`", "rms over parts", "dB", decibels)
+        yield reported(f"all parts, `{level}`", "rms over parts, complex", "%", 100 * relative)
+
+
+def compared(claim: str, found: Complex, truth: Complex) -> Iterator[Row]:
+    yield reported(claim, "rms", "dB", rms(field_db(found / truth)))
+    yield reported(claim, "rms, complex", "%", 100 * rms(found - truth) / rms(truth))
+
+
+def pair_rows(quick: bool) -> Iterator[Row]:
+    radius = 0.02 if quick else 0.05
+    levels = ("specular", "rays") if quick else LEVELS
+    at = antennas(PAIR_ASPECTS_DEG)
+    steep = np.array(PAIR_ASPECTS_DEG) >= 40
+    for gap, polarization in product((0.02,) if quick else (0.02, 0.10), ("v", "h")):
+        apart = 2 * radius + gap
+        centres = [[0.0, 0.0, -apart / 2], [0.0, 0.0, apart / 2]]
+        pair = rt.Ellipsoids(centres, [np.eye(3)] * 2, np.full((2, 3), radius))
+        truth = field(pair, at, 12e9, "full-wave", polarization)
+        for level in levels:
+            found = field(pair, at, 12e9, level, polarization)
+            claim = f"two spheres, gap {100 * gap:g} cm, {polarization.upper()}, `{level}`"
+            for name, some in (("40 to 90 degrees", steep), ("20 and 30 degrees", ~steep)):
+                error = rms(found[some] - truth[some]) / rms(truth[some])
+                yield reported(claim, f"rms, complex, {name}", "%", 100 * error)
+            worst = float(np.abs(field_db(found / truth))[steep].max())
+            yield reported(claim, "worst, 40 to 90 degrees", "dB", worst)
+
+
+def measure(quick: bool) -> list[Row]:
+    return [*part_rows(quick), *pair_rows(quick)]
+
+
+if __name__ == "__main__":
+    sys.exit(main("Every level against full wave.", measure))
