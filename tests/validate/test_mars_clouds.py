@@ -56,7 +56,7 @@ def take_of(mars: ModuleType, turn_deg: float) -> Any:
     nodes = motion.at(np.arange(16) * 0.1)[0][:, [NODES.index(name) for name in KINECT.values()]]
     x, y, z = np.moveaxis(nodes @ about.T + [2.0, -0.3, -0.9], -1, 0)
     joints = np.stack([-y, x, z], axis=-1)  # right, away, up
-    nothing = mars.Points(np.zeros((0, 3)), *(np.zeros(0, dtype=np.int64) for _ in range(3)))
+    nothing = mars.Points(np.zeros((0, 3)), *(np.zeros(0, dtype=np.int64) for _ in range(4)))
     return mars.Take(1, 0, np.arange(16), joints, tuple(KINECT), nothing)
 
 
@@ -114,6 +114,10 @@ def test_a_point_is_where_its_echo_comes_from(mars: ModuleType) -> None:
     assert points.doppler[strongest] == 3
     # A range bin is 3 cm, a bin of the sine of azimuth 6 cm there; elevation is by two rows alone.
     np.testing.assert_allclose(points.places[strongest], place, atol=0.08)
+    np.testing.assert_allclose(points.range_m, np.linalg.norm(points.places, axis=1))
     assert set(points.frame) == {7}
+    moved = points.shifted((0.1, 0.2, 0.3))
+    np.testing.assert_allclose(moved.places - points.places, [[0.1, 0.2, 0.3]] * len(points.level))
+    np.testing.assert_allclose(moved.range_m - points.range_m, 0.2)
     without = mars.detected(cube, 7, removal=False, threshold_db=15.0)
     assert without.doppler[without.level.argmax()] == 0

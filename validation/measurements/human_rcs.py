@@ -168,7 +168,7 @@ def figure(_: list[Row], path: Path) -> None:
     """Cross-sections of a standing adult by aspect, at all bands, in polar axes."""
     from matplotlib.figure import Figure
 
-    drawn = Figure(figsize=(10, 5.4), layout="constrained")
+    drawn = Figure(figsize=(10, 6.4), layout="constrained")
     for column, who in enumerate(HEIGHTS_M, start=1):
         axes = drawn.add_subplot(1, 2, column, projection="polar")
         angle = np.radians(np.append(aspects(ASPECTS), 360.0))
@@ -180,11 +180,11 @@ def figure(_: list[Row], path: Path) -> None:
         axes.set_theta_zero_location("N")
         axes.set_rlim(-25, 10)
         axes.set_title(
-            f"{who}, standing, conductor: cross-section [dBsm]\nby aspect [degree], 0 ahead"
+            f"{who}, standing, conductor:\ncross-section [dBsm] by aspect, 0 ahead", fontsize=11
         )
     lines, names = axes.get_legend_handles_labels()
     drawn.legend(lines, names, loc="outside lower center", ncols=len(lines))
-    drawn.savefig(path, dpi=130)
+    drawn.savefig(path, dpi=80)
 
 
 if __name__ == "__main__":

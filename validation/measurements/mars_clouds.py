@@ -46,9 +46,13 @@ SHORTEST = 8  # frames: the smoothing of shorter stretches is that of their ends
 
 
 class Points(NamedTuple):
-    """Points of frames, in the radar's axes: x right, y away, z up [m]."""
+    """Points of frames, in the radar's axes: x right, y away, z up [m].
+
+    The range is that of the range bin, whatever is known of the direction.
+    """
 
     places: Reals  # (point, 3)
+    range_m: Reals
     doppler: Ints  # bin, positive receding
     level: Reals  # magnitude, in any unit
     frame: Ints  # index of the frame in the take
@@ -56,9 +60,10 @@ class Points(NamedTuple):
     def of(self, kept: NDArray[np.bool_]) -> Points:
         return Points(*(values[kept] for values in self))
 
-    @property
-    def range_m(self) -> Reals:
-        return np.asarray(np.linalg.norm(self.places, axis=1))
+    def shifted(self, shift_m: tuple[float, float, float]) -> Points:
+        """The same points elsewhere; what is away is added to the range, and alone is."""
+        places = self.places + np.array(shift_m)
+        return self._replace(places=places, range_m=self.range_m + shift_m[1])
 
 
 @dataclass(frozen=True)
@@ -134,6 +139,7 @@ def _take(person: int, move: int, frames: Ints, stored: np.lib.npyio.NpzFile) ->
     points = stored["points"][own].astype(np.float64)
     measured = Points(
         points[:, :3],
+        np.linalg.norm(points[:, :3], axis=1),
         np.rint(points[:, 3] / DOPPLER_BIN_MPS).astype(np.int64),
         points[:, 4],
         stored["frame_of_point"][own].astype(np.int64) - frames[0],
@@ -208,9 +214,10 @@ def detected(
     level = np.abs(spectra[doppler, ..., np.arange(len(row))]).mean(axis=(1, 2))
     ahead = 1 - np.sum(sines**2, axis=1)
     directions = np.stack([-sines[:, 0], np.sqrt(ahead.clip(0)), sines[:, 1]], axis=1)
-    places = (row * range_bin_m(radar))[:, None] * directions
+    ranges = row * range_bin_m(radar)
+    places = ranges[:, None] * directions
     inside = (ahead >= 0) & (np.abs(places[:, ::2]) <= 1).all(axis=1) & (places[:, 1] <= 3)
-    found = Points(places, doppler, level, np.full(len(row), frame))
+    found = Points(places, ranges, doppler, level, np.full(len(row), frame))
     return found.of(inside)
 
 
