@@ -81,10 +81,10 @@ def _spatial(one: Mapping[str, Any] | None) -> str:
     if one is None:
         return "PointNet on spatial clouds has not been measured yet"
     return (
-        f"PointNet with the paper's settings and {one['points']} points, {one['folds']} folds of "
-        f"{one['clouds']} clouds: {one['spatial']:.1f} % on spatial clouds, {one['rdt']:.1f} % on "
-        f"the RDT clouds of the same captures ({one['script']}, commit {one['commit']} of "
-        f"{one['date']})"
+        f"PointNet with the paper's settings and {one['points']} points of {one['clouds']} clouds: "
+        f"{one['spatial']:.1f} % right on spatial clouds and {one['rdt']:.1f} % on the RDT clouds of "
+        f"the same captures, in {one['answers']} answers each ({one['script']}, commit "
+        f"{one['commit']} of {one['date']})"
     )
 
 

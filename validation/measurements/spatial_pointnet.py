@@ -36,7 +36,11 @@ def main() -> None:
     options = parser.parse_args()
     data = options.out / "clouds"
     build_dataset(SPEC, data)
-    found = {"script": Path(__file__).name, "points": options.points, "clouds": 0}
+    found = {
+        "script": Path(__file__).name,
+        "points": options.points,
+        "clouds": len(Collection(data)),
+    }
     kinds = {
         "spatial": (SpatialClouds, PAPER.changed(points=options.points, scaling="unit-sphere")),
         "rdt": (Collection, PAPER.changed(points=options.points)),
@@ -48,7 +52,7 @@ def main() -> None:
         percent = [100 * one.accuracy for one in study.outcomes]
         tested = sum(len(one.truth) for one in study.outcomes)
         print(f"{kind}: {np.mean(percent):.1f} % of {tested} clouds, folds {percent}", flush=True)
-        found |= {kind: float(np.mean(percent)), "folds": len(percent), "clouds": len(read(data))}
+        found |= {kind: float(np.mean(percent)), "folds": len(percent), "answers": tested}
     if options.json:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
