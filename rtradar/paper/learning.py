@@ -82,8 +82,8 @@ def _spatial(one: Mapping[str, Any] | None) -> str:
         return "PointNet on spatial clouds has not been measured yet"
     return (
         f"PointNet with the paper's settings and {one['points']} points of {one['clouds']} clouds: "
-        f"{one['spatial']:.1f} % right on spatial clouds and {one['rdt']:.1f} % on the RDT clouds of "
-        f"the same captures, in {one['answers']} answers each ({one['script']}, commit "
+        f"{one['spatial']:.1f} % right on spatial clouds and {one['rdt']:.1f} % on the RDT clouds "
+        f"of the same captures, in {one['answers']} answers each ({one['script']}, commit "
         f"{one['commit']} of {one['date']})"
     )
 
