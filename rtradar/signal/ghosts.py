@@ -40,6 +40,9 @@ _STREAMS = 8
 MOST_NODES = 3
 """Frequencies at which amplitudes may be given: those of a parabola."""
 
+_MEAN_OF_POWERS = np.array([[1.0, 0.0, 1 / 12]])
+"""Means of the powers 0 to 2 of u, from -1/2 to 1/2."""
+
 _TESTS, _POWER_CHIRPS = 6, 48
 
 AHEAD = 8
@@ -140,9 +143,10 @@ class GhostIf:
 
         # Flat echoes have their mean over the sweep, the others their amplitude in its middle.
         flat = self._kept[: len(self._kept) - len(self._changing)]
-        mean = _over_sweep(echoes.amplitude[..., flat], echoes, self._radar)
-        middle, *change = _over_sweep(echoes.amplitude[..., self._changing], echoes, self._radar)
-        level = np.concatenate([mean[0] + mean[2] / 12, middle], axis=2)
+        powers = _powers_of_u(echoes, self._radar)
+        (mean,) = _weighted(echoes.amplitude, _MEAN_OF_POWERS @ powers, flat)
+        middle, *change = _weighted(echoes.amplitude, powers, self._changing)
+        level = np.concatenate([mean, middle], axis=2)
         changes = np.array([parts(own) for own in change])
         return Anchors(by_tx(echoes.length[..., self._kept]), parts(level), changes)
 
@@ -179,7 +183,8 @@ def ghosts_within(
     if len(some.frequency) > MOST_NODES or radar.in_frames:
         return None, exact
     level, tilt, curve = (
-        (np.abs(own) ** 2).mean(axis=(0, 1)) for own in _over_sweep(some.amplitude, some, radar)
+        (np.abs(own) ** 2).mean(axis=(0, 1))
+        for own in _weighted(some.amplitude, _powers_of_u(some, radar), np.arange(len(some.part)))
     )
     strong = _worth(level, power_m2 * _SHARE)
     # Times the variances of u and of its square over the sweep.
@@ -216,18 +221,25 @@ def _error(found: GhostIf, model: GhostEchoes, radar: Radar) -> float:
     return float((np.abs(error) ** 2).mean())
 
 
-def _over_sweep(
-    amplitude: NDArray[np.complexfloating], echoes: Echoes, radar: Radar
-) -> NDArray[np.complex64]:
-    """Coefficients (power, chirp, rx, echo) of amplitudes (node, chirp, rx, echo), powers 0 to 2.
+def _powers_of_u(echoes: Echoes, radar: Radar) -> NDArray[np.float64]:
+    """Weights (power, node) of amplitudes at the nodes of echoes in each power 0 to 2 of u.
 
-    They are those of the polynomial through the nodes of the echoes, in u, which goes from -1/2 to
-    1/2 over the sweep.
+    The polynomial goes through the nodes; u goes from -1/2 to 1/2 over the sweep.
     """
     powers = powers_of_sample_number(echoes.frequency, radar, 0.5)
-    out = np.zeros((MOST_NODES, *amplitude.shape[1:]), dtype=np.complex64)
-    for own, weights in zip(out, powers.astype(np.float32), strict=False):
-        for weight, values in zip(weights, amplitude, strict=True):
+    return np.concatenate([powers, np.zeros((MOST_NODES - len(powers), powers.shape[1]))])
+
+
+def _weighted(
+    amplitude: NDArray[np.complexfloating],
+    weights: NDArray[np.float64],
+    which: NDArray[np.int64],
+) -> NDArray[np.complex64]:
+    """Sums (sum, chirp, rx, some) over the nodes of some amplitudes (node, chirp, rx, echo)."""
+    chosen = np.take(amplitude, which, axis=-1)
+    out = np.zeros((len(weights), *chosen.shape[1:]), dtype=np.complex64)
+    for own, row in zip(out, weights.astype(np.float32), strict=True):
+        for weight, values in zip(row, chosen, strict=True):
             own += weight * values
     return out
 
