@@ -12,6 +12,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -34,6 +35,8 @@ FAINT_DB = 40.0
 """Faces whose ghosts are expected further below the direct echoes are left out [dB]."""
 _FILLED = 0.9
 """Least part of its rectangle that a facet fills; it is reflected by that part."""
+_KEPT_PIECES = 64
+"""Pieces of furniture whose faces are kept for the next run."""
 _NARROWEST_M = 0.03
 """Faces that are narrower are not listed at all [m]."""
 _SIDES = (("front", "back"), ("left", "right"), ("top", "bottom"))
@@ -122,22 +125,9 @@ def _expected(
 
 def faces_of(piece: Furniture) -> Iterator[SolidFace]:
     """Yield the flat faces of a piece, the largest first: `wardrobe front`, `wardrobe front 2`."""
-    from trimesh import Trimesh  # slow to import
-
     triangles = piece.triangles()
-    mesh = Trimesh(triangles.vertices, triangles.faces, process=False)
-    planes: dict[tuple[float, ...], list[int]] = {}
-    for number in np.argsort(-mesh.facets_area, kind="stable").tolist():
-        normal, origin = mesh.facets_normal[number], mesh.facets_origin[number]
-        key = *(normal + 0.0).round(3).tolist(), float(round(origin @ normal, 3))
-        planes.setdefault(key, []).append(number)
-    found = []
-    for numbers in planes.values():
-        corners = [triangles.corners[mesh.facets[number]].reshape(-1, 3) for number in numbers]
-        made = _face(corners, mesh.facets_area[numbers], mesh.facets_normal[numbers[0]])
-        if made is not None:
-            found.append(made)
-    found.sort(key=lambda own: -own["fraction"] * own.pop("area"))
+    faces = np.asarray(triangles.faces, dtype=np.int64)
+    found = _flat_faces(triangles.vertices.tobytes(), faces.tobytes())
     count = Counter[str]()
     for own in found:
         looks = piece.axes.T @ np.cross(own["edge_u_m"], own["edge_v_m"])
@@ -150,6 +140,31 @@ def faces_of(piece: Furniture) -> Iterator[SolidFace]:
             sheet=not triangles.closed,
             **own,
         )
+
+
+@lru_cache(maxsize=_KEPT_PIECES)
+def _flat_faces(vertices: bytes, faces: bytes) -> tuple[dict[str, Any], ...]:
+    """Find the faces of a mesh, by its arrays float64 and int64, the largest first.
+
+    Every run in a room asks for them again, and they take half a second.
+    """
+    from trimesh import Trimesh  # slow to import
+
+    places = np.frombuffer(vertices).reshape(-1, 3)
+    mesh = Trimesh(places, np.frombuffer(faces, dtype=np.int64).reshape(-1, 3), process=False)
+    planes: dict[tuple[float, ...], list[int]] = {}
+    for number in np.argsort(-mesh.facets_area, kind="stable").tolist():
+        normal, origin = mesh.facets_normal[number], mesh.facets_origin[number]
+        key = *(normal + 0.0).round(3).tolist(), float(round(origin @ normal, 3))
+        planes.setdefault(key, []).append(number)
+    found = []
+    for numbers in planes.values():
+        corners = [places[mesh.faces[mesh.facets[number]]].reshape(-1, 3) for number in numbers]
+        made = _face(corners, mesh.facets_area[numbers], mesh.facets_normal[numbers[0]])
+        if made is not None:
+            found.append(made)
+    found.sort(key=lambda own: -own["fraction"] * own.pop("area"))
+    return tuple(found)
 
 
 def _face(corners: Sequence[Array], areas: Array, normal: Array) -> dict[str, Any] | None:
