@@ -25,6 +25,7 @@ from rtradar.scatter.common.polarization import (
     Surfaces,
     bisector,
     over_copolar,
+    received_from_conductor,
     sent_field,
     unit,
 )
@@ -253,10 +254,14 @@ def _left(
     """Co-polar field over that of the bare return, (node, keyframe, line, 2, rx_end, echo)."""
     out, back = (leg.arriving[..., chosen, :] for leg in legs)
     out, back = out[:, :, :, None], back[:, :, None]
-    arrives = sent[:, :, :, :, None], out, bisector(-out, -back)
-    returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
+    normals = bisector(-out, -back)
     # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
-    factor = np.asarray(-np.sum(received[:, :, :, None] * returned, axis=-1))
+    if around.surfaces.conduct:
+        factor = -received_from_conductor(sent, received, normals)
+    else:
+        arrives = sent[:, :, :, :, None], out, normals
+        returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
+        factor = np.asarray(-np.sum(received[:, :, :, None] * returned, axis=-1))
     own = np.flatnonzero(np.isin(chosen, known))
     if len(own):
         # The bare return of these holds the co-polar fraction of a conductor.

@@ -93,8 +93,9 @@ class EchoColumns:
     """The list of echoes of a room.
 
     First come all parts over each path without delays of slabs, then delayed ones as they are met.
-    ``path`` and ``part (echo,)`` int64 are those of each echo; ``echo`` lists the echo of each
-    column, ``met`` what its wave has met.
+    ``path`` and ``part (echo,)`` int64 are those of each echo, which is ``direct (echo,)`` if it
+    comes without a reflection at a wall; ``echo`` lists the echo of each column, ``met`` what its
+    wave has met.
     """
 
     def __init__(
@@ -108,6 +109,7 @@ class EchoColumns:
         self._columns = {(echo, AT_ONCE): echo for echo in self.echo}
         self._delays: SlabDelays | None = None
         self._settled = False
+        self.direct = np.array([not paths[path].order for path in self.path.tolist()], dtype=bool)
 
     def __len__(self) -> int:
         return len(self.echo)
@@ -116,11 +118,6 @@ class EchoColumns:
     def delayed(self) -> bool:
         """Whether slabs delay any of them."""
         return any(met != AT_ONCE for met in self.met)
-
-    @property
-    def direct(self) -> NDArray[np.bool_]:
-        """Whether each echo comes straight, without a reflection at a wall."""
-        return np.array([self._paths[path].order == 0 for path in self.path.tolist()])
 
     def column(self, echo: int, met: Met) -> int:
         """Return the column of an echo, a new one if it is the first; -1 if it was left out."""
@@ -139,7 +136,7 @@ class EchoColumns:
         self.echo = [int(number[self.echo[i]]) for i in chosen]
         self.met = [self.met[i] for i in chosen]
         self._columns = {key: i for i, key in enumerate(zip(self.echo, self.met, strict=True))}
-        self.path, self.part = self.path[echo], self.part[echo]
+        self.path, self.part, self.direct = self.path[echo], self.part[echo], self.direct[echo]
         self._delays, self._settled = None, True
 
     def not_followed(self) -> list[frozenset[str]]:

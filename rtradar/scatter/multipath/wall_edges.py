@@ -99,6 +99,26 @@ class WallEdges:
             ends = image(face.wall, ends, back=face.back)
         return along, weight
 
+    def crossed(self, origins: Array, targets: Array) -> list[int]:
+        """Return the walls whose middle planes any of some straight legs cross.
+
+        The ends (..., 3) [m] broadcast against each other. Most legs in a room cross none.
+        """
+        sides = [np.asarray(ends) @ self._normals.T - self._middles for ends in (origins, targets)]
+        across = sides[0] * sides[1] < 0
+        return np.flatnonzero(across.any(axis=tuple(range(across.ndim - 1)))).tolist()
+
+    @cached_property
+    def _normals(self) -> Array:
+        return np.array([wall.normal for wall in self.walls]).reshape(-1, 3)
+
+    @cached_property
+    def _middles(self) -> Array:
+        """Places of the middle planes of all walls along their normals [m]."""
+        corners = np.array([wall.corner_m for wall in self.walls]).reshape(-1, 3)
+        deep = np.array([wall.thickness_m for wall in self.walls]) / 2
+        return np.asarray((corners * self._normals).sum(axis=1) - deep)
+
     def passage(self, number: int, origins: Array, targets: Array) -> tuple[Bools, Field]:
         """Tell which straight legs pass through a wall, and how much of each.
 

@@ -146,10 +146,12 @@ class WallResponse(NamedTuple):
         spreading and without the phase of the section's length, and 0 behind metal. What goes past
         the edges of a wall, or through its openings, goes on as it is.
         """
+        crossed = self.edges.crossed(origins, targets)
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
         )
-        for number, wall in enumerate(self.walls):
+        for number in crossed:
+            wall = self.walls[number]
             across, met = self.edges.passage(number, origins, targets)
             if not across.any():
                 continue

@@ -164,3 +164,19 @@ def test_in_a_box_legs_run_as_between_endless_walls() -> None:
         np.testing.assert_array_equal(weight, valid)
         for mine, other in zip(places, along, strict=True):
             np.testing.assert_array_equal(mine, other)
+
+
+def test_walls_that_are_crossed_are_those_that_a_leg_passes_through() -> None:
+    surface = Surface(material=material("concrete"), thickness_m=0.2)
+    sides = ("near", "far", "right", "left", "floor", "ceiling")
+    box = room_walls((4.0, 3.0, 2.5), (-2.0, -1.5), dict.fromkeys(sides, surface))
+    edges = WallEdges(box, WAVELENGTH_M, ENDLESS_M)
+    rng = np.random.default_rng(0)
+    source, targets = np.array([0.0, 0.0, 1.0]), rng.uniform(-4, 4, (40, 3))
+    for target in targets[:, None]:
+        passed = [
+            number for number in range(len(box)) if edges.passage(number, source, target)[0].any()
+        ]
+        # A wall may be missed beside its edges, and its plane be crossed.
+        assert set(passed) <= set(edges.crossed(source, target))
+    assert WallEdges([], WAVELENGTH_M, ENDLESS_M).crossed(source, targets) == []
