@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from rtradar.motion.synthetic.figure import (
     ANKLE,
     HIP,
     HIP_Y,
-    LEFT,
     ROOT,
     SHANK,
     SIDES,
@@ -37,7 +37,7 @@ from rtradar.motion.synthetic.figure import (
 
 GRAVITY_MPS2 = 9.81
 
-ROLL = 0.29
+ROLL = 0.38
 """The heels lift and come down in this part of a contact, before take-off and after landing."""
 
 
@@ -52,18 +52,24 @@ class _Manner:
     """Number of jacks, or of pairs of jumps, between rests."""
     rest_s: float
     uneven: float
-    """Deviation of the times of single hops."""
+    """Deviation of the times of single hops, in hops."""
+    lopsided: float
+    """Cube root of how much longer than usual the feet stay apart, in fifths of a hop."""
     wide: float
     """Feet beyond the hip joints, where they are apart."""
     close: float
     """Feet relative to the hip joints, where they are together."""
     toes_out: float
+    astride: float
+    """How far one foot lands before the other where they are apart."""
     heels: float
     lift: float
     highest: float
     lowest: float
     late_s: float
-    """How much longer the arms move than in one hop."""
+    """How much longer the arms move than in one hop; so they rest at no end of their way."""
+    behind: float
+    """By which part of a contact the arms are behind the feet, or before them."""
     elbow: float
     elbow_swing: float
     overhead: float
@@ -82,18 +88,21 @@ class _Manner:
 
 _RANGES = {
     "hop_s": (0.5, 0.64),
-    "flight_s": (0.14, 0.265),
+    "flight_s": (0.14, 0.23),
     "jacks": (6.0, 20.0),
     "rest_s": (0.1, 0.4),
-    "uneven": (0.004, 0.014),
+    "uneven": (0.006, 0.02),
+    "lopsided": (-1.0, 1.0),
     "wide": (0.09, 0.23),
     "close": (0.75, 1.3),
     "toes_out": (4.0, 20.0),
-    "heels": (24.0, 36.0),
+    "astride": (-0.07, 0.07),
+    "heels": (20.0, 32.0),
     "lift": (0.007, 0.016),
     "highest": (112.0, 150.0),
     "lowest": (8.0, 20.0),
-    "late_s": (0.04, 0.16),
+    "late_s": (0.05, 0.16),
+    "behind": (-0.4, 0.5),
     "elbow": (6.0, 30.0),
     "elbow_swing": (0.0, 36.0),
     "overhead": (0.0, 60.0),
@@ -111,8 +120,12 @@ _JUMPS = _RANGES | {
     "jacks": (2.0, 5.0),
     "rest_s": (0.1, 1.2),
     "uneven": (0.01, 0.03),
+    "lopsided": (0.0, 0.0),
     "close": (0.8, 1.9),
     "toes_out": (0.0, 0.0),
+    "astride": (0.0, 0.0),
+    "late_s": (0.04, 0.16),
+    "behind": (0.0, 0.0),
     "lift": (0.008, 0.02),
     "elbow": (15.0, 60.0),
     "forward": (0.0, 10.0),
@@ -137,13 +150,15 @@ def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> 
     hop = manner.hop_s / subject.tempo
     # A hop of the same height takes as long at any tempo; only where contact would get too short it
     # must be lower.
-    flight = min(manner.flight_s * math.sqrt(subject.amplitude), 0.55 * hop)
+    longer = 0.2 * manner.lopsided**3  # a few people hurry in one of both positions, most do not
+    flight = min(manner.flight_s * math.sqrt(subject.amplitude), (0.55 - 0.5 * abs(longer)) * hop)
     number = 2 * round(manner.jacks)
     begin = -hop * (1 + subject.phase * (number - 2))
     uneven = np.random.default_rng(subject.manner)
     sets: list[list[_Flight]] = []
     while begin < until_s:
         late = hop * manner.uneven * np.clip(uneven.standard_normal(number), -2.0, 2.0)
+        late[1::2] += longer * hop
         begins = begin + 0.8 * hop + hop * np.arange(number) + late
         sets.append(
             [
@@ -199,6 +214,32 @@ def _hopping(
     return partial(_hops, subject, manner, _sets(subject, manner, duration_s, apart=apart))
 
 
+def _shortest_contact(all_sets: list[list[_Flight]]) -> float:
+    """Return the shortest time on the floor between two hops of a set [s]."""
+    return min(after.begin - hop.end for hops in all_sets for hop, after in pairwise(hops))
+
+
+def _level(height: float, heel: Array, track: float) -> float:
+    """Height of the root at take-off and landing [m], with a foot so far aside of the middle [m].
+
+    ``heel`` (3,) is how far the ankle is moved by the raised heel [m].
+    """
+    leg = 0.97 * (THIGH + SHANK) * height
+    below = math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
+    return float((ANKLE + ROOT - HIP) * height + heel[2] + below)
+
+
+def _turning(subject: Subject, manner: _Manner, t: Array) -> Array:
+    """Yaw (n,) of the hips [rad]: nobody faces exactly the same way all the time."""
+    swings = [
+        np.sin(
+            2 * np.pi * (rate * subject.tempo * t / manner.hop_s + subject.drawn(name, 0.0, 1.0))
+        )
+        for rate, name in ((0.5, "turn of a jack"), (0.31, "slow turn"))
+    ]
+    return np.asarray(0.5 * math.radians(manner.turn) * (swings[0] + swings[1]))
+
+
 def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
     hop_s = manner.hop_s / subject.tempo
@@ -216,7 +257,7 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         return keyed(t, times, [values[0], *reached[:-1]])
 
     span = all_sets[0][0].end - all_sets[0][0].begin
-    contact = hop_s - span
+    contact = _shortest_contact(all_sets)
     # The feet move sideways while they are well off the floor.
     apart = between((0.0, 1.0), -0.05 * span, -0.05 * span)
     # Heels lift before take-off and come down after landing, so that the legs need not be straight
@@ -234,14 +275,7 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
 
     close, wide = manner.close * HIP_Y * height, (HIP_Y + manner.wide * amplitude) * height
     heel = rolled(heels * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
-    leg = 0.97 * (THIGH + SHANK) * height
-    low, high = (
-        ANKLE * height
-        + heel[2]
-        + (ROOT - HIP) * height
-        + math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
-        for track in (wide, close)
-    )
+    low, high = (_level(height, heel, track) for track in (wide, close))
     z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))
     lowest, highest = (
         math.radians(manner.lowest),
@@ -249,25 +283,22 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
     )
     # Two moves of the arms that overlap are one that lasts longer.
     raised = sum(
-        0.5 * between((lowest, highest), 0.48 * contact + late, 0.45 * contact - late)
-        for late in (-manner.late_s / 2, manner.late_s / 2)
+        0.5 * between((lowest, highest), 0.48 * contact - late, 0.45 * contact + late)
+        for late in (
+            manner.behind * contact - manner.late_s / 2,
+            manner.behind * contact + manner.late_s / 2,
+        )
     )
     moving = np.sin(np.pi * (raised - lowest) / (highest - lowest)) ** 2
     lean = np.radians(manner.lean + manner.crouch * (height * ROOT - z) / (0.1 * height))
-    # Nobody faces exactly the same way all the time.
-    swings = [
-        np.sin(
-            2 * np.pi * (rate * subject.tempo * t / manner.hop_s + subject.drawn(name, 0.0, 1.0))
-        )
-        for rate, name in ((0.5, "turn of a jack"), (0.31, "slow turn"))
-    ]
-    turn = 0.5 * math.radians(manner.turn) * (swings[0] + swings[1])
+    turn = _turning(subject, manner, t)
     thorax = about(z=-turn, x=0.4 * turn, y=lean)
     ankles, feet, arms = {}, {}, {}
     for side, sign in SIDES.items():
         outward = about(z=sign * math.radians(manner.toes_out) * apart)
         across = sign * (close + (wide - close) * apart)
-        ankles[side] = outward.apply(ankle) + across[:, None] * LEFT
+        before = sign * manner.astride * height * apart
+        ankles[side] = outward.apply(ankle) + xyz(before, across, 0.0)
         feet[side] = outward * about(y=pitch)
         upper = thorax * about(
             x=sign * subject.uneven[side] * raised,
@@ -279,7 +310,7 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         )
         arms[side] = Arm(upper, fore, fore)
     return Pose(
-        root=xyz(0.03 * height * roll, 0.0, z),
+        root=xyz(0.015 * height * roll, 0.0, z),
         pelvis=about(z=turn, y=0.5 * lean),
         thorax=thorax,
         head=about(y=0.5 * lean),
