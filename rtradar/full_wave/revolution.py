@@ -40,9 +40,6 @@ LARGEST_BYTES = 2 * 2**30
 _OF_THE_WAY = 0.75
 """How far sources stand between the surface and the line between the foci, at most."""
 
-_LEAST_DEPTH = 0.6
-"""Least depth of sources over `Sampling.depth`: nearer ones would be seen one by one."""
-
 
 @dataclass(frozen=True)
 class Sampling:
@@ -57,6 +54,9 @@ class Sampling:
     depth : float
         Number of rings times their depth in the elliptic coordinate. Deeper sources make smoother
         fields, and a problem that rounding spoils sooner.
+    least_depth : float
+        Least number of rings times depth, over ``depth``, of bodies whose sources cannot stand
+        deeper, such as needles: with fewer of them the surface would see the sources one by one.
     oversampling : float
         Rings at which the boundary condition is asked for, over rings of sources.
     inner_per_wavelength, inner_oversampling : float
@@ -67,6 +67,7 @@ class Sampling:
     per_wavelength: float = 4.0
     least: int = 24
     depth: float = 12.0
+    least_depth: float = 0.85
     oversampling: float = 1.5
     inner_per_wavelength: float = 3.0
     inner_oversampling: float = 1.2
@@ -182,7 +183,7 @@ class BodiesOfRevolution:
         counts = self._counts(self._k, self.sampling.per_wavelength)
         for body, count in zip(self.spheroids, counts, strict=True):
             deepest = self._deepest(body)
-            enough = max(count, int(np.ceil(_LEAST_DEPTH * depth / deepest)))
+            enough = max(count, int(np.ceil(self.sampling.least_depth * depth / deepest)))
             found.append(body.rings(enough, -min(depth / enough, deepest)))
         return found
 
