@@ -373,7 +373,9 @@ def walker_rows(quick: bool) -> Iterator[Row]:
             chirps = np.arange(first, first + radar.chirps_per_frame)
             fields = []
             for apart_s in (2.5e-3, body_shadow.KEYFRAMES_S):
-                with mock.patch.object(body_shadow, "KEYFRAMES_S", apart_s):
+                # Of keyframes alone: points that are less exact on both sides serve.
+                given = {"KEYFRAMES_S": apart_s, "EXACT": body_shadow.FINE}
+                with mock.patch.multiple(body_shadow, **given):
                     shadow = body_shadow.ClutterShadow(clutter, body)
                 room = RoomIf(radar, clutter.cycle(), shadow).clutter_if(chirps)
                 cycles = room[: len(chirps) // radar.n_tx * radar.n_tx]

@@ -12,7 +12,7 @@ Points on furniture and on rough walls, which all antennas share, are many. A fe
 return most: these are computed for every Tx and at three frequencies, the weak ones from the
 array's middle at the sweep's centre. How many count as strong, the time between keyframes, and that
 between the fewer ones of weak points follow from errors that are measured beforehand. Where nothing
-may be in error all points are computed as `FINE` says.
+may be in error all points are computed as `EXACT` says.
 
 Mitsuba is not asked. A ray is free or not, and what is wanted is the wave near an edge, whose field
 is between both over a Fresnel zone. Clutter that furniture hides is not in the room's echoes
@@ -45,6 +45,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import small_facets
 from rtradar.scatter.clutter.point_shadow import (
     CLOSE,
+    EXACT,
     FAINT,
     FINE,
     REACH,
@@ -180,7 +181,7 @@ class ClutterShadow:
         """
         tx = np.array([self._radar.n_tx // 4])
         fields = _fields(clutter, self.starts, near.number, tx)
-        strong, precision, of_points = np.ones(len(near.power), dtype=bool), FINE, 0.0
+        strong, precision, of_points = np.ones(len(near.power), dtype=bool), EXACT, 0.0
         if allowed_m2 > 0:
             strong, precision, of_points = self._enough(near, fields, tx, _OF_POINTS * allowed_m2)
         self._points = PointShadow(self._radar, near.some(strong), precision)

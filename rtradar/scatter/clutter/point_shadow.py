@@ -39,9 +39,13 @@ class Precision(NamedTuple):
     reach: float
 
 
+EXACT = Precision(5, 99, 99, 256, 4.0)
+"""-25 dB of the change of the samples in a kick, where nothing may be in error
+(``validation/other_methods/shadow.py``)."""
 FINE = Precision(3, 99, 2, 128, REACH)
-"""Each approximation for itself is below -25 dB of the change of the samples in a walk; of a kick,
-which changes more, all together are at -15 dB (``validation/other_methods/shadow.py``)."""
+"""Beside this errors are measured. Each approximation for itself is below -25 dB of the change of
+the samples in a walk; of a kick, which changes more, all together are at -15 dB: what two places
+on a line of receivers and three frequencies leave out, and fringes beyond `REACH`, count alike."""
 CLOSE = FINE._replace(lines=40)
 """-12 dB of what changes in 0.1 s of a kick."""
 USUAL = Precision(3, 99, 2, 24, 2.0)
