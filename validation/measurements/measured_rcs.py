@@ -256,7 +256,8 @@ def draw(_: list[Row], path: Path) -> None:
                     label="measured",
                 )  # fmt: skip
             axes.set_title(f"{names[name].frequency_hz / 1e9:g} GHz, {polarization}", fontsize=9)
-            axes.set(ylim=(own.min() - 5, own.max() + 4), ylabel="cross-section [dBsm]")
+            least = np.quantile(own, 0.02) - 6  # a null may reach far down
+            axes.set(ylim=(least, own.max() + 4), ylabel="cross-section [dBsm]")
             axes.grid(alpha=0.3)
     for axes in grid[-1]:
         axes.set_xlabel("aspect from the tip [deg]")
