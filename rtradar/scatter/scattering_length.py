@@ -76,9 +76,9 @@ def scattering_length(
     Notes
     -----
     Equation :eq:`scattering-length` of the theory page. `physical-optics` and `reference` are for
-    any angle between Tx and Rx, above 0.2 rad by :eq:`po-bistatic`, which is not reciprocal. Beyond
-    some 60 degrees what their currents radiate from the edge of the lit side is off by 1 to 4 dB in
-    h, beyond 120 degrees also in v, until forward scatter is right again
+    any angle between Tx and Rx, above 0.25 rad by :eq:`po-bistatic`, which is not reciprocal.
+    Beyond some 60 degrees what their currents radiate from the edge of the lit side is off by 1 to
+    4 dB in h, beyond 120 degrees also in v, until forward scatter is right again
     (``validation/closed_forms/bistatic.py``). Other models of optics return nothing straight
     through.
 

@@ -197,6 +197,21 @@ class MeshSurfaces:
         """As `Surfaces.meets`."""
         return self._first_hits(points + _LIFT_OF_MESH * self._ball * normals, directions)
 
+    def way_out(
+        self, points: Array, normals: Array, antenna: Array, own: NDArray[np.int64]
+    ) -> tuple[Array, NDArray[np.int64]]:
+        """Places (ray, 3) [m] and faces where the ways to an antenna (3,) leave the mesh.
+
+        The points (ray, 3) are on the faces ``own (ray,)``, the normals those into the mesh. What
+        meets nothing, by float32 at an edge, is outside at once.
+        """
+        ways = antenna - points
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        face, distance = self.meets(points, normals, ways, own)
+        inside = face >= 0
+        distance = np.where(inside, distance, 0.0)
+        return points + distance[:, None] * ways, np.where(inside, face, own)
+
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
         """As `Surfaces.distance`: to the plane of the face, which has no border."""
         normal = self._normals[surface]

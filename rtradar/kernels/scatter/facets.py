@@ -68,8 +68,9 @@ class Waves(NamedTuple):
 
     ``pairs (pair, 2)`` int64, Tx and Rx among the antennas of a task; ``carrier (task, pair)`` the
     path whose phase is taken out [m]; ``wavenumber (task, node)`` [rad/m]; ``spreading``, whether
-    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 4)`` are
-    e_R.e_T and, in the axes of the part, the vector -(e_R.s_T) e_T; without any, (0, 0, 4), the
+    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 5)`` are w
+    e_R.e_T; in the axes of the part, the vector -w (e_R.s_T) e_T; and what multiplies the
+    reciprocal obliquity, with 0 <= w <= 1 the weight of the currents. Without any, (0, 0, 5), the
     obliquity is the reciprocal one.
     """
 
@@ -77,7 +78,7 @@ class Waves(NamedTuple):
     carrier: Array
     wavenumber: Array
     spreading: bool
-    currents: Array = np.empty((0, 0, 4))
+    currents: Array = np.empty((0, 0, 5))
 
 
 class _Chosen(NamedTuple):
@@ -197,9 +198,9 @@ def _facing_both(tx_facing, rx_facing, bend, both, out):
 
 @inlined(fastmath=FAST)
 def _lit_by_tx(tx_facing, chosen, both, currents, out):
-    """Fill in the obliquity of the currents on facets that Tx lights, 0 for the others."""
+    """Take the reciprocal obliquity its part times, and add that of the currents that Tx drives."""
     n0, n1, n2, bend = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.bend
-    along, x, y, z = currents[0], currents[1], currents[2], currents[3]
+    along, x, y, z, reciprocal = currents[0], currents[1], currents[2], currents[3], currents[4]
     for i in range(len(out)):
         side = -1.0 if both and tx_facing[i] < 0 else 1.0
         facing = side * tx_facing[i]
@@ -207,7 +208,7 @@ def _lit_by_tx(tx_facing, chosen, both, currents, out):
         h = max(bend[i], 1e-300)
         over = min(1.0, max(0.0, (facing + h) / (2 * h)))
         across = x * n0[i] + y * n1[i] + z * n2[i]
-        out[i] = along * max(facing, 0.0) + over * side * across
+        out[i] = reciprocal * out[i] + along * max(facing, 0.0) + over * side * across
 
 
 @inlined(fastmath=FAST)
@@ -251,10 +252,9 @@ def integrate(begin, end, facets, views, waves, out):
             offset = waves.carrier[task, pair] - far[t] - far[r]
             mean, u, v, strength = terms
             both, facing = facets.both_sides, view[t][3]
+            _facing_both(facing, view[r][3], chosen.bend, both, strength)
             if len(waves.currents) > 0:
                 _lit_by_tx(facing, chosen, both, waves.currents[task, pair], strength)
-            else:
-                _facing_both(facing, view[r][3], chosen.bend, both, strength)
             _light(view[t], view[r], chosen, far[t], far[r], offset, waves.spreading, terms)
             largest = largest_spread(u, v, room)
             for node in range(waves.wavenumber.shape[1]):

@@ -15,8 +15,8 @@ from rtradar.kernels.scatter.facets import Facets, Views, Waves
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, sweep_nodes
-from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     body_facets,
     ellipsoid_facets,
@@ -108,14 +108,25 @@ class FacetBody:
         backend = select(variant)
         self.variant = backend.kind
         tracer = BodyTracer(use(backend), body.semi_axes)
-        self.seen = FacetShadows(tracer, self._facets, body.semi_axes).seen
+        self._shadows = FacetShadows(tracer, self._facets, body.semi_axes)
 
     def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
-        """Path [m] and strength of each part (chirp, rx, part) by its specular point."""
-        length, strength, _ = solve_specular_points(
-            at, polarization=self._radar.polarization, spreading=self._spreading
-        )
+        """Path [m] and strength of each part (chirp, rx, part) by its specular point.
+
+        The strength is without polarisation: that of the part may vanish elsewhere.
+        """
+        length, strength, _ = solve_specular_points(at, spreading=self._spreading)
         return length, strength
+
+    def seen(
+        self, centres: Array, frames: Array, antennas: Array, parts: NDArray[np.int64]
+    ) -> Seen:
+        """See `FacetShadows.seen`, for antennas of which any may light and any receive."""
+        ways = antennas[:, None] - centres[parts]
+        apart = float(directions_apart(ways[:, None], ways[None]).max())
+        return self._shadows.seen(
+            centres, frames, antennas, parts, apart=apart if apart > NEAR else 0.0
+        )
 
     def field(
         self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
@@ -156,8 +167,9 @@ class FacetBody:
         carrier = np.swapaxes(length, 1, 2).reshape(tasks, len(pairs))
         k = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
         waves = Waves(pairs, carrier, np.broadcast_to(k, (tasks, nodes)), self._spreading)
+        to_tx, to_rx = (antennas[:, None, pairs[:, side]] - centres[:, :, None] for side in (0, 1))
+        ways = to_tx, to_rx, frames
+        waves, factor = with_obliquity(waves, *ways, self._radar.polarization)
         field = facet_integral(self._facets, views, waves)
-        field = field.reshape(len(centres), len(parts), len(pairs), nodes)
-        field = np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))
-        to_tx, to_rx = (antennas[:, pairs[:, side], None] - centres[:, None] for side in (0, 1))
-        return np.asarray(np.conj(field) * copolar(to_tx, to_rx, self._radar.polarization))
+        field = field.reshape(*factor.shape, nodes) * factor[..., None]
+        return np.asarray(np.conj(np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))))

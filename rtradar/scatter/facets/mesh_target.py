@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
-from rtradar.scatter.common.polarization import copolar, driven_currents
+from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
-    WIDE,
     facet_integral,
     facet_normals,
     mesh_facets,
@@ -72,21 +71,18 @@ def mesh_scattering(
     for pair, k in enumerate(wavenumber):
         antennas = np.stack([tx[pair], rx[pair]])
         divided, face = _divide_bent(corners, antennas, k)
-        ways = (antennas - middle) / np.linalg.norm(antennas - middle, axis=1, keepdims=True)
-        wide = bool(np.linalg.norm(ways[0] - ways[1]) > WIDE)
+        ways = antennas - middle
+        wide = bool(directions_apart(*ways) > NEAR)
         divided, face, seen = _divide_edges(solid, divided, face, antennas, k, wide)
         own = divided.reshape(-1, 3), _own_faces(len(divided))
         facets = mesh_facets(*own, both_sides=not mesh.closed, bend=solid.bend[face])
         ranges = np.linalg.norm(antennas, axis=1)
         views = Views(np.zeros(1, dtype=np.int64), antennas[None], one_pair, seen)
         waves = Waves(one_pair, np.array([[ranges.sum()]]), np.array([[k]]), spreading=True)
-        factor = 1.0
-        if wide:
-            currents = np.append(*driven_currents(ways[0], ways[1], polarization))
-            waves = waves._replace(currents=currents.reshape(1, 1, 4))
-        else:
-            factor = float(copolar(ways[0], ways[1], polarization))
-        field[pair] = facet_integral(facets, views, waves)[0, 0, 0] * ranges.prod() * factor
+        to_tx, to_rx = ways[:, None, None, None]
+        axes = np.eye(3)[None, None]
+        waves, factor = with_obliquity(waves, to_tx, to_rx, axes, polarization)
+        field[pair] = (facet_integral(facets, views, waves) * factor).item() * ranges.prod()
     return field
 
 
@@ -245,11 +241,7 @@ class _Solid(NamedTuple):
         seen = self._fractions(points, some.face[near], antenna, near, len(lit))
         inside = (_FOUR @ some.corners[away]).reshape(-1, 3)
         normals, own = np.repeat(some.normals[away], 4, axis=0), np.repeat(some.face[away], 4)
-        ways = antenna - inside
-        met, distance = self.tracer.meets(inside, -normals, ways, own)
-        # What meets nothing, by float32 at an edge, is outside at once.
-        met, distance = np.where(met < 0, own, met), np.where(met < 0, 0.0, distance)
-        exits = inside + (distance / np.linalg.norm(ways, axis=1))[:, None] * ways
+        exits, met = self.tracer.way_out(inside, -normals, antenna, own)
         return seen + self._fractions(exits, met, antenna, away, len(lit))
 
     def _fractions(

@@ -3,13 +3,14 @@
 Facets are triangles of the skin: their corners move with it, so that what they add stays coherent
 from pose to pose, however it bends. They are so small that their sag is 0.1 rad. Mitsuba decides
 what antennas see past all people's skins, at the middles of the facets, on the mesh that is coarser
-by one division; facets that face away are not lit.
+by one division. Facets that face an antenna away are not lit by it, but radiate to it through what
+is behind them, if Tx and Rx are far apart.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,14 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.common.poses import ChirpPoses
-from rtradar.scatter.facets.surfaces import body_facets, facet_integral, facet_normals
+from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
+from rtradar.scatter.facets.surfaces import (
+    body_facets,
+    facet_integral,
+    facet_normals,
+    smooth_bend,
+)
 from rtradar.scatter.ray_tubes.tubes import in_four
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
@@ -185,18 +191,25 @@ class SkinFacets:
         row = np.argmin(apart, axis=1)[None]
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
         field = np.empty((len(parts), len(pairs), len(self.frequency)), dtype=np.complex128)
+        to_tx, to_rx = (antennas[pairs[:, side]] - centres[parts, None] for side in (0, 1))
+        wide = bool((directions_apart(to_tx, to_rx) > NEAR).any())
+        frame = np.eye(3)[None, None]
         for place, part in enumerate(parts):
             piece = self._pieces[part]
             own = (vertices[piece.vertices] - centres[part])[None]
             normals, areas = facet_normals(own, piece.faces)
-            facets = Facets(own, piece.faces, normals, areas, np.zeros_like(areas))
+            bend = np.zeros_like(areas)
+            if wide:
+                # The current does not fall to nothing at the edge of the lit side.
+                bend[0] = smooth_bend(own[0], piece.faces)
+            facets = Facets(own, piece.faces, normals, areas, bend)
             local, lit = (antennas - centres[part])[None], seen[:, piece.facets]
             views = Views(np.zeros(1, dtype=np.int64), local, row, np.ascontiguousarray(lit))
             waves = Waves(pairs, length[None, :, place], k, self._spreading)
-            field[place] = facet_integral(facets, views, waves)[0]
-        to_tx, to_rx = (antennas[pairs[:, side], None] - centres[parts] for side in (0, 1))
-        factor = copolar(to_tx, to_rx, self._radar.polarization)
-        return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))) * factor)
+            ways = to_tx[None, place, None], to_rx[None, place, None], frame
+            waves, factor = with_obliquity(waves, *ways, self._radar.polarization)
+            field[place] = facet_integral(facets, views, waves)[0] * factor[0, 0, :, None]
+        return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))))
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""
@@ -211,31 +224,48 @@ class SkinFacets:
         return np.asarray((1 - weight) * before + weight * after, dtype=np.float32)
 
     def _look(self, time: float) -> NDArray[np.bool_]:
-        """Which facets (eye, facet) are seen past all skins at a time [s]."""
+        """Which facets (eye, facet) are seen past all skins at a time [s].
+
+        Those that face an eye away are seen by it from where the way to it leaves the skin that
+        they are of, if the eyes are far apart.
+        """
         posed = [skin.posed(time)[0] for skin in self._skins]
         # Each in a scene about its own middle: float32 rounds alike whoever else is there.
         scenes = [
             MeshSurfaces(self._mi, vertices, skin.coarse, same=_SAME)
             for skin, vertices in zip(self._skins, posed, strict=True)
         ]
+        ways = self._eyes[:, None] - np.array([vertices.mean(axis=0) for vertices in posed])
+        wide = bool((directions_apart(ways[:, None], ways[None]) > NEAR).any())
         found = []
         for skin, vertices, own in zip(self._skins, posed, scenes, strict=True):
             corners = vertices[skin.coarse]
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals = facet_normals(vertices[None], skin.coarse.astype(np.int32))[0][0]
             # Those at the corners, in their order, then the one between.
             middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
             seen = np.zeros((len(self._eyes), len(corners), 4), dtype=bool)
             for eye, place in enumerate(self._eyes):
-                facing = np.flatnonzero(np.sum(normals * (place - corners[:, 0]), axis=1) > 0)
-                points = middles[facing].reshape(-1, 3)
-                clear = np.ones(len(points), dtype=bool)
-                start = np.broadcast_to(place, points.shape)
-                for scene in scenes:
-                    whose = np.repeat(facing if scene is own else np.full_like(facing, -1), 4)
-                    clear &= scene.sees(start, points, whose)
-                seen[eye, facing] = clear.reshape(-1, 4)
+                faces = np.sum(normals * (place - corners[:, 0]), axis=1) > 0
+                facing, away = np.flatnonzero(faces), np.flatnonzero(~faces)
+                points, whose = middles[facing].reshape(-1, 3), np.repeat(facing, 4)
+                seen[eye, facing] = _clear(place, points, whose, own, scenes).reshape(-1, 4)
+                if wide:
+                    inside, whose = middles[away].reshape(-1, 3), np.repeat(away, 4)
+                    inward = -np.repeat(normals[away], 4, axis=0)
+                    exits, whose = own.way_out(inside, inward, place, whose)
+                    seen[eye, away] = _clear(place, exits, whose, own, scenes).reshape(-1, 4)
             found.append(seen.reshape(len(self._eyes), -1))
         return np.concatenate(found, axis=1)
+
+
+def _clear(
+    eye: Array, points: Array, whose: Indices, own: MeshSurfaces, scenes: Sequence[MeshSurfaces]
+) -> NDArray[np.bool_]:
+    """Whether nothing hides points (n, 3), on the faces (n,) of their own mesh, from the eye."""
+    clear, start = np.ones(len(points), dtype=bool), np.broadcast_to(eye, points.shape)
+    for scene in scenes:
+        clear &= scene.sees(start, points, whose if scene is own else np.full_like(whose, -1))
+    return clear
 
 
 def _piece(fine: Indices, part: Indices, own: int) -> _Piece:

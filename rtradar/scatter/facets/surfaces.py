@@ -28,13 +28,6 @@ LARGEST_KA = 400.0
 FACETS_PER_SQUARE_KA = 6.0
 """Facets of a sphere over (ka)^2 for 0.07 dB of the closed form, which its terminator takes."""
 
-WIDE = 0.2
-"""Distance between the directions to Tx and Rx above which it matters which of them lights.
-
-Then there are four times as many facets: the current does not fall to nothing at the edge of the
-lit side.
-"""
-
 _EDGE = 0.5
 """Angle between the normals of a triangle and a vertex [rad] above which a mesh has an edge."""
 

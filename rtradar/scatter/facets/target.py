@@ -12,14 +12,13 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
-from rtradar.scatter.common.polarization import copolar, driven_currents
 from rtradar.scatter.facets.body import FacetShadows
 from rtradar.scatter.facets.mesh_target import mesh_scattering
+from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
     MAXIMUM_FACETS,
-    WIDE,
     ellipsoid_facets,
     facet_integral,
     subdivisions_for,
@@ -48,12 +47,12 @@ def facet_scattering(
 ) -> NDArray[np.complex128]:
     """Co-polar scattering length (n,) by physical optics.
 
-    Where Tx and Rx are up to 0.2 rad apart as the target sees them it is the reciprocal form of
-    :eq:`po`, of what both see, as in a radar. Farther apart it is that of :eq:`po-bistatic`: the
-    currents on all that Tx lights radiate to Rx wherever other parts do not stand between, through
-    their own part too. Of a closed mesh, what stands between is what is met after the way has left
-    it. There Tx and Rx may not be exchanged; from one form to the other the field changes by up to
-    1 %. For each facet it is :eq:`facet`.
+    Where Tx and Rx are up to 0.15 rad apart as the target sees them it is the reciprocal form of
+    :eq:`po`, of what both see, as in a radar. More than 0.25 rad apart it is that of
+    :eq:`po-bistatic`: the currents on all that Tx lights radiate to Rx wherever other parts do not
+    stand between, through their own part too. Of a closed mesh, what stands between is what is met
+    after the way has left it. There Tx and Rx may not be exchanged. In between one fades into the
+    other. For each facet it is :eq:`facet`.
 
     Parameters, returns and errors are those of `scattering_length`; ``facets`` is the least number
     per ellipsoid, None for 0.1 dB up to ka = 400.
@@ -69,7 +68,7 @@ def facet_scattering(
     field = np.empty(len(tx), dtype=np.complex128)
     apart = _directions_apart(solid, tx, rx)
     for wide in (False, True):
-        some = np.flatnonzero((apart > WIDE) == wide)
+        some = np.flatnonzero((apart > NEAR) == wide)
         if len(some):
             pairs = _Pairs(tx[some], rx[some], wavenumber[some], polarization, wide)
             field[some] = _ellipsoids(solid, pairs, variant, facets)
@@ -97,6 +96,7 @@ def _ellipsoids(
     backend = select(variant)
     enough = _enough_facets(target, float(pairs.wavenumber.max()), facets)
     if facets is None and pairs.wide:
+        # The current does not fall to nothing at the edge of the lit side.
         enough = min(4 * enough, MAXIMUM_FACETS)
     surface = ellipsoid_facets(target.semi_axes, subdivisions_for(enough))
     shadows = FacetShadows(BodyTracer(use(backend), target.semi_axes), surface, target.semi_axes)
@@ -143,20 +143,14 @@ def _block(
     ranges = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
     carrier, k = (np.repeat(a, len(parts))[:, None] for a in (ranges[0] + ranges[1], wavenumber))
     views = Views(np.tile(parts, n), local.reshape(-1, 2, 3), row.reshape(-1, 2), seen.fraction)
-    waves, factor = Waves(np.array([[0, 1]]), carrier, k, spreading=True), np.ones((n, len(parts)))
-    if wide:
-        along, across = driven_currents(to_tx, to_rx, polarization)
-        across = np.einsum("pji,npj->npi", target.frames, across)
-        currents = np.concatenate([along[..., None], across], axis=-1)
-        waves = waves._replace(currents=currents.reshape(-1, 1, 4))
-    else:
-        factor = copolar(to_tx, to_rx, polarization)
-    field = facet_integral(surface, views, waves).reshape(n, len(parts)) * factor
+    waves = Waves(np.array([[0, 1]]), carrier, k, spreading=True)
+    ways = to_tx[:, :, None], to_rx[:, :, None], target.frames
+    waves, factor = with_obliquity(waves, *ways, polarization)
+    field = facet_integral(surface, views, waves).reshape(n, len(parts)) * factor[:, :, 0]
     return np.asarray(field.sum(axis=1) * ranges[0] * ranges[1])
 
 
 def _directions_apart(target: Ellipsoids, tx: Array, rx: Array) -> Array:
     """Distance (n,) of the unit vectors to Tx and to Rx, 0 to 2, the largest of any part."""
-    ways = (antennas[:, None] - target.centres for antennas in (tx, rx))
-    to_tx, to_rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways)
-    return np.asarray(np.linalg.norm(to_tx - to_rx, axis=-1).max(axis=1))
+    to_tx, to_rx = (antennas[:, None] - target.centres for antennas in (tx, rx))
+    return np.asarray(directions_apart(to_tx, to_rx).max(axis=1))
