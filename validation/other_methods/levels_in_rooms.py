@@ -144,9 +144,9 @@ def _stretched(bodies: rt.Ellipsoids, number: int, vectors: Array) -> Array:
     return np.asarray(vectors @ bodies.frames[number] / bodies.semi_axes[number])
 
 
-def lit(bodies: rt.Ellipsoids, surface: Skin, direction: Array) -> NDArray[np.bool_]:
-    """Whether points face waves along directions (point, 3), and no other ellipsoid is before."""
-    free = (surface.normals * direction).sum(axis=1) < 0
+def unobstructed(bodies: rt.Ellipsoids, surface: Skin, direction: Array) -> NDArray[np.bool_]:
+    """Whether no other ellipsoid is before points, for waves along directions (point, 3)."""
+    free = np.ones(len(surface.points), dtype=bool)
     for number in range(len(bodies.centres)):
         o = _stretched(bodies, number, surface.points - bodies.centres[number])
         d = _stretched(bodies, number, -direction)
@@ -164,37 +164,20 @@ def brute_force(
     Points are so many a wavelength on the body and on the sheet.
     """
     surface = skin(bodies, 2 * pi / k / per_wavelength)
-    # Of what turns away from the sheet nothing is lit from there.
-    sheet = np.array([SHEET_MIDDLE[0], SHEET_Y, SHEET_MIDDLE[1]]) - surface.points
-    sheet /= np.linalg.norm(sheet, axis=1, keepdims=True)
-    faces = (surface.normals * sheet).sum(axis=1) > -0.4
-    waves = {
-        "": straight(surface.points, k),
-        "left": over_sheet(surface.points[faces], k, on_sheet),
-    }
-    whole = [np.zeros((len(faces), 3), dtype=np.complex128) for _ in range(2)]
-    for all_of, some in zip(whole, waves["left"], strict=True):
-        all_of[faces] = some
-    waves["left"] = Waves(whole[0], whole[1])
-    seen = {}
-    for name, wave in waves.items():
-        seen[name] = np.zeros(len(faces), dtype=bool)
-        there = np.flatnonzero(faces) if name else np.arange(len(faces))
-        own = Skin(*(array[there] for array in surface))
-        direction = Waves(*(array[there] for array in wave)).direction
-        seen[name][there] = lit(bodies, own, direction)
+    waves = {"": straight(surface.points, k), "left": over_sheet(surface.points, k, on_sheet)}
+    free = {name: unobstructed(bodies, surface, wave.direction) for name, wave in waves.items()}
 
     def answer(out: str, back: str) -> complex:
+        """What the currents on all that is lit on the way out radiate, through their own part."""
         current = 2 * np.cross(surface.normals, waves[out].magnetic)
         reaction = (current * waves[back].electric).sum(axis=1) * surface.areas
-        both = seen[out] & seen[back]
-        return complex(1j * k / np.sqrt(4 * pi) * reaction[both].sum())
+        lit = free[out] & ((surface.normals * waves[out].direction).sum(axis=1) < 0)
+        return complex(1j * k / np.sqrt(4 * pi) * reaction[lit & free[back]].sum())
 
-    # Physical optics is not reciprocal; the level takes the mean of both ways, and so do we.
-    bounce = (answer("left", "") + answer("", "left")) / 2
     return {
         "body": answer("", ""),
-        "left > body": bounce,
+        "left > body": answer("left", ""),
+        "body > left": answer("", "left"),
         "left > body > left": answer("left", "left"),
     }
 
