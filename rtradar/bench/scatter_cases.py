@@ -10,7 +10,7 @@ from rtradar.bench.kernel_table import Calls, filled, kernel_case
 from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
-from rtradar.kernels.scatter.specular_point import Geometry, solve_reference
+from rtradar.kernels.scatter.specular_point import Geometry, Options, solve_reference
 from rtradar.kernels.surface_currents import Equation
 from rtradar.scatter.facets.surfaces import ellipsoid_facets
 
@@ -175,6 +175,27 @@ def _specular_points(k: Any) -> Calls:
     given = 0, 100, at, start, k.Options(polarized=False, horizontal=False, spreading=True)
     out = np.empty(shape), np.empty(shape), np.empty((*shape, 3))
     return filled(k.solve, *given, out=out), lambda: k.solve_reference(at)
+
+
+@kernel_case(
+    "scatter.double_reflections.solve_double", "3 pairs of ellipsoids, one chirp, 2 receivers", 2e-3
+)
+def _double_reflections(k: Any) -> Calls:
+    # In a row across the line of sight, so that all pairs reflect.
+    at = _geometry(1, 2, 3)._replace(
+        centres=np.array([[[4.0, 0.7 * n, 1.0 - 0.1 * n] for n in range(3)]])
+    )
+    pairs = np.array([[0, 1], [2, 1], [0, 2]])
+    options = Options(polarized=True, horizontal=False, spreading=True)
+    shape, start = (1, 2, 3), np.full((1, 3, 2, 3), np.nan)
+    out = np.empty(shape), np.empty(shape)
+    points = np.empty((*shape, 2, 3))
+
+    def run() -> tuple[np.ndarray, ...]:
+        k.solve_double(0, 1, at, pairs, start.copy(), options, *out, points)
+        return out
+
+    return run, lambda: k.solve_double_reference(at, pairs, horizontal=False)
 
 
 @kernel_case("scatter.nearby_points.nearby_echoes", "147 echoes, 100 chirps, 8 receivers", 0.03)

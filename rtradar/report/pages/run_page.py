@@ -211,6 +211,10 @@ def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
         for name, value in power.items()
     )
     fractions = ((name, f"{value:.1%}") for name, value in models.items())
+    doubles = (
+        (one["first"].capitalize(), one["last"], f"{one['over_single_reflections_db']:.1f} dB")
+        for one in modelled.get("double_reflections", ())
+    )
     if "seed" in summary:
         parameters["seed"] = summary["seed"]
     return _tables(
@@ -220,6 +224,10 @@ def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
         ("What was found", mapping_table(others)),
         ("People", _people(summary.get("people", ()))),
         ("How parts were modelled, of all parts and time", table(fractions)),
+        (
+            "Reflections from part to part",
+            table(doubles, ("First", "Last", "Power over all single reflections")),
+        ),
         ("Echo power by part", table(powers, ("", "Mean, with spreading loss", "Of all"))),
     )
 

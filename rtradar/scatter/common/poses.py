@@ -34,7 +34,7 @@ class BuiltInModel:
     traces: ClassVar[bool] = True
     """Whether the model traces rays, so that parts of the body occlude each other."""
 
-    fast_over_walls: ClassVar[bool] = False
+    fast_over_walls: bool = False
     """Whether one model computes all paths of a room, as `HasFormula` or `HasSpecularPoints`; else
     each path has one of its own, before images of the antennas."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,11 @@ from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.double_reflections import (
+    DoubleReflections,
+    check_bounces,
+    double_scattering,
+)
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import (
     SHADOW_RAYS,
@@ -47,12 +52,14 @@ def fresnel_scattering(
     polarization: Literal["v", "h"] = "v",
     variant: str = "auto",
     shadow_rays: int = SHADOW_RAYS,
+    bounces: int = 1,
 ) -> NDArray[np.complex128]:
     """Co-polar scattering length (n,) of ellipsoids that occlude each other, pair by pair.
 
-    Parameters, returns and errors are those of `scattering_length`; ``shadow_rays`` is that of
-    `Fresnel`. Equation :eq:`fresnel` of the theory page.
+    Parameters, returns and errors are those of `scattering_length`; ``shadow_rays`` and ``bounces``
+    are those of `Fresnel`. Equation :eq:`fresnel` of the theory page.
     """
+    check_bounces("fresnel", bounces)
     pairs, parts = len(tx), len(target.semi_axes)
     at = target_geometry(target, tx, rx)
     length, amplitude, points = solve_specular_points(at, polarization=polarization, points=True)
@@ -66,7 +73,10 @@ def fresnel_scattering(
     poses = Poses(target.centres[None], target.frames[None], target.semi_axes)
     fractions = zone_fractions(tracer, zones, poses, np.array([[0, 1]]), k[:, None], shadow_rays)
     left = fractions.reshape(pairs, 1, parts)
-    return sum_of_echoes(length, amplitude * left, at, frequency)
+    field = sum_of_echoes(length, amplitude * left, at, frequency)
+    if bounces == 2:
+        field += double_scattering(target, tx, rx, frequency, polarization, tracer)
+    return field
 
 
 class Fresnel(BuiltInModel):
@@ -78,11 +88,14 @@ class Fresnel(BuiltInModel):
     ----------
     shadow_rays : int
         Points on each part to which rays are traced from each node of the array, 8 to 4096.
+    bounces : int
+        1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`);
+        of these a path is visible or not, without its zone.
 
     Raises
     ------
     InputError
-        Where ``shadow_rays`` is out of range.
+        Where an option is out of range.
     """
 
     relative_cost = 6.0
@@ -96,8 +109,10 @@ class Fresnel(BuiltInModel):
         variant: str = "auto",
         spreading: bool = True,
         shadow_rays: int = SHADOW_RAYS,
+        bounces: int = 1,
     ) -> None:
         bounds_of(shadow_rays)  # refuses what is out of range
+        check_bounces("fresnel", bounces)
         self._radar, self._body, self._spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
@@ -107,6 +122,13 @@ class Fresnel(BuiltInModel):
         self.fractions = ZoneFractions(
             radar, body, self._frequency, tracer, shadow_rays=shadow_rays
         )
+        self._double: DoubleReflections | None = None
+        if bounces == 2:
+            self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
+
+    def account(self) -> dict[str, Any] | None:
+        """List the pairs of parts that reflect one after the other."""
+        return None if self._double is None else self._double.account()
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -116,4 +138,6 @@ class Fresnel(BuiltInModel):
             at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
         # The amplitude of an echo is the conjugate of the scattering length.
-        return one_echo_a_part(at.tx_index, length, amplitude * fractions.conj(), self._frequency)
+        left = amplitude * fractions.conj()
+        single = one_echo_a_part(at.tx_index, length, left, self._frequency)
+        return single if self._double is None else self._double.beside(single, chirps)

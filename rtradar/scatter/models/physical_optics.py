@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
+from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
@@ -25,15 +25,52 @@ from rtradar.scatter.common.poses import (
     one_echo_a_part,
     owners_of,
 )
+from rtradar.scatter.double_reflections import (
+    DoubleReflections,
+    check_bounces,
+    double_scattering,
+)
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
 from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.scatter.facets.target import facet_scattering
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.body_tracer import BodyTracer
+
+if TYPE_CHECKING:
+    import trimesh
 
 _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
 
 _MOST_FREQUENCIES = 9
+
+_NO_DOUBLES = (
+    "physical-optics: bounces = 2; reflections from part to part are those of ellipsoids: leave "
+    "bounces out, or {}"
+)
+
+
+def optics_scattering(
+    target: Ellipsoids | trimesh.Trimesh,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    polarization: Literal["v", "h"] = "v",
+    variant: str = "auto",
+    facets: int | None = None,
+    bounces: int = 1,
+) -> NDArray[np.complex128]:
+    """Scattering length (n,) by physical optics, see `facet_scattering` and `PhysicalOptics`."""
+    check_bounces("physical-optics", bounces)
+    if bounces == 2 and not isinstance(target, Ellipsoids):
+        raise InputError(_NO_DOUBLES.format("give rt.Ellipsoids"))
+    pairs = tx, rx, frequency
+    field = facet_scattering(target, *pairs, polarization, variant, facets)
+    if bounces == 2 and isinstance(target, Ellipsoids):
+        tracer = BodyTracer(use(select(variant)), target.semi_axes)
+        field += double_scattering(target, *pairs, polarization, tracer)
+    return field
 
 
 class PhysicalOptics(BuiltInModel):
@@ -56,6 +93,9 @@ class PhysicalOptics(BuiltInModel):
         Number of frequencies over the sweep. Where a part is half occluded at 12 GHz, three leave
         an error of 3.1 % of the field and five 1.9 %
         (``tests/scatter/models/test_physical_optics.py``), but the IF takes longer.
+    bounces : int
+        1, or 2 for reflections from part to part as well, by geometric optics
+        (`rtradar.scatter.double_reflections`); meshes have none of these.
 
     Raises
     ------
@@ -69,7 +109,7 @@ class PhysicalOptics(BuiltInModel):
     """
 
     accepts_meshes = True
-    scattering = staticmethod(facet_scattering)
+    scattering = staticmethod(optics_scattering)
     relative_cost = 12.0
 
     def __init__(
@@ -84,7 +124,9 @@ class PhysicalOptics(BuiltInModel):
         tolerance: float = 0.05,
         unevenness: float = 0.02,
         frequencies: int = 3,
+        bounces: int = 1,
     ) -> None:
+        check_bounces("physical-optics", bounces)
         if frequencies not in range(1, _MOST_FREQUENCIES + 1):
             raise InputError(
                 f"physical-optics: frequencies = {frequencies}; it must be a whole number from "
@@ -108,6 +150,12 @@ class PhysicalOptics(BuiltInModel):
                 "facets out, or take body = 'ellipsoids'"
             )
         self.variant: str | None = self._surface.variant
+        self._double: DoubleReflections | None = None
+        if bounces == 2:
+            if has_mesh(body):
+                raise InputError(_NO_DOUBLES.format("take body = 'ellipsoids'"))
+            tracer = BodyTracer(use(select(variant)), body.semi_axes)
+            self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
         self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
         # From coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
@@ -151,6 +199,10 @@ class PhysicalOptics(BuiltInModel):
         ratio = np.where(specular != 0, amplitude / np.where(specular != 0, specular, 1.0), 0.0)
         return Sample(ratio, np.abs(specular))
 
+    def account(self) -> dict[str, Any] | None:
+        """List the pairs of parts that reflect one after the other."""
+        return None if self._double is None else self._double.account()
+
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
@@ -177,4 +229,5 @@ class PhysicalOptics(BuiltInModel):
                     ratio = envelope.keyframe(interval).ratio[:, None]
                     over_array = weights[at.tx_index[inside]] @ ratio
                     amplitude[:, inside] = over_array * strength[inside]
-        return one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
+        single = one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
+        return single if self._double is None else self._double.beside(single, chirps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,11 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.double_reflections import (
+    DoubleReflections,
+    check_bounces,
+    double_scattering,
+)
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
 from rtradar.scatter.target import sum_of_echoes, target_geometry
@@ -19,7 +24,18 @@ from rtradar.trace.body_tracer import BodyTracer
 
 
 class Specular(BuiltInModel):
-    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba."""
+    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
+
+    Parameters
+    ----------
+    bounces : int
+        1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`).
+
+    Raises
+    ------
+    InputError
+        Where ``bounces`` is neither.
+    """
 
     fast_over_walls = True
     relative_cost = 1.5
@@ -32,8 +48,10 @@ class Specular(BuiltInModel):
         frequency: NDArray[np.float64],
         polarization: Literal["v", "h"],
         variant: str = "auto",
+        bounces: int = 1,
     ) -> NDArray[np.complex128]:
         """Scattering length of one target."""
+        check_bounces("specular", bounces)
         at = target_geometry(target, tx, rx)
         length, amplitude, points = solve_specular_points(
             at, polarization=polarization, points=True
@@ -41,7 +59,10 @@ class Specular(BuiltInModel):
         tracer = BodyTracer(use(select(variant)), target.semi_axes)
         tracer.pose(target.centres, target.frames)
         visible = unobstructed(tracer, at.tx, at.rx, points)
-        return sum_of_echoes(length, amplitude * visible, at, frequency)
+        field = sum_of_echoes(length, amplitude * visible, at, frequency)
+        if bounces == 2:
+            field += double_scattering(target, tx, rx, frequency, polarization, tracer)
+        return field
 
     def __init__(
         self,
@@ -50,18 +71,31 @@ class Specular(BuiltInModel):
         *,
         variant: str = "auto",
         spreading: bool = True,
+        bounces: int = 1,
     ) -> None:
+        check_bounces("specular", bounces)
         self._radar, self._body, self.spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
         self.tracer = BodyTracer(use(backend), body.semi_axes)
         self.visibility = SpecularVisibility(radar, body, self.tracer)
+        self._double: DoubleReflections | None = None
+        if bounces == 2:
+            self._double = DoubleReflections(radar, body, self.tracer, spreading=spreading)
+            # Each path over walls has reflections from part to part of its own.
+            self.fast_over_walls = False
+
+    def account(self) -> dict[str, Any] | None:
+        """List the pairs of parts that reflect one after the other."""
+        return None if self._double is None else self._double.account()
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude = self.specular_echo(chirps, at)
-        return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
+        centre_hz = self._radar.centre_frequency_hz
+        single = one_echo_a_part(at.tx_index, length, amplitude, centre_hz)
+        return single if self._double is None else self._double.beside(single, chirps)
 
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
