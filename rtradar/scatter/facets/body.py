@@ -169,7 +169,7 @@ class FacetBody:
         waves = Waves(pairs, carrier, np.broadcast_to(k, (tasks, nodes)), self._spreading)
         to_tx, to_rx = (antennas[:, None, pairs[:, side]] - centres[:, :, None] for side in (0, 1))
         ways = to_tx, to_rx, frames
-        waves, factor = with_obliquity(waves, *ways, self._radar.polarization)
+        waves, factor = with_obliquity(waves, *ways, self._radar.polarization, shadow=False)
         field = facet_integral(self._facets, views, waves)
         field = field.reshape(*factor.shape, nodes) * factor[..., None]
         return np.asarray(np.conj(np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))))

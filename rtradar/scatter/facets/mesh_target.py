@@ -81,7 +81,7 @@ def mesh_scattering(
         waves = Waves(one_pair, np.array([[ranges.sum()]]), np.array([[k]]), spreading=True)
         to_tx, to_rx = ways[:, None, None, None]
         axes = np.eye(3)[None, None]
-        waves, factor = with_obliquity(waves, to_tx, to_rx, axes, polarization)
+        waves, factor = with_obliquity(waves, to_tx, to_rx, axes, polarization, shadow=True)
         field[pair] = (facet_integral(facets, views, waves) * factor).item() * ranges.prod()
     return field
 

@@ -207,7 +207,7 @@ class SkinFacets:
             views = Views(np.zeros(1, dtype=np.int64), local, row, np.ascontiguousarray(lit))
             waves = Waves(pairs, length[None, :, place], k, self._spreading)
             ways = to_tx[None, place, None], to_rx[None, place, None], frame
-            waves, factor = with_obliquity(waves, *ways, self._radar.polarization)
+            waves, factor = with_obliquity(waves, *ways, self._radar.polarization, shadow=False)
             field[place] = facet_integral(facets, views, waves)[0] * factor[0, 0, :, None]
         return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))))
 

@@ -145,7 +145,7 @@ def _block(
     views = Views(np.tile(parts, n), local.reshape(-1, 2, 3), row.reshape(-1, 2), seen.fraction)
     waves = Waves(np.array([[0, 1]]), carrier, k, spreading=True)
     ways = to_tx[:, :, None], to_rx[:, :, None], target.frames
-    waves, factor = with_obliquity(waves, *ways, polarization)
+    waves, factor = with_obliquity(waves, *ways, polarization, shadow=True)
     field = facet_integral(surface, views, waves).reshape(n, len(parts)) * factor[:, :, 0]
     return np.asarray(field.sum(axis=1) * ranges[0] * ranges[1])
 

@@ -6,6 +6,8 @@ import trimesh
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.facets import Waves
+from rtradar.scatter.facets.obliquity import with_obliquity
 
 RADIUS_M, FREQUENCY_HZ, FAR_M = 0.03, 14e9, 1e4
 
@@ -66,3 +68,19 @@ def test_near_the_transmitter_it_is_reciprocal() -> None:
     target = rt.Ellipsoids([np.zeros(3)], [np.eye(3)], [(0.03, 0.05, 0.12)])
     tx, rx = [3.0, 0.0, 0.4], [3.0, 0.15, 0.4]
     assert optics(target, tx, rx) == pytest.approx(optics(target, rx, tx), rel=2e-3)
+
+
+@pytest.mark.parametrize(("angle_deg", "alike"), [(5.0, True), (150.0, True), (178.0, False)])
+def test_in_a_run_a_body_casts_no_shadow_of_its_own(angle_deg: float, alike: bool) -> None:
+    # The shadow on what stands behind is that of the clutter.
+    angle = np.radians(angle_deg)
+    to_tx = np.array([4.0, 0.0, 0.1]).reshape(1, 1, 1, 3)
+    to_rx = np.array([4.0 * np.cos(angle), 4.0 * np.sin(angle), 0.1]).reshape(1, 1, 1, 3)
+    waves = Waves(np.array([[0, 1]]), np.zeros((1, 1)), np.ones((1, 1)), spreading=True)
+    given = waves, to_tx, to_rx, np.eye(3)[None, None], "v"
+    whole, factor = with_obliquity(*given, shadow=True)
+    run, in_run = with_obliquity(*given, shadow=False)
+    assert np.array_equal(run.currents, whole.currents) == alike
+    np.testing.assert_array_equal(in_run, factor)
+    if not alike:
+        np.testing.assert_array_equal(run.currents[..., :4], 0)
