@@ -27,7 +27,7 @@ from rtradar.process import (
     range_time,
     spectrogram,
 )
-from rtradar.report.figures import rooms
+from rtradar.report.figures import rooms, trainings
 from rtradar.report.figures.canvas import FieldUnit
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.rooms import (
@@ -131,9 +131,9 @@ EVERY: dict[str, Callable[[], None]] = {
     ),
     "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
     "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
-    "confusion": lambda: evaluation.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
-    "transfer": lambda: evaluation.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
-    "learning": lambda: evaluation.draw_learning(FILE, [HISTORY], NAME),
+    "confusion": lambda: trainings.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
+    "transfer": lambda: trainings.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
+    "learning": lambda: trainings.draw_learning(FILE, [HISTORY], NAME),
 }
 
 
@@ -318,7 +318,7 @@ def test_ghosts_have_numbers_with_a_key(drawn: list[Figure]) -> None:
 
 
 def test_every_function_that_draws_is_among_those_drawn_below() -> None:
-    modules = (rooms, comparison, evaluation)
+    modules = (rooms, comparison, evaluation, trainings)
     own = {
         name
         for module in modules
