@@ -8,9 +8,9 @@ import numpy as np
 
 from rtradar.bench.kernel_table import Calls, filled, kernel_case
 from rtradar.kernels.scatter.facets import Views, Waves
-from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.specular_point import Geometry, Options, solve_reference
+from rtradar.kernels.scatter.zones.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
 from rtradar.kernels.surface_currents import Equation
 from rtradar.scatter.facets.surfaces import ellipsoid_facets
 
@@ -50,7 +50,7 @@ def _zones(zones: int) -> Any:
     return maps, given
 
 
-@kernel_case("scatter.fresnel_zones.lay_zones", "tangents of 200 Fresnel zones", 1e-9)
+@kernel_case("scatter.zones.fresnel_zones.lay_zones", "tangents of 200 Fresnel zones", 1e-9)
 def _lay_zones(k: Any) -> Calls:
     maps, given = _zones(200)
 
@@ -66,7 +66,7 @@ def _lay_zones(k: Any) -> Calls:
 
 
 @kernel_case(
-    "scatter.fresnel_zones.zone_points", "10 000 points on ellipsoids, along great circles"
+    "scatter.zones.fresnel_zones.zone_points", "10 000 points on ellipsoids, along great circles"
 )
 def _zone_points(k: Any) -> Calls:
     rng, (maps, _) = np.random.default_rng(0), _zones(200)
@@ -75,7 +75,9 @@ def _zone_points(k: Any) -> Calls:
     return call, lambda: k.zone_points_reference(*given)
 
 
-@kernel_case("scatter.zone_edges.open_fractions", "cells of a zone cut by an edge, counted", 0.06)
+@kernel_case(
+    "scatter.zones.zone_edges.open_fractions", "cells of a zone cut by an edge, counted", 0.06
+)
 def _open_fractions(k: Any) -> Calls:
     (maps, _), line = _zones(1), (np.cos(0.4), np.sin(0.4), 1.7)
     bounds = np.arange(0, CELLS + 1, 4)
@@ -84,7 +86,7 @@ def _open_fractions(k: Any) -> Calls:
     return call, lambda: k.open_fractions_reference(maps.rim[0], line)
 
 
-@kernel_case("scatter.fresnel_zones.zone_sums", "V of a zone, 3 antennas", 1e-9)
+@kernel_case("scatter.zones.fresnel_zones.zone_sums", "V of a zone, 3 antennas", 1e-9)
 def _zone_sums(k: Any) -> Calls:
     rng, (maps, given) = np.random.default_rng(0), _zones(1)
     antennas, pairs = given[0] + rng.normal(0, 0.1, (3, 3)), np.array([[0, 1], [2, 1]])
@@ -95,7 +97,9 @@ def _zone_sums(k: Any) -> Calls:
     return call, lambda: k.zone_sums_reference(maps, 0, antennas, pairs, _WAVENUMBER, fractions)
 
 
-@kernel_case("scatter.fresnel_zones.blend_fractions", "fractions of 21 parts at 100 chirps, 8 Rx")
+@kernel_case(
+    "scatter.zones.fresnel_zones.blend_fractions", "fractions of 21 parts at 100 chirps, 8 Rx"
+)
 def _blend_fractions(k: Any) -> Calls:
     rng = np.random.default_rng(0)
     nodes, slopes = rng.normal(size=(2, 9, 3, 18, 21, 2)) @ [1, 1j]

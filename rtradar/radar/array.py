@@ -149,7 +149,7 @@ class Array(Waveform):
         axes : (time, 3, 3) float64
             Each as `axes` is.
         positions : (time, 3) float64
-            As of `path_at`.
+            Positions along the path, those that `path_at` gives.
         """
         angles, positions = self.path_at(times)
         return _rotation(angles), positions

@@ -172,6 +172,44 @@ def _reflected(field, normal):
 
 
 @inlined()
+def _leaning(body, point, one, other, sign):
+    """How fast the path would change if the ellipsoid grew about its centre: its curvature's part.
+
+    The path changes along ``one + sign other`` as the point moves.
+    """
+    total = 0.0
+    for i in range(3):
+        total += (point[i] - body.centre[i]) * (one[i] + sign * other[i])
+    return total
+
+
+@inlined()
+def _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix):
+    """Fill in the first and the second derivatives of the path, ``slope (4,), matrix (4, 4)``."""
+    s1, s2, s3 = legs
+    r1, r2, r3 = ranges
+    for i in range(2):
+        a, b = along_p[i], along_q[i]
+        slope[i] = dot(a, s1) - dot(a, s2)
+        slope[2 + i] = dot(b, s2) + dot(b, s3)
+        for j in range(2):
+            c, d = along_p[j], along_q[j]
+            same = 1.0 if i == j else 0.0
+            matrix[i, j] = (
+                (dot(a, c) - dot(a, s1) * dot(c, s1)) / r1
+                + (dot(a, c) - dot(a, s2) * dot(c, s2)) / r2
+                - same * lean_p
+            )
+            matrix[2 + i, 2 + j] = (
+                (dot(b, d) - dot(b, s2) * dot(d, s2)) / r2
+                + (dot(b, d) - dot(b, s3) * dot(d, s3)) / r3
+                - same * lean_q
+            )
+            matrix[2 + i, j] = -(dot(b, c) - dot(b, s2) * dot(c, s2)) / r2
+            matrix[j, 2 + i] = matrix[2 + i, j]
+
+
+@inlined()
 def _search(tx, rx, first, second, options, u, v, points):
     """Find the path of one pair from the unit vectors ``u, v (3,)``; they and ``points`` are set.
 
@@ -191,30 +229,9 @@ def _search(tx, rx, first, second, options, u, v, points):
         _place(first, u, tangent_p, p, along_p)
         _place(second, v, tangent_q, q, along_q)
         r1, r2, r3 = _way(tx, p, s1), _way(p, q, s2), _way(rx, q, s3)
-        # How much shorter the path would be if the spheres shrank: their part in the curvature.
-        lean_p = lean_q = 0.0
-        for i in range(3):
-            lean_p += (p[i] - first.centre[i]) * (s1[i] - s2[i])
-            lean_q += (q[i] - second.centre[i]) * (s2[i] + s3[i])
-        for i in range(2):
-            a, b = along_p[i], along_q[i]
-            slope[i] = dot(a, s1) - dot(a, s2)
-            slope[2 + i] = dot(b, s2) + dot(b, s3)
-            for j in range(2):
-                c, d = along_p[j], along_q[j]
-                same = 1.0 if i == j else 0.0
-                matrix[i, j] = (
-                    (dot(a, c) - dot(a, s1) * dot(c, s1)) / r1
-                    + (dot(a, c) - dot(a, s2) * dot(c, s2)) / r2
-                    - same * lean_p
-                )
-                matrix[2 + i, 2 + j] = (
-                    (dot(b, d) - dot(b, s2) * dot(d, s2)) / r2
-                    + (dot(b, d) - dot(b, s3) * dot(d, s3)) / r3
-                    - same * lean_q
-                )
-                matrix[2 + i, j] = -(dot(b, c) - dot(b, s2) * dot(c, s2)) / r2
-                matrix[j, 2 + i] = matrix[2 + i, j]
+        legs, ranges = (s1, s2, s3), (r1, r2, r3)
+        lean_p, lean_q = _leaning(first, p, s1, s2, -1.0), _leaning(second, q, s2, s3, 1.0)
+        _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix)
         definite = _factor(matrix, lower)
         more = 0.0
         while not definite:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.fresnel_zones import blend_fractions
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.kernels.scatter.zones.fresnel_zones import blend_fractions
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import array_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step

@@ -1,6 +1,6 @@
 """How much of an ellipsoid's return is left behind others: its Fresnel zones, added up.
 
-On cells along the meridians of `rtradar.kernels.scatter.fresnel_zones`
+On cells along the meridians of `rtradar.kernels.scatter.zones.fresnel_zones`
 
     V = sum w g f exp(-jk dL) / sum w g exp(-jk dL),     g = (n.s_T + n.s_R) / (R_T R_R) dS,
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.fresnel_zones import (
+from rtradar.kernels.scatter.zones.fresnel_zones import (
     CELLS,
     MERIDIANS,
     ZoneMaps,
@@ -29,7 +29,7 @@ from rtradar.kernels.scatter.fresnel_zones import (
     zone_points,
     zone_sums,
 )
-from rtradar.kernels.scatter.zone_edges import Edges, open_fractions
+from rtradar.kernels.scatter.zones.zone_edges import Edges, open_fractions
 from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.kernels.scatter.fresnel_zones import (
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.kernels.scatter.zones.fresnel_zones import (
     CELLS,
     MERIDIANS,
     RIM,
@@ -18,8 +19,7 @@ from rtradar.kernels.scatter.fresnel_zones import (
     zone_points,
     zone_points_reference,
 )
-from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.kernels.scatter.zone_edges import (
+from rtradar.kernels.scatter.zones.zone_edges import (
     open_fractions,
     open_fractions_reference,
     straight_edge,

@@ -3,7 +3,8 @@
 Rays are traced to the corners of wide cells, each of which is one or several cells along a
 meridian: one near the specular point, more farther out. Where some corners of
 such a cell are blocked, the edge through it is the straight line in the plane of rho between the
-two places at which it crosses the sides of the cell; see `rtradar.kernels.scatter.fresnel_zones`.
+two places at which it crosses the sides of the cell; see
+`rtradar.kernels.scatter.zones.fresnel_zones`.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS
 from rtradar.kernels.scatter.triangles import positive_fraction
+from rtradar.kernels.scatter.zones.fresnel_zones import CELLS, MERIDIANS
 
 
 class Edges(NamedTuple):

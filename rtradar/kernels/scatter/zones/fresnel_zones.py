@@ -7,7 +7,7 @@ H^(-1/2) (cos, sin) makes k dL about rho^2: circles of rho are the borders of Fr
 A = frame diag(semi_axes) stretches to it. The zones reach to `RIM`, or to where the lit side ends.
 
 They are added up over `CELLS` cells along each of `MERIDIANS` meridians. Which fraction of a cell
-is open is for `rtradar.kernels.scatter.zone_edges`.
+is open is for `rtradar.kernels.scatter.zones.zone_edges`.
 """
 
 from __future__ import annotations

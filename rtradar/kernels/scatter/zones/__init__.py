@@ -1,0 +1,1 @@
+"""Kernels of Fresnel zones and the edges that cross them."""
