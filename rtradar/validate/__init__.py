@@ -7,6 +7,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +16,14 @@ from tqdm import tqdm
 
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
-from rtradar.validate.claims import Outcome, choose, claims, run_claim, validation_folder
+from rtradar.validate.claims import (
+    Claim,
+    Outcome,
+    choose,
+    claims,
+    run_claim,
+    validation_folder,
+)
 from rtradar.validate.readme import around_table, markdown, write_readme
 from rtradar.validate.rows import worst
 
@@ -41,6 +49,30 @@ def _lines(outcome: Outcome) -> Iterator[str]:
         yield f"  FAILED  {row.claim}: {row.quantity}: {row.error:.4g} {row.unit}, {limit}"
     if outcome.trouble:
         yield f"  FAILED  {name} {outcome.trouble}"
+
+
+def _run(
+    chosen: Sequence[tuple[Claim, str | None]], *, quick: bool, figures: Path | None
+) -> Iterator[Outcome]:
+    """Run scripts as they are chosen, as many side by side as there are cores.
+
+    Those that measure costs run after all others, one at a time.
+    """
+
+    def run(claim: Claim, key: str | None) -> Outcome:
+        return run_claim(claim, key=key, quick=quick, figures=figures)
+
+    pool = ThreadPoolExecutor(os.cpu_count())
+    try:
+        running = [pool.submit(run, *one) for one in chosen if not one[0].alone]
+        for future in as_completed(running):
+            yield future.result()
+    finally:
+        # An interrupted command begins no other script.
+        pool.shutdown(cancel_futures=True)
+    for one in chosen:
+        if one[0].alone:
+            yield run(*one)
 
 
 def validate(
@@ -92,13 +124,15 @@ def validate(
         figures = figures.resolve()
     outcomes = []
     tqdm.write(_HEAD)
-    with tqdm(chosen, unit="script", disable=None) as bar:
-        for claim, key in bar:
-            bar.set_description(claim.name)
-            outcomes.append(run_claim(claim, key=key, quick=quick, figures=figures))
-            for line in _lines(outcomes[-1]):
+    with tqdm(total=len(chosen), unit="script", disable=None) as bar:
+        for outcome in _run(chosen, quick=quick, figures=figures):
+            outcomes.append(outcome)
+            bar.set_description(outcome.claim.name)
+            bar.update()
+            for line in _lines(outcome):
                 tqdm.write(line)
             sys.stdout.flush()
+    outcomes.sort(key=lambda outcome: outcome.claim.name)
     rows = [row for outcome in outcomes for row in outcome.rows]
     judged = [row for row in rows if row.tolerance is not None]
     passed = all(row.passed for row in rows) and not any(outcome.trouble for outcome in outcomes)

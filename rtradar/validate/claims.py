@@ -41,6 +41,11 @@ class Claim:
         """Name of the script, without its ending."""
         return self.script.stem
 
+    @property
+    def alone(self) -> bool:
+        """Whether it measures times or memory, which other scripts beside it would spoil."""
+        return self.script.parent.name == "cost"
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -104,22 +109,25 @@ def run_claim(
     claim: Claim, *, key: str | None = None, quick: bool = False, figures: Path | None = None
 ) -> Outcome:
     """Run one script in a process of its own, and read its rows."""
-    began, spent = time.perf_counter(), sum(os.times()[2:4])
+    began = time.perf_counter()
     with temporary_folder("rtradar-validate-") as folder:
         written = folder / "rows.json"
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False
-        )
-        said = done.stderr.strip().splitlines() or ["nothing on stderr"]
-        rows, trouble = [], f"ended with status {done.returncode} and left no rows: {said[-1]}"
+        with open(folder / "stderr", "w", encoding="utf-8") as errors:
+            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
+            # What it and its children used, whatever runs beside it.
+            _, ended, used = os.wait4(process.pid, 0)
+            status = process.returncode = os.waitstatus_to_exitcode(ended)
+        text = (folder / "stderr").read_text(encoding="utf-8", errors="replace")
+        said = text.strip().splitlines() or ["nothing on stderr"]
+        rows, trouble = [], f"ended with status {status} and left no rows: {said[-1]}"
         with suppress(OSError, ValueError, KeyError, TypeError):
             rows = [Row(**row) for row in json.loads(written.read_text(encoding="utf-8"))["rows"]]
             trouble = "" if rows else "gave no rows"
-    if rows and done.returncode not in (0, int(not all(row.passed for row in rows))):
-        trouble = f"ended with status {done.returncode}: {said[-1]}"
+    if rows and status not in (0, int(not all(row.passed for row in rows))):
+        trouble = f"ended with status {status}: {said[-1]}"
     kept = [row for row in rows if key is None or row.key == key]
-    seconds, cpu_seconds = time.perf_counter() - began, sum(os.times()[2:4]) - spent  # of children
+    seconds, cpu_seconds = time.perf_counter() - began, used.ru_utime + used.ru_stime
     return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()))
