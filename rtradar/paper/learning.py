@@ -10,10 +10,14 @@ from typing import Any
 import numpy as np
 
 from rtradar.paper.sources import Sources
+from rtradar.report.figures.trainings import draw_confusion, draw_learning
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
 
 SIZES = ("500", "1000", "2000", "3000")
 """Points of a cloud, the columns of table 4."""
+
+CURVES = ("train_loss", "train_accuracy", "test_loss", "test_accuracy")
+"""What is kept of each epoch of a training."""
 
 
 def stored_result() -> dict[str, Any]:
@@ -22,7 +26,8 @@ def stored_result() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``script``, ``commit`` and ``date``; ``paper`` and ``ours`` by points of a cloud.
+        ``script``, ``commit`` and ``date``; ``paper`` and ``ours`` by points of a cloud; the
+        `CURVES` of ``first_trial`` and ``all_epochs``, and the matrix of the ``best`` fold.
     """
     text = files("rtradar.paper").joinpath("stored.json").read_text(encoding="utf-8")
     found: dict[str, Any] = json.loads(text)
@@ -60,19 +65,26 @@ def learning_figures(sources: Sources) -> dict[str, Any]:
         "table4_apart": "; ".join(
             f"{size}: {result['ours'][size]['mean'] - paper[size].mean():+.1f}" for size in SIZES
         ),
-        "lean": "; ".join(f"{size}: {result['lean'][size]:g}" for size in SIZES),
+        "lean": "; ".join(f"{size}: {mean:.1f}" for size, mean in result["lean"].items()),
         "median": float(np.median(chosen)),
         "quartiles": " and ".join(f"{value:.1f}" for value in np.quantile(chosen, (0.25, 0.75))),
         "spatial": _spatial(result["spatial"]),
     }
-    for name in ("first_trial", "all_epochs"):
-        found |= {f"{name}_{key}": value for key, value in result[name].items()}
+    trial, long = result["first_trial"], result["all_epochs"]
+    found |= {
+        "first_trial_epochs": len(trial["test_accuracy"]),
+        "first_trial_test": 100 * trial["test_accuracy"][-1],
+        "all_epochs_loss": long["train_loss"][-1],
+        "all_epochs_train": 100 * long["train_accuracy"][-1],
+        "all_epochs_test_early": 100 * float(np.mean(long["test_accuracy"][60:70])),
+        "all_epochs_test_last": 100 * long["test_accuracy"][-1],
+    }
+    counts = np.array(result["best"]["counts"])
+    found |= {"best": 100 * counts.trace() / counts.sum(), "best_clouds": int(counts.sum())}
     return found | {"rate_batches": 1e-4 * 0.5**12, "rate_160": 1e-4 * 0.5**16}
 
 
 def _shown(one: Mapping[str, Any]) -> str:
-    if one["spread"] is None:
-        return f"{one['mean']:.1f} (first fold alone)"
     return f"{one['mean']:.1f} ± {one['spread']:.1f}"
 
 
@@ -89,25 +101,33 @@ def _spatial(one: Mapping[str, Any] | None) -> str:
 
 
 def _draw(sources: Sources, result: Mapping[str, Any]) -> None:
-    """Draw the paper's four boxes, and ours beside them."""
+    """Draw the paper's four boxes and ours beside them, and what it shows of single trainings."""
     figure = new_figure(4.2)
     axes = figure.subplots()
     place = np.arange(len(SIZES), dtype=np.float64)
-    style: dict[str, Any] = {"widths": 0.28, "showfliers": False, "patch_artist": True}
-    style["medianprops"] = {"color": LIGHT.text}
-    paper = [result["paper"][size] for size in SIZES]
-    style["boxprops"] = {"facecolor": LIGHT.faint}
-    axes.boxplot(paper, positions=place - 0.18, **style)
-    style["boxprops"] = {"facecolor": LIGHT.cycle[0], "alpha": 0.5}
-    for at, size in zip(place + 0.18, SIZES, strict=True):
-        one = result["ours"][size]
-        if each := one.get("each"):
-            axes.boxplot([each], positions=[at], **style)
-        spread = one["spread"] or 0.0
-        axes.errorbar(at, one["mean"], spread, fmt="o", color=LIGHT.cycle[1], capsize=4)
-        axes.annotate(f"{one['folds']}", (at, one["mean"]), (6, -3), textcoords="offset points")
+    for beside, name, colour in ((-0.18, "paper", LIGHT.faint), (0.18, "ours", LIGHT.cycle[0])):
+        boxes = [result[name][size] for size in SIZES]
+        axes.boxplot(
+            boxes if name == "paper" else [one["each"] for one in boxes],
+            positions=place + beside,
+            widths=0.28,
+            showfliers=False,
+            patch_artist=True,
+            boxprops={"facecolor": colour, "alpha": 0.5},
+            medianprops={"color": LIGHT.text},
+        )
     axes.set_xticks(place, SIZES)
-    axes.set(xlabel="Points of a cloud", ylabel="Test accuracy [%]", ylim=(60, 102))
-    title = "Table 4: the paper's ten folds (boxes), ours (dots: mean, spread, number of folds)"
-    dress(axes, title=title)
+    axes.set(xlabel="Points of a cloud", ylabel="Test accuracy [%]", ylim=(45, 102))
+    dress(axes, title="Table 4: ten folds of the paper (left boxes), and ours (right)")
     save_figure(figure, sources.out / "table-4.png")
+    for number, name, title in (
+        (14, "first_trial", "Learning rate 1e-6"),
+        (15, "all_epochs", "Learning rate 1e-4"),
+    ):
+        curves = result[name]
+        epochs = zip(*(curves[key] for key in CURVES), strict=True)
+        history = [dict(zip(CURVES, values, strict=True)) for values in epochs]
+        draw_learning(sources.out / f"figure-{number}.png", [history], title)
+    best = result["best"]
+    counts = np.array(best["counts"])
+    draw_confusion(sources.out / "figure-16.png", counts, best["classes"], "Best of ten folds")

@@ -15,8 +15,7 @@ from rtradar.classify.recipes import LEAN, PAPER
 from rtradar.classify.study import Study, train_study
 from rtradar.classify.training import pick_device, pick_precision
 from rtradar.clouds.collection import Collection
-from rtradar.paper.learning import SIZES
-from rtradar.report.pages.evaluation import draw_confusion, draw_learning
+from rtradar.paper.learning import CURVES, SIZES
 from rtradar.system.seeds import stream
 from rtradar.validate.claims import validation_folder
 
@@ -74,37 +73,25 @@ def train_anew(out: Path) -> dict[str, Any]:
             row = {"mean": float(np.mean(each)), "spread": spread, "folds": len(each), "each": each}
             found[name][size] = row if name == "ours" else row["mean"]
         if name == "ours":
-            _draw_best(out, studies["1000"])
+            found["best"] = _best(studies["1000"])
     first = partial(train_study, clouds, only=[1], device=device)
-    trial = first(out / "full-first-trial", _FIRST_TRIAL)
-    draw_learning(out / "figure-14.png", [trial.outcomes[0].history], "Learning rate 1e-6")
-    found["first_trial"] = {"epochs": _FIRST_TRIAL.epochs_run, "test": _percent(trial)[0]}
+    trial = first(out / "full-first-trial", _FIRST_TRIAL).outcomes[0]
     longer = PAPER.changed(stop_below=0.0, precision=precision)
     long = first(out / "full-all-epochs", longer).outcomes[0]
-    draw_learning(out / "figure-15.png", [long.history], "Learning rate 1e-4")
-    found["all_epochs"] = _course(long)
-    return found
+    return found | {"first_trial": _course(trial), "all_epochs": _course(long)}
 
 
 def _percent(study: Study) -> list[float]:
     return [100 * outcome.accuracy for outcome in study.outcomes]
 
 
-def _draw_best(out: Path, study: Study) -> None:
-    """Draw the confusion matrix of the best fold, as the paper does."""
+def _best(study: Study) -> dict[str, Any]:
+    """Return the counts (truth, answer) of the best fold, of which the paper shows the matrix."""
     best = max(study.outcomes, key=lambda outcome: outcome.accuracy)
-    names = study.plan["classes"]
-    draw_confusion(out / "figure-16.png", confusion([best], len(names)), names, "Best of ten folds")
+    names = list(study.plan["classes"])
+    return {"classes": names, "counts": confusion([best], len(names)).tolist()}
 
 
-def _course(outcome: Outcome) -> dict[str, float]:
-    """Return loss and accuracies after 200 epochs, and the test accuracy of epochs 61 to 70."""
-    rows = outcome.history
-    early = np.mean([row["test_accuracy"] for row in rows[60:70]])
-    last = rows[-1]
-    return {
-        "loss": last["train_loss"],
-        "train": 100 * last["train_accuracy"],
-        "test_early": 100 * float(early),
-        "test_last": 100 * last["test_accuracy"],
-    }
+def _course(outcome: Outcome) -> dict[str, list[float]]:
+    """Return loss and accuracy of training and test, epoch by epoch."""
+    return {key: [round(row[key], 4) for row in outcome.history] for key in CURVES}

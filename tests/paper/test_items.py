@@ -51,7 +51,7 @@ def test_table_4_is_that_of_the_evaluation(tmp_path: Path) -> None:
 def test_table_4_beside_ours_has_its_mean_and_where_it_is_from(tmp_path: Path) -> None:
     found = learning_figures(Sources(tmp_path, quick=True, full=False, recordings={}))
     assert "1000: 90.0 ± 4.7" in found["table4_paper"]
-    assert "1000: 90.0 ± 5.8" in found["table4_ours"]
+    assert "1000: 69.0 ± 9.3" in found["table4_ours"]
     assert stored_result()["commit"] in found["origin"]
     assert (tmp_path / "table-4.png").is_file()
     json.dumps(found, allow_nan=False)

@@ -62,7 +62,7 @@ def test_page_and_numbers_have_the_items_that_are_measured(
         assert set(items[name]) == {"id", "title", *TEXTS, "picture"}
         assert "{" not in items[name]["ours"]
     assert items["table-4"]["picture"] == "table-4.png"
-    assert items["figure-14"]["picture"] is None, "its curves come with --full"
+    assert items["figure-14"]["picture"] == "figure-14.png"
     assert items["equation-3"]["ours"] == "7.14 m/s."
     page = (out / "paper.html").read_text()
     assert all(f'id="{name}"' in page and f'href="#{name}"' in page for name in items)
