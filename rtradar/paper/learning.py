@@ -88,10 +88,8 @@ def _shown(one: Mapping[str, Any]) -> str:
     return f"{one['mean']:.1f} ± {one['spread']:.1f}"
 
 
-def _spatial(one: Mapping[str, Any] | None) -> str:
+def _spatial(one: Mapping[str, Any]) -> str:
     """Say what is known of spatial clouds."""
-    if one is None:
-        return "PointNet on spatial clouds has not been measured yet"
     return (
         f"PointNet with the paper's settings and {one['points']} points of {one['clouds']} clouds: "
         f"{one['spatial']:.1f} % right on spatial clouds and {one['rdt']:.1f} % on the RDT clouds "

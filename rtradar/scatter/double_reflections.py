@@ -23,7 +23,7 @@ from rtradar.kernels.scatter.specular_point import Geometry, Options
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.system.threads import thread_map
@@ -35,7 +35,7 @@ Visible = NDArray[np.bool_]
 
 LEAST_DB = -30.0
 """Power of a pair over that of all single reflections, below which it is left out: of a walker at
-12 GHz 14 of 240 stay, which cost 3 times what the single ones do; 36 above -35 dB cost 8 times."""
+12 GHz 14 of 240 stay (`validation/other_methods/double_reflections.py`)."""
 
 _INSTANTS = 50
 """Chirps of a recording at which the power of pairs is looked at."""
@@ -50,6 +50,26 @@ class Doubles(NamedTuple):
     length: Array
     amplitude: Array
     points: Array
+
+
+class TwoBounceModel(BuiltInModel):
+    """A model of one path a part, to which reflections from part to part may be added."""
+
+    _double: DoubleReflections | None = None
+
+    def _reflect_twice(
+        self, radar: Radar, body: Body, tracer: BodyTracer, *, spreading: bool
+    ) -> None:
+        """Add reflections from part to part from now on."""
+        self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
+
+    def account(self) -> dict[str, Any] | None:
+        """List the pairs of parts that reflect one after the other."""
+        return None if self._double is None else self._double.account()
+
+    def _with_doubles(self, single: Echoes, chirps: Indices) -> Echoes:
+        """Put the reflections from part to part, if any are asked for, after the single ones."""
+        return single if self._double is None else self._double.beside(single, chirps)
 
 
 def check_bounces(fidelity: str, bounces: int) -> None:

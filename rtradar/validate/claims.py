@@ -8,7 +8,6 @@ from its source, so that the choice of one claim does not run the others.
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -115,19 +114,19 @@ def run_claim(
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        with open(folder / "stderr", "w", encoding="utf-8") as errors:
-            process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
-            # What it and its children used, whatever runs beside it.
-            _, ended, used = os.wait4(process.pid, 0)
-            status = process.returncode = os.waitstatus_to_exitcode(ended)
-        text = (folder / "stderr").read_text(encoding="utf-8", errors="replace")
-        said = text.strip().splitlines() or ["nothing on stderr"]
-        rows, trouble = [], f"ended with status {status} and left no rows: {said[-1]}"
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False
+        )
+        said = done.stderr.strip().splitlines() or ["nothing on stderr"]
+        rows, trouble = [], f"ended with status {done.returncode} and left no rows: {said[-1]}"
+        cpu_seconds = 0.0
         with suppress(OSError, ValueError, KeyError, TypeError):
-            rows = [Row(**row) for row in json.loads(written.read_text(encoding="utf-8"))["rows"]]
+            content = json.loads(written.read_text(encoding="utf-8"))
+            rows = [Row(**row) for row in content["rows"]]
+            cpu_seconds = float(content["cpu_seconds"])
             trouble = "" if rows else "gave no rows"
-    if rows and status not in (0, int(not all(row.passed for row in rows))):
-        trouble = f"ended with status {status}: {said[-1]}"
+    if rows and done.returncode not in (0, int(not all(row.passed for row in rows))):
+        trouble = f"ended with status {done.returncode}: {said[-1]}"
     kept = [row for row in rows if key is None or row.key == key]
-    seconds, cpu_seconds = time.perf_counter() - began, used.ru_utime + used.ru_stime
+    seconds = time.perf_counter() - began
     return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()))

@@ -17,7 +17,6 @@ from rtradar.kernels.scatter.double_reflections import solve_double_reference
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter import build_model
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart, solve_doubles
-from rtradar.scene import Scene, Wall, material
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -144,21 +143,10 @@ def test_keyframes_change_nothing_but_fades() -> None:
     np.testing.assert_allclose(found.length[..., kept][there], cold.length[there], atol=1e-7)
 
 
-def test_in_a_room_each_path_has_its_own() -> None:
-    body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
-    wall = Wall(
-        name="left",
-        corner_m=(-50.0, 3.0, -50.0),
-        edge_u_m=(100.0, 0.0, 0.0),
-        edge_v_m=(0.0, 0.0, 100.0),
-        material=material("perfect-conductor"),
-        thickness_m=0.1,
-    )
-    room: Any = build_model("specular", RADAR, body, scene=Scene(walls=(wall,)), bounces=2)
-    echoes = room.echoes(np.array([100]))
-    names = np.array(room.path_names)
-    double = echoes.bounces - [name.count("left") for name in names] == 2
-    assert set(names[double]) == set(names)
+def test_parts_in_one_place_end_the_search() -> None:
+    at = random_pair(0)
+    at = at._replace(centres=np.repeat(at.centres[:, :1], 2, axis=1))
+    assert not solve_doubles(at, np.array([[0, 1]])).amplitude.any()
 
 
 @pytest.mark.parametrize("bounces", [0, 3])

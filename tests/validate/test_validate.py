@@ -71,6 +71,21 @@ def test_good_rows_pass_and_are_kept(
     assert found["scripts"][0]["keys"] == ["sphere", "colour"]
 
 
+def test_scripts_of_costs_run_alone_after_all_others(folder: Path, tmp_path: Path) -> None:
+    # Each notes when it begins and when it has measured; the one of costs is first by name.
+    notes = tmp_path / "notes"
+    note = f'open({str(notes)!r}, "a").write(__file__ + chr(10))'
+    text = GOOD.replace("    error =", f"    {note}\n    error =")
+    text = text.replace("    return", f"    {note}\n    return")
+    (folder / "cost").mkdir()
+    for place in ("cost/a_first.py", "toys/balls.py", "toys/cubes.py"):
+        (folder / place).write_text(text)
+    assert main(["validate"]) == 0
+    names = [Path(line).name for line in notes.read_text().splitlines()]
+    assert sorted(names[:4]) == ["balls.py"] * 2 + ["cubes.py"] * 2
+    assert names[4:] == ["a_first.py"] * 2
+
+
 def test_quick_and_figures_reach_the_script(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

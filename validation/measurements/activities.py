@@ -47,7 +47,7 @@ DATA = {
 
 TRAININGS = {
     **{f"lean-{size}": f"paper-400 --points {size}" for size in SIZES},
-    # A quarter of an hour on a GPU, most of a day on two cores.
+    # Most of a day on two cores; a GPU is used where there is one.
     **{f"paper-{size}": f"paper-400 --recipe paper --points {size}" for size in SIZES},
     "paper-1000-unit-sphere": "paper-400 --recipe paper --scaling unit-sphere --fold 1",
     "paper-1000-turned": "paper-400 --recipe paper --augmentation turned --fold 1",

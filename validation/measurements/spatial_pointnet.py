@@ -4,10 +4,10 @@
 
 The paper tried points x, y, z without Doppler, and had less than half of them right. Here both
 kinds of clouds are of the 400 captures of ``paper_400.toml``, in the paper's ten folds. That takes
-minutes on a GPU and most of a day on two cores; ``--fold`` takes some of the folds. Each cloud is
-scaled by one number, for x, y and z are alike; RDT clouds are scaled as always. The script goes on
-where it was stopped. With ``--json`` it writes what ``rtradar/paper/stored.json`` has under
-``spatial``, but for commit and date.
+most of a day on two cores; a GPU is used where there is one, and ``--fold`` takes some of the
+folds. Each cloud is scaled by one number, for x, y and z are alike; RDT clouds are scaled as
+always. The script goes on where it was stopped. With ``--json`` it writes what
+``rtradar/paper/stored.json`` has under ``spatial``, but for commit and date.
 """
 
 from __future__ import annotations

@@ -34,6 +34,9 @@ ellipsoid's size; it leaves about as much in the amplitude."""
 _LONGEST_STEP = 0.5
 """Longest step of Newton's method, on the unit sphere."""
 
+_MOST_ADDED = 1e6
+"""Most that is added to the diagonal of the matrix [m]."""
+
 
 class Reflector(NamedTuple):
     """One ellipsoid: ``centre (3,)``, ``frame (3, 3)`` and ``axes (3,)`` [m]."""
@@ -210,17 +213,16 @@ def _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix):
 
 
 @inlined()
-def _search(tx, rx, first, second, options, u, v, points):
+def _search(tx, rx, first, second, options, u, v, points, rows, square):
     """Find the path of one pair from the unit vectors ``u, v (3,)``; they and ``points`` are set.
 
-    Returned are its length and its amplitude, 0 where there is no such reflection.
+    Returned are its length and its amplitude, 0 where there is no such reflection. ``rows (15, 3)``
+    and ``square (10, 4)`` are room to work in.
     """
     p, q = points[0], points[1]
-    tangent_p, tangent_q = np.empty((2, 3)), np.empty((2, 3))
-    along_p, along_q = np.empty((2, 3)), np.empty((2, 3))
-    s1, s2, s3 = np.empty(3), np.empty(3), np.empty(3)
-    slope, step = np.empty(4), np.empty(4)
-    matrix, lower = np.empty((4, 4)), np.zeros((4, 4))
+    tangent_p, tangent_q, along_p, along_q = rows[0:2], rows[2:4], rows[4:6], rows[6:8]
+    s1, s2, s3 = rows[8], rows[9], rows[10]
+    matrix, lower, slope, step = square[0:4], square[4:8], square[8], square[9]
     r1 = r2 = r3 = 0.0
     found, drop = False, 0.0
     for _ in range(_MAX_STEPS):
@@ -234,12 +236,15 @@ def _search(tx, rx, first, second, options, u, v, points):
         _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix)
         definite = _factor(matrix, lower)
         more = 0.0
-        while not definite:
+        while not definite and more < _MOST_ADDED:
             # Toward steepest descent, until the matrix is positive definite.
             more = max(2 * more, 1e-3)
             for i in range(4):
                 matrix[i, i] += more
             definite = _factor(matrix, lower)
+        if not definite:
+            # Not a number, as where both points are one.
+            return r1 + r3, 0.0
         _solved(lower, slope, step)
         size = 0.0
         for i in range(4):
@@ -259,14 +264,13 @@ def _search(tx, rx, first, second, options, u, v, points):
     length = r1 + r2 + r3 - drop
     if not found:
         return length, 0.0
-    normal_p, normal_q = np.empty(3), np.empty(3)
+    normal_p, normal_q, sent, received = rows[11], rows[12], rows[13], rows[14]
     area = _normal(first, u, normal_p) * _normal(second, v, normal_q)
     cosine_p, cosine_q = -dot(s1, normal_p), -dot(s3, normal_q)
     # Each surface faces both ends of its legs.
     if min(min(cosine_p, dot(s2, normal_p)), min(cosine_q, -dot(s2, normal_q))) <= 0:
         return length, 0.0
     root = lower[0, 0] * lower[1, 1] * lower[2, 2] * lower[3, 3]
-    sent, received = np.empty(3), np.empty(3)
     _polarised(s1, options.horizontal, sent)
     _polarised(s3, options.horizontal, received)
     _reflected(sent, normal_p)
@@ -284,7 +288,7 @@ def solve_double(begin, end, at, pairs, start, options, length, amplitude, point
     where nothing is known, are replaced by those of the last receiver.
     """
     tx, rx, centres, frames, semi_axes = at
-    u, v = np.empty(3), np.empty(3)
+    u, v, rows, square = np.empty(3), np.empty(3), np.empty((15, 3)), np.empty((10, 4))
     for chirp in range(begin, end):
         for pair in range(len(pairs)):
             a, b = pairs[pair, 0], pairs[pair, 1]
@@ -299,7 +303,7 @@ def solve_double(begin, end, at, pairs, start, options, length, amplitude, point
                     _bisecting(first, tx[chirp], second.centre, u)
                     _bisecting(second, first.centre, rx[chirp, receiver], v)
                 given = first, second, options, u, v, points[chirp, receiver, pair]
-                found = _search(tx[chirp], rx[chirp, receiver], *given)
+                found = _search(tx[chirp], rx[chirp, receiver], *given, rows, square)
                 length[chirp, receiver, pair], amplitude[chirp, receiver, pair] = found
                 known = found[1] != 0
                 if known:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
-    DoubleReflections,
+    TwoBounceModel,
     check_bounces,
     double_scattering,
 )
@@ -79,7 +79,7 @@ def fresnel_scattering(
     return field
 
 
-class Fresnel(BuiltInModel):
+class Fresnel(TwoBounceModel):
     """`fresnel`: lengths and returns of `specular`, times the visible fraction V of Fresnel zones.
 
     Mitsuba decides for each antenna which corners of the zones' cells it sees.
@@ -122,13 +122,8 @@ class Fresnel(BuiltInModel):
         self.fractions = ZoneFractions(
             radar, body, self._frequency, tracer, shadow_rays=shadow_rays
         )
-        self._double: DoubleReflections | None = None
         if bounces == 2:
-            self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
-
-    def account(self) -> dict[str, Any] | None:
-        """List the pairs of parts that reflect one after the other."""
-        return None if self._double is None else self._double.account()
+            self._reflect_twice(radar, body, tracer, spreading=spreading)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -140,4 +135,4 @@ class Fresnel(BuiltInModel):
         # The amplitude of an echo is the conjugate of the scattering length.
         left = amplitude * fractions.conj()
         single = one_echo_a_part(at.tx_index, length, left, self._frequency)
-        return single if self._double is None else self._double.beside(single, chirps)
+        return self._with_doubles(single, chirps)

@@ -19,14 +19,13 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.keyframes import keyframe_before
 from rtradar.scatter.common.poses import (
-    BuiltInModel,
     chirp_poses,
     has_mesh,
     one_echo_a_part,
     owners_of,
 )
 from rtradar.scatter.double_reflections import (
-    DoubleReflections,
+    TwoBounceModel,
     check_bounces,
     double_scattering,
 )
@@ -73,7 +72,7 @@ def optics_scattering(
     return field
 
 
-class PhysicalOptics(BuiltInModel):
+class PhysicalOptics(TwoBounceModel):
     """`physical-optics`: facets at keyframes, three frequencies and a few places of the array.
 
     Parameters
@@ -150,12 +149,11 @@ class PhysicalOptics(BuiltInModel):
                 "facets out, or take body = 'ellipsoids'"
             )
         self.variant: str | None = self._surface.variant
-        self._double: DoubleReflections | None = None
         if bounces == 2:
             if has_mesh(body):
                 raise InputError(_NO_DOUBLES.format("take body = 'ellipsoids'"))
             tracer = BodyTracer(use(select(variant)), body.semi_axes)
-            self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
+            self._reflect_twice(radar, body, tracer, spreading=spreading)
         self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
         # From coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
@@ -199,10 +197,6 @@ class PhysicalOptics(BuiltInModel):
         ratio = np.where(specular != 0, amplitude / np.where(specular != 0, specular, 1.0), 0.0)
         return Sample(ratio, np.abs(specular))
 
-    def account(self) -> dict[str, Any] | None:
-        """List the pairs of parts that reflect one after the other."""
-        return None if self._double is None else self._double.account()
-
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
@@ -230,4 +224,4 @@ class PhysicalOptics(BuiltInModel):
                     over_array = weights[at.tx_index[inside]] @ ratio
                     amplitude[:, inside] = over_array * strength[inside]
         single = one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
-        return single if self._double is None else self._double.beside(single, chirps)
+        return self._with_doubles(single, chirps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
-    DoubleReflections,
+    TwoBounceModel,
     check_bounces,
     double_scattering,
 )
@@ -23,7 +23,7 @@ from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 
-class Specular(BuiltInModel):
+class Specular(TwoBounceModel):
     """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
 
     Parameters
@@ -79,15 +79,10 @@ class Specular(BuiltInModel):
         self.variant: str | None = backend.kind
         self.tracer = BodyTracer(use(backend), body.semi_axes)
         self.visibility = SpecularVisibility(radar, body, self.tracer)
-        self._double: DoubleReflections | None = None
         if bounces == 2:
-            self._double = DoubleReflections(radar, body, self.tracer, spreading=spreading)
+            self._reflect_twice(radar, body, self.tracer, spreading=spreading)
             # Each path over walls has reflections from part to part of its own.
             self.fast_over_walls = False
-
-    def account(self) -> dict[str, Any] | None:
-        """List the pairs of parts that reflect one after the other."""
-        return None if self._double is None else self._double.account()
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -95,7 +90,7 @@ class Specular(BuiltInModel):
         length, amplitude = self.specular_echo(chirps, at)
         centre_hz = self._radar.centre_frequency_hz
         single = one_echo_a_part(at.tx_index, length, amplitude, centre_hz)
-        return single if self._double is None else self._double.beside(single, chirps)
+        return self._with_doubles(single, chirps)
 
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None

@@ -107,6 +107,15 @@ def from_images(fidelity: str, body: Any, tx: Array, rx: Array, polarization: st
     return complex(length / (ranges[0] * ranges[1]) * np.exp(-2j * np.pi * turns))
 
 
+def test_reflections_from_part_to_part_go_over_every_path(wall: Make) -> None:
+    body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
+    room: Any = build_model("specular", SMALL, body, scene=Scene(walls=(wall("left"),)), bounces=2)
+    echoes = room.echoes(np.array([100]))
+    names = np.array(room.path_names)
+    double = echoes.bounces - [name.count("left") for name in names] == 2
+    assert set(names[double]) == set(names)
+
+
 @pytest.mark.parametrize(("side", "polarization", "sign"), MIRRORS)
 @pytest.mark.parametrize("fidelity", MODELS.built_in)
 def test_before_one_mirror_stand_the_radar_and_its_image(
