@@ -45,8 +45,9 @@ from helpers import rms
 from levels_against_full_wave import Polarization, antennas, field
 
 Complex = NDArray[np.complex128]
-KEY = "double-reflections"
-judged, reported = (partial(kind, key=KEY) for kind in (rows.judged, rows.reported))
+judged, reported = (
+    partial(kind, key="double-reflections") for kind in (rows.judged, rows.reported)
+)
 
 LEVELS = ("specular", "fresnel", "physical-optics")
 ASPECTS_DEG = np.array([20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0])
