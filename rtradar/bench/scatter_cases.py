@@ -152,7 +152,7 @@ def _radiate_tubes(k: Any) -> Calls:
     rx, wavenumber = np.array([[-4.0, 0.5, 0.2]]), np.array([_WAVENUMBER])
     out, length = np.empty((8, 1, 1, 1), dtype=np.complex128), np.full((1, 1), 8.0)
     given = tubes, np.ones((1, count), dtype=np.bool_), rx, wavenumber, length
-    call = filled(k.radiate_tubes, *given, False, True, False, out=(out,), adds=True)
+    call = filled(k.radiate_tubes, 0, 8, *given, False, True, False, out=(out,), adds=True)
     reference = (tubes, rx[0], _WAVENUMBER, 8.0)
     return lambda: call()[0].sum(), lambda: k.radiate_tubes_reference(*reference)
 
@@ -217,7 +217,7 @@ def _nearby_points(k: Any) -> Calls:
     centres, frames = (np.repeat(array, 100, axis=0) for array in at[2:4])
     given = images, zero, k.Ellipsoids(centres, frames, at.semi_axes)
     out = np.empty((100, 8, 147)), np.empty((100, 8, 147))
-    call = filled(k.nearby_echoes, *given, near, out=out)
+    call = filled(k.nearby_echoes, 0, 100, *given, near, out=out)
     return call, lambda: k.nearby_echoes_reference(*given)
 
 
@@ -225,7 +225,7 @@ def _nearby_points(k: Any) -> Calls:
 def _far_field(k: Any) -> Calls:
     at = _geometry(1000, 8, 21)
     out = np.empty((1000, 8, 21)), np.empty((1000, 8, 21))
-    return filled(k.far_field, at, True, out=out), lambda: k.far_field_reference(at, True)
+    return filled(k.far_field, 0, 1000, at, True, out=out), lambda: k.far_field_reference(at, True)
 
 
 def _views(parts: int) -> tuple[Any, Any, Any]:
@@ -314,7 +314,7 @@ def _path_amplitudes(k: Any) -> Calls:
     at = k.Blend(interval, rng.random(100), line, *ends)
     given = rng.normal(size=(100, 8, 273)), before, after, at
     out = (np.empty((3, 100, 8, 273), dtype=np.complex64),)
-    call = filled(k.path_amplitudes, *given, out=out)
+    call = filled(k.path_amplitudes, 0, 100, *given, out=out)
     return call, lambda: k.path_amplitudes_reference(*given)
 
 
@@ -330,7 +330,7 @@ def _delayed_lengths(k: Any) -> Calls:
     delays = k.SlabDelays(np.arange(273), np.array(legs), passes, np.array(slabs))
     bodies, tx = Ellipsoids(*at[2:]), rng.integers(0, 4, 100)
     given = antennas, tx, points, bodies, delays, 8 + rng.random((100, 8, 273))
-    call = filled(k.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
+    call = filled(k.delayed_lengths, 0, 100, *given, out=(np.empty((100, 8, 273)),))
     return call, lambda: k.delayed_lengths_reference(*given)
 
 

@@ -13,13 +13,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from scipy import fft
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.nufft import closed_grid
+from rtradar.system.threads import in_threads
 
 ANCHORS = 4
 """Anchors around a chirp through which the cubic goes."""
@@ -105,9 +105,11 @@ def add_anchored_tones(
         changed = (np.diff(own.first) != 0) | (np.diff(own.tx) != 0)
         runs = np.concatenate([[0], np.flatnonzero(changed) + 1, [len(some)]])
         grid = np.empty((len(some), receivers, cells), dtype=np.complex64)
-        _spread_anchored(anchors, own, runs, sweep, half, level, powers, grid)
+        items = (len(runs) - 1) * receivers
+        given = anchors, own, runs, sweep, half, level, powers, grid
+        in_threads(_spread_anchored, items, *given)
         summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
-        _add_rows(summed, weights, half, some, out)
+        in_threads(_add_rows, len(some), summed, weights, half, some, out)
 
 
 @lru_cache
@@ -131,11 +133,11 @@ def _windows(samples: int, cells: int) -> _Windows:
     return _Windows(fitted(0, _TAPS, _PLACES), powers, weights[:samples, 0].astype(np.float32))
 
 
-@compiled(parallel=True)
-def _add_rows(summed, weights, half, rows, out):
-    """Add the samples of grids after the FFT to rows of ``out``, weighted."""
+@compiled()
+def _add_rows(start, stop, summed, weights, half, rows, out):
+    """Add the samples of grids ``start`` to ``stop`` to rows of ``out`` after the FFT, weighted."""
     cells, samples = summed.shape[2], out.shape[2]
-    for i in prange(len(rows)):
+    for i in range(start, stop):
         for receiver in range(out.shape[1]):
             source, target = summed[i, receiver], out[rows[i], receiver]
             for sample in range(half):
@@ -178,17 +180,18 @@ def _course(length, carrier, sweep, cells_per_m, place, turn, steps):
             before = after
 
 
-@compiled(parallel=True, fastmath={"contract"})
-def _spread_anchored(anchors, between, runs, sweep, half, level, powers, grid):
+@compiled(fastmath={"contract"})
+def _spread_anchored(start, stop, anchors, between, runs, sweep, half, level, powers, grid):
     """Fill ``grid (chirp, rx, cell)`` with the tones' windows, phases about sample ``half``.
 
-    The chirps of a run, from ``runs (run + 1,)``, have their anchors and their Tx in common.
+    The chirps of a run, from ``runs (run + 1,)``, have their anchors and their Tx in common. Filled
+    are items ``start`` to ``stop``, one for each run and receiver.
     """
     receivers, cells = grid.shape[1:]
     echoes, changing = anchors.length.shape[3], anchors.change.shape[5]
     flat = echoes - changing
     cells_per_m = sweep.slope / SPEED_OF_LIGHT_MPS / sweep.sample_rate * cells
-    for item in prange((len(runs) - 1) * receivers):
+    for item in range(start, stop):
         run, receiver = item // receivers, item % receivers
         real, imaginary = np.empty((2, cells + _WIDER), dtype=np.float32)
         begin, turn = np.empty((2, echoes), dtype=np.float32)

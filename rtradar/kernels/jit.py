@@ -22,19 +22,16 @@ class CacheWarning(UserWarning):
     """Compiled code cannot be kept on disk: results are right, but every process compiles again."""
 
 
-def compiled(
-    *, parallel: bool = False, fastmath: bool | set[str] = False
-) -> Callable[[_Function], _Function]:
+def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
     It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code
     is loaded again as long as all that went into it is the same, functions and constants of other
-    modules included. Where it cannot be kept, a `CacheWarning` says so once. If ``parallel``, Numba
-    distributes its ``prange`` among threads; ``fastmath`` are the liberties that LLVM may take with
-    floating point: all of them, or those named.
+    modules included. Where it cannot be kept, a `CacheWarning` says so once. ``fastmath`` are the
+    liberties that LLVM may take with floating point: all of them, or those named.
     """
     numba_decorator: Callable[[_Function], Any] = njit(
-        nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
+        nogil=True, error_model="numpy", fastmath=fastmath
     )
 
     def decorator(function: _Function) -> _Function:

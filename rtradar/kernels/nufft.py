@@ -15,7 +15,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from scipy import fft
 
@@ -23,6 +22,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.elementary import phasor
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.tone_sum import Tones
+from rtradar.system.threads import in_threads
 
 _POWERS = 3
 """Powers of the sample number that one grid takes, for an amplitude at three frequencies."""
@@ -83,7 +83,7 @@ def sum_by_nufft(tones: Tones, out: NDArray[np.complex64]) -> None:
         for number, parabola in enumerate(parabolas):
             own = tones._replace(length=tones.length[some], amplitude=amplitude, powers=parabola)
             grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
-            _spread_tones(own, half, samples, gaussian, grid)
+            in_threads(_spread_tones, len(grid), own, half, samples, gaussian, grid)
             summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
             if number > 0:
                 sums *= cubic
@@ -159,14 +159,17 @@ def closed_grid(real, imaginary, before, out):
         out[cell] = complex(real[before + cell], imaginary[before + cell])
 
 
-@compiled(parallel=True, fastmath={"contract"})
-def _spread_tones(tones, half, samples, gaussian, grid):
-    """Fill ``grid (chirp, rx, cell)`` with Gaussians of the tones, phases about sample ``half``."""
-    chirps, receivers, cells = grid.shape
+@compiled(fastmath={"contract"})
+def _spread_tones(start, stop, tones, half, samples, gaussian, grid):
+    """Fill ``grid (chirp, rx, cell)`` with Gaussians of the tones, phases about sample ``half``.
+
+    Chirps ``start`` to ``stop`` are filled.
+    """
+    _, receivers, cells = grid.shape
     nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
     powers, variance = tones.powers, gaussian.variance
     width = cells / (2 * math.pi * samples)
-    for chirp in prange(chirps):
+    for chirp in range(start, stop):
         real = np.empty(cells + _TAPS, dtype=np.float32)
         imaginary = np.empty(cells + _TAPS, dtype=np.float32)
         position, across, up = np.empty(echoes), np.empty(echoes), np.empty(echoes)

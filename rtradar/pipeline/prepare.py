@@ -37,11 +37,13 @@ from rtradar.signal import Noise
 from rtradar.signal.phase_noise import mean_delays
 from rtradar.signal.receiver import Expected, ReceiverStage
 from rtradar.system.checks import brief
+from rtradar.system.threads import one_blas_thread
 
 Moving = Motion | Person | Sequence[Motion | Person | Object]
 """Who and what moves: one or several, with a bare motion for a person where the scene puts them."""
 
 
+@one_blas_thread()
 def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
     """Place people before a radar and settle everything that the first echo needs.
 

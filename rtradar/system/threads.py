@@ -1,16 +1,21 @@
-"""A thread map on threads that stay: starting some costs as much as the work of a short call."""
+"""Threads that stay, for starting some costs as much as a short call, and work done one ahead."""
 
 from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from contextvars import copy_context
 from functools import lru_cache
 from typing import Any, TypeVar
 
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, for workers that share cores."""
+
+_PARTS = 4
+"""Parts of its work that each thread gets, so that a slower one has fewer."""
 
 _Result = TypeVar("_Result")
 
@@ -80,6 +85,52 @@ def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
     if failed:
         raise failed[min(failed)]
     return results
+
+
+def in_threads(kernel: Callable[..., Any], count: int, *given: Any) -> list[Any]:
+    """Call ``kernel(start, stop, *given)`` for parts of ``count`` items, a few for each thread.
+
+    Returned is what each call returns, in order.
+    """
+    size = max(1, -(-count // (_PARTS * thread_count())))
+    return thread_map(
+        lambda start: kernel(start, min(start + size, count), *given), range(0, count, size)
+    )
+
+
+def one_ahead(works: Iterable[Callable[[], _Result]]) -> Generator[_Result, None, None]:
+    """Yield the result of each piece of work, while a thread does the next one.
+
+    Works are taken here, in order and one more than has been yielded, and done one after another.
+    With one thread there is nobody to do the next. Who may leave before the end closes the
+    iterator (`contextlib.closing`), which waits until no more work is done.
+    """
+    if thread_count() == 1:
+        for work in works:
+            yield work()
+        return
+    with ThreadPoolExecutor(1, thread_name_prefix="rtradar-ahead") as ahead:
+        current: Future[_Result] | None = None
+        for work in works:
+            following = ahead.submit(copy_context().run, work)
+            if current is not None:
+                yield current.result()
+            current = following
+        if current is not None:
+            yield current.result()
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let products of matrices take one thread each inside, in the whole process.
+
+    After each product OpenBLAS's threads wait for the next in a loop, which takes a core from those
+    of `thread_map`.
+    """
+    from threadpoolctl import threadpool_limits  # looks through all libraries that are loaded
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def _all_of(shared: list[Callable[[], None]]) -> None:

@@ -10,6 +10,7 @@ import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import wait
+from contextlib import closing
 from functools import partial
 
 import pytest
@@ -17,6 +18,8 @@ import pytest
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
+    in_threads,
+    one_ahead,
     thread_count,
     thread_environment,
     thread_limit,
@@ -148,3 +151,59 @@ def test_every_kind_of_thread_is_limited() -> None:
         [sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True
     )
     assert found.stdout.split() == ["1", "1", "1"]
+
+
+def test_parts_of_the_work_cover_all_items_once() -> None:
+    for count in (0, 1, 7, 100):
+        parts = in_threads(lambda start, stop: range(start, stop), count)
+        assert [item for part in parts for item in part] == list(range(count))
+
+
+@pytest.mark.parametrize("count", ["1", "2"])
+def test_work_is_done_in_order_and_at_most_one_ahead(
+    count: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, count)
+    done: list[int] = []
+
+    def work(item: int) -> int:
+        done.append(item)
+        return item
+
+    seen = []
+    for item in one_ahead(partial(work, item) for item in range(10)):
+        seen.append(item)
+        assert done == list(range(len(done)))
+        assert len(done) <= item + 2
+    assert seen == list(range(10))
+
+
+def test_an_error_in_work_ahead_is_raised_where_its_result_is_due(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, "2")
+
+    def work(item: int) -> int:
+        if item == 2:
+            raise ValueError("item 2")
+        return item
+
+    results = one_ahead(partial(work, item) for item in range(10))
+    assert [next(results), next(results)] == [0, 1]
+    with pytest.raises(ValueError, match="item 2"):
+        next(results)
+
+
+def test_closing_waits_until_no_work_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, "2")
+    begun, ended = [], []
+
+    def work(item: int) -> None:
+        begun.append(item)
+        time.sleep(0.01)
+        ended.append(item)
+
+    with closing(one_ahead(partial(work, item) for item in range(10))) as results:
+        next(results)
+    assert begun == ended
+    assert len(begun) <= 2

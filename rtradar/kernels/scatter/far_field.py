@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 
 from rtradar.kernels.jit import compiled
 from rtradar.kernels.scatter.specular_point import in_part_axes
@@ -16,12 +15,15 @@ _NO_BISECTOR = 1e-24
 _LANES = 8
 
 
-@compiled(parallel=True, fastmath={"contract"})
-def far_field(at, spreading, length, amplitude):
-    """Fill length and amplitude (chirp, rx, part) [m] for a `specular_point.Geometry`."""
+@compiled(fastmath={"contract"})
+def far_field(start, stop, at, spreading, length, amplitude):
+    """Fill length and amplitude (chirp, rx, part) [m] for a `specular_point.Geometry`.
+
+    Chirps ``start`` to ``stop`` are filled.
+    """
     tx, rx, centres, frames, semi_axes = at
-    chirps, receivers, parts = length.shape
-    for chirp in prange(chirps):
+    _, receivers, parts = length.shape
+    for chirp in range(start, stop):
         to_tx = np.empty(3)
         # Receivers side by side: to each of them in the axes of the part, then length and
         # amplitude. In one array of a known size: of many the compiler would have to fear that they

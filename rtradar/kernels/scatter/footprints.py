@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.kernels.elementary import phasor
@@ -68,15 +67,18 @@ def _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered):
     return weight
 
 
-@compiled(parallel=True)
-def radiate_tubes(tubes, visible, rx, wavenumber, length, horizontal, spreading, tapered, out):
+@compiled()
+def radiate_tubes(
+    start, stop, tubes, visible, rx, wavenumber, length, horizontal, spreading, tapered, out
+):
     """Add what tubes send to receivers to ``out (chunk, node, rx, group)``, a part in each chunk.
 
-    ``visible (rx, tube)``, ``rx (rx, 3)`` [m], ``wavenumber (node,)`` [1/m], and the path ``length
-    (rx, group)`` whose phase is taken out [m].
+    Tasks ``start`` to ``stop`` are done, one for each chunk and receiver. ``visible (rx, tube)``,
+    ``rx (rx, 3)`` [m], ``wavenumber (node,)`` [1/m], and the path ``length (rx, group)`` whose
+    phase is taken out [m].
     """
     count, receivers, chunks = len(tubes.group), len(rx), len(out)
-    for task in prange(chunks * receivers):
+    for task in range(start, stop):
         chunk, receiver = task // receivers, task % receivers
         x, y, z = rx[receiver, 0], rx[receiver, 1], rx[receiver, 2]
         u = np.empty(3)

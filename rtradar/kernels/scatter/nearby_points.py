@@ -13,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
@@ -176,25 +175,25 @@ def _correct(rx, point, plane, out, least, room):
     return good
 
 
-@compiled(parallel=True)
-def nearby_echoes(images, tx_index, ellipsoids, near, length, amplitude):
+@compiled()
+def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, amplitude):
     """Lengths and returns of echoes, by one or two steps from near their specular points.
 
-    Filled are ``length`` and ``amplitude (chirp, rx, echo)``: path lengths, and the returns of a
-    perfect conductor over R1 R2 without regard to polarisation [m]. ``tx_index (chirp,)`` is the
-    transmitter of each chirp. Echoes that are not wanted get the path over the part's centre and no
-    return. Returned is the number of echoes, over all chirps, that had to be searched for as by
-    `solve`: where the steps do not settle on the side that both antennas see, or lengths may be off
-    by 1 um. That is near forward scattering, where a small step of an antenna moves the specular
-    point far.
+    Chirps ``start`` to ``stop`` are computed. Filled are ``length`` and ``amplitude (chirp, rx,
+    echo)``: path lengths, and the returns of a perfect conductor over R1 R2 without regard to
+    polarisation [m]. ``tx_index (chirp,)`` is the transmitter of each chirp. Echoes that are not
+    wanted get the path over the part's centre and no return. Returned is the number of echoes, over
+    all chirps, that had to be searched for as by `solve`: where the steps do not settle on the side
+    that both antennas see, or lengths may be off by 1 um. That is near forward scattering, where a
+    small step of an antenna moves the specular point far.
     """
     # Unpacked here, as in `solve`.
     images_tx, images_rx, images_middle, out_leg, back_leg, part_of = images
     centres, frames, semi_axes = ellipsoids
     befores, afters, wanted, intervals, lines, fractions, tx_weights = near
-    chirps, receivers, echoes = length.shape
+    _, receivers, echoes = length.shape
     searched = 0
-    for chirp in prange(chirps):
+    for chirp in range(start, stop):
         room, one, guess, source = np.empty((6, receivers)), np.empty(5), np.empty(3), np.empty(3)
         local_r, up = np.empty((3, receivers)), np.zeros(3)
         transmitter, which, line = tx_index[chirp], intervals[chirp], lines[chirp]

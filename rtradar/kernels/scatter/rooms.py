@@ -6,7 +6,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.kernels.elementary import smoothstep
@@ -41,17 +40,18 @@ class Blend(NamedTuple):
     rx_weight: Array
 
 
-@compiled(parallel=True, fastmath={"contract"})
-def path_amplitudes(bare, before, after, at, out):
+@compiled(fastmath={"contract"})
+def path_amplitudes(start, stop, bare, before, after, at, out):
     """Fill ``out (node, chirp, rx, echo)`` complex64 with amplitudes of echoes over paths.
 
-    They are ``bare (chirp, rx, echo)`` times the conjugate of what is left of the echoes, given by
-    the `PathFactors` ``before`` and ``after`` each interval and the `Blend` ``at``. Factors change
-    linearly from keyframe to keyframe, visibility by `smoothstep`.
+    Chirps ``start`` to ``stop`` are filled. Amplitudes are ``bare (chirp, rx, echo)`` times the
+    conjugate of what is left of the echoes, given by the `PathFactors` ``before`` and ``after``
+    each interval and the `Blend` ``at``. Factors change linearly from keyframe to keyframe,
+    visibility by `smoothstep`.
     """
-    nodes, chirps, receivers, echoes = out.shape
+    nodes, _, receivers, echoes = out.shape
     ends = at.rx_weight.shape[2]
-    for chirp in prange(chirps):
+    for chirp in range(start, stop):
         which, line, fraction = at.interval[chirp], at.line[chirp], at.fraction[chirp]
         smooth = smoothstep(fraction)
         left = np.zeros((ends, echoes), dtype=np.float32)
@@ -157,16 +157,17 @@ def _leg(row):
     return row[0], row[1], row[2]
 
 
-@compiled(parallel=True)
-def delayed_lengths(antennas, tx_index, points, bodies, delays, length, out):
+@compiled()
+def delayed_lengths(start, stop, antennas, tx_index, points, bodies, delays, length, out):
     """Fill ``out (chirp, rx, column)`` with path lengths and the delays of slabs [m].
 
-    ``antennas`` are `LegAntennas`, ``tx_index (chirp,)`` the transmitters, ``points`` the
-    `PartPoints` towards which echoes leave the ``bodies``, which are `Ellipsoids`, ``delays``
-    `SlabDelays`, and ``length (chirp, rx, echo)`` lengths without slabs.
+    Chirps ``start`` to ``stop`` are filled. ``antennas`` are `LegAntennas`, ``tx_index (chirp,)``
+    the transmitters, ``points`` the `PartPoints` towards which echoes leave the ``bodies``, which
+    are `Ellipsoids`, ``delays`` `SlabDelays`, and ``length (chirp, rx, echo)`` lengths without
+    slabs.
     """
-    chirps, receivers, columns = out.shape
-    for chirp in prange(chirps):
+    _, receivers, columns = out.shape
+    for chirp in range(start, stop):
         transmitter = tx_index[chirp]
         places = np.empty((len(points.part), 3))
         for echo in range(len(points.part)):

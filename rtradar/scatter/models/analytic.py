@@ -17,6 +17,7 @@ from rtradar.rcs import ellipsoid
 from rtradar.scatter.common.polarization import unit
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.target import sum_of_echoes, target_geometry
+from rtradar.system.threads import in_threads
 
 
 def far_field_echo(
@@ -34,7 +35,7 @@ def far_field_echo(
     at = Geometry.of(at)
     shape = (*at.rx.shape[:2], at.centres.shape[1])
     length, amplitude = np.empty(shape), np.empty(shape)
-    far_field(at, spreading, length, amplitude)
+    in_threads(far_field, len(length), at, spreading, length, amplitude)
     return length, amplitude
 
 

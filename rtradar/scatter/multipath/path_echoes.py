@@ -20,6 +20,7 @@ from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.wall_interaction import Passage, Passages, WallResponse
+from rtradar.system.threads import in_threads
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -78,7 +79,8 @@ class LegImages:
         if formula is None:
             legs = np.ascontiguousarray(self.of_path[path].T)
             antennas = Images(tx, self._in_lanes, self._middle, legs[0], legs[1], part)
-            nearby_echoes(antennas, poses.tx_index, bodies, near, length, amplitude)
+            given = antennas, poses.tx_index, bodies, near, length, amplitude
+            in_threads(nearby_echoes, len(length), *given)
             return length, amplitude
         for number in np.unique(path):
             own, (out, back) = path == number, self.of_path[number]
@@ -164,7 +166,8 @@ class EchoColumns:
         out = np.empty((*length.shape[:2], len(self)))
         where = PartPoints(points, self.part)
         bodies = Ellipsoids(at.centres, at.frames, at.semi_axes)
-        delayed_lengths(legs.antennas, at.tx_index, where, bodies, self._delays, length, out)
+        given = legs.antennas, at.tx_index, where, bodies, self._delays, length, out
+        in_threads(delayed_lengths, len(out), *given)
         return out
 
     def _list_delays(self) -> SlabDelays:

@@ -51,6 +51,7 @@ from rtradar.scatter.radar_axes import MovingScene, in_world, wall_seen
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
+from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
@@ -283,7 +284,7 @@ class RoomModel:
         # Times what walls, the body's surface and occluders leave.
         frequency = self._around.walls.frequency
         amplitude = np.empty((len(frequency), *bare.shape), dtype=np.complex64)
-        path_amplitudes(bare, *factors, blend, amplitude)
+        in_threads(path_amplitudes, len(bare), bare, *factors, blend, amplitude)
         echo = np.array(columns.echo, dtype=np.int64)
         bounces = 1 + np.array([self.paths[path].order for path in columns.path], dtype=np.int64)
         return Echoes(
@@ -329,7 +330,7 @@ class RoomModel:
             extra = columns.lengths(legs, there, points, extra)
         nodes = self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
-        path_amplitudes(np.ones(extra.shape), *factors, blend, left)
+        in_threads(path_amplitudes, len(extra), np.ones(extra.shape), *factors, blend, left)
         found, numbers = [], []
         for path in np.unique(columns.path[echo]).tolist():
             own = self._model(path).echoes(chirps)

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
+from rtradar.system.threads import in_threads
 
 Array = NDArray[np.float64]
 _TASKS = 32
@@ -115,5 +116,6 @@ def radiate(
         arrays = (f.places, f.path, f.directions[:, 3], f.normals[:, 3], f.field, group)
         tubes = Tubes._make(np.ascontiguousarray(array) for array in arrays)
         given = (np.ascontiguousarray(array) for array in (visible, rx, wavenumber, length))
-        radiate_tubes(tubes, *given, polarization == "h", spreading, tapered, parts)
+        options = polarization == "h", spreading, tapered
+        in_threads(radiate_tubes, chunks * len(rx), tubes, *given, *options, parts)
     return 1j * np.asarray(wavenumber)[:, None, None] / np.sqrt(np.pi) * parts.sum(axis=0)

@@ -19,7 +19,7 @@ def test_far_field_echoes_are_those_of_the_reference(receivers: int, spreading: 
     frames = Rotation.random(30, random_state=1).as_matrix().reshape(5, 6, 3, 3)
     at = Geometry(tx, rx, centres, frames, rng.uniform(0.03, 0.3, (6, 3)))
     length, amplitude = np.empty((2, 5, receivers, 6))
-    far_field(at, spreading, length, amplitude)
+    far_field(0, len(length), at, spreading, length, amplitude)
     expected = far_field_reference(at, spreading)
     np.testing.assert_allclose(length, expected[0], rtol=1e-13)
     np.testing.assert_allclose(amplitude, expected[1], rtol=1e-12)

@@ -65,7 +65,7 @@ def test_a_start_beside_the_specular_point_leads_to_it(off: list[float]) -> None
     antennas = TX[None, None], np.ascontiguousarray(RX.T)[None, None], middle[None, None]
     images = Images(*antennas, zero, zero, zero)
     # None is searched for, which would take eight times as long.
-    assert nearby_echoes(images, zero, body, start, length, amplitude) == 0
+    assert nearby_echoes(0, 1, images, zero, body, start, length, amplitude) == 0
     assert length[0, :, 0] == pytest.approx([shortest(rx)[0] for rx in RX], abs=1e-6)
     expected = nearby_echoes_reference(images, zero, body)
     np.testing.assert_allclose(length, expected[0], rtol=0, atol=1e-6)
@@ -84,7 +84,7 @@ def test_what_does_not_settle_is_searched_for_and_what_is_not_wanted_returns_not
     antennas = TX[None, None], np.ascontiguousarray(RX.T)[None, None], RX.mean(axis=0)[None, None]
     images = Images(*antennas, two, two, two)
     length, amplitude = np.empty((1, len(RX), 2)), np.empty((1, len(RX), 2))
-    assert nearby_echoes(images, zero, body, start, length, amplitude) == 1
+    assert nearby_echoes(0, 1, images, zero, body, start, length, amplitude) == 1
     expected = nearby_echoes_reference(images, zero, body)
     np.testing.assert_allclose(length[..., 0], expected[0][..., 0], rtol=1e-13)
     np.testing.assert_allclose(amplitude[..., 0], expected[1][..., 0], rtol=1e-6)
