@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
-from contextlib import closing
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
-from itertools import cycle
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +14,7 @@ from tqdm import tqdm
 from rtradar.body import Body, Person
 from rtradar.echoes import Echoes
 from rtradar.pipeline.indoors import Indoors
-from rtradar.pipeline.processing import Processing, RangeSpectra, block_chirps
+from rtradar.pipeline.processing import Processing, block_chirps
 from rtradar.pipeline.timing import Stages
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
@@ -29,7 +26,7 @@ from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.receiver import ReceiverStage
 from rtradar.system.files import uninterruptible
-from rtradar.system.threads import one_ahead, one_blas_thread
+from rtradar.system.threads import one_blas_thread
 
 
 class SpectraSink(Protocol):
@@ -96,43 +93,23 @@ class Capture:
         names = [self.motion, self.radar.name, self.settings.fidelity]
         return ", ".join(names + ([self.scene.name] if self.inside else []))
 
-    @one_blas_thread()
     def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
         """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.
 
         The sink receives the range spectra. The array ``kept`` (chirp, rx, sample), if there is
-        one, receives the IF samples with noise; with DDM it has one chirp for each cycle. While the
-        sink processes some chirps, a thread computes the spectra of the next from their echoes.
+        one, receives the IF samples with noise; with DDM it has one chirp for each cycle.
         """
         most = block_chirps(self.radar)
         # The blocks of an array on disk are its chunks.
         at_once = most if kept is not None else min(sink.max_chirps, most)
-
-        def spectra(
-            samples: Callable[[], NDArray[np.complex64]], first: int, range_spectra: RangeSpectra
-        ) -> tuple[NDArray[np.complex64], int]:
-            received = samples()
+        range_spectra = self.processing.range_spectra(at_once)
+        for first, received in self.received(at_once, progress=progress):
             if kept is not None:
                 # Zarr makes folders as it writes, which must not be after they were removed.
                 with self.stages.time("write"), uninterruptible():
                     begin = first // chirps_together(self.radar)
                     kept[begin : begin + len(received)] = received
-            return range_spectra(received, first), first
-
-        # One array is processed while the other is filled.
-        arrays = cycle([self.processing.range_spectra(at_once) for _ in range(2)])
-        blocks = self._blocks(at_once, progress=progress)
-        works = (
-            partial(spectra, samples, first, range_spectra)
-            for (first, samples), range_spectra in zip(blocks, arrays, strict=False)
-        )
-        if self.inside is not None and self.inside.room.traces:
-            for work in works:
-                sink.push(*work())
-            return
-        with closing(one_ahead(works)) as found:
-            for some, first in found:
-                sink.push(some, first)
+            sink.push(range_spectra(received, first), first)
 
     def received(
         self, at_once: int, *, progress: bool = True
@@ -142,24 +119,13 @@ class Capture:
         Yields the first chirp of at most ``at_once`` and their samples with noise; the next may
         come in the same array. With DDM there is one row for each cycle.
         """
-        for first, samples in self._blocks(at_once, progress=progress):
-            with one_blas_thread():
-                received = samples()
-            yield first, received
-
-    def _blocks(
-        self, at_once: int, *, progress: bool
-    ) -> Iterator[tuple[int, Callable[[], NDArray[np.complex64]]]]:
-        """Compute echoes in blocks of chirps, and yield what computes their samples, as `received`.
-
-        Each is to be called before the next, which fills the same array.
-        """
         radar, stages, most = self.radar, self.stages, block_chirps(self.radar)
         room, ghosts = (self.inside.room, self.inside.ghosts) if self.inside else (None, None)
         # The largest array but for the frames. Allocated anew for each block, it would now and then
         # find no hole in the heap.
         samples_of = np.empty((at_once, radar.n_rx, radar.samples_per_chirp), np.complex64)
 
+        @one_blas_thread()
         def if_samples(echoes: Echoes, first: int) -> NDArray[np.complex64]:
             n = len(echoes.tx)
             with stages.time("signal"):
@@ -188,17 +154,14 @@ class Capture:
 
         # A function of its own: names that a loop binds would keep echoes alive while the next
         # block is computed.
-        def block(
-            chirps: NDArray[np.int64],
-        ) -> Iterator[tuple[int, Callable[[], NDArray[np.complex64]]]]:
-            with stages.time("scatter"):
+        def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+            with stages.time("scatter"), one_blas_thread():
                 echoes = self.tones.echoes(chirps)
                 if ghosts is not None:
                     ghosts.compute(chirps, AHEAD)
             for begin in range(0, len(chirps), at_once):
                 first = int(chirps[begin])
-                some = chirps_of(echoes, begin, begin + at_once)
-                yield first, partial(if_samples, some, first)
+                yield first, if_samples(chirps_of(echoes, begin, begin + at_once), first)
 
         silent = None if progress else True  # None: silent where there is no terminal
         blocks = range(0, self.n_chirps, most)

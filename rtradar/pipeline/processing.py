@@ -55,10 +55,6 @@ Detect = Callable[
 out, and the sines (cell, 2) of their directions where the detector finds them."""
 
 
-RangeSpectra = Callable[[NDArray[np.complex64], int], NDArray[np.complex64]]
-"""Received samples of some chirps and the number of the first in; their range spectra out."""
-
-
 def _detect_of(settings: RunSettings, radar: Radar, window_functions: WindowFunctions) -> Detect:
     """Return the detector of the settings, of power alone or of all channels."""
     name, options = settings.detector, settings.detector_options
@@ -100,7 +96,9 @@ class Processing:
             settings.seed,
         )
 
-    def range_spectra(self, at_once: int) -> RangeSpectra:
+    def range_spectra(
+        self, at_once: int
+    ) -> Callable[[NDArray[np.complex64], int], NDArray[np.complex64]]:
         """Return a function that makes range spectra of the samples of at most ``at_once`` chirps.
 
         It takes received samples and the number of their first chirp, and gives (chirp, rx, range)

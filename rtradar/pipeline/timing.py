@@ -53,11 +53,7 @@ def stage_line(text: str) -> Iterator[None]:
 
 
 class Stages:
-    """Wall-clock time [s] by the name of the stage, in ``seconds``.
-
-    Samples of the next chirps are computed beside the maps of the last ones, so the sum may exceed
-    the time of the whole.
-    """
+    """Wall-clock time [s] by the name of the stage, in ``seconds``."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -68,8 +68,6 @@ class MovingRoomIf(RoomIf):
     ``trace`` gives the clutter that the upright ``radar`` has in a scene, once for each keyframe.
     """
 
-    traces = True
-
     def __init__(
         self,
         radar: Radar,

@@ -106,10 +106,7 @@ class RoomIf:
     of what the body occludes is computed. Between them a cubic goes through the samples, for the
     sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object for
     one cycle, as `Clutter.cycle` yields them; without a shadow the room is exactly still.
-    ``traces`` says whether rays are traced while samples are computed.
     """
-
-    traces = False
 
     def __init__(
         self, radar: Radar, objects: Iterable[Echoes], shadow: MovingShadow | None = None

@@ -1,13 +1,12 @@
-"""Threads that stay, for starting some costs as much as a short call, and work done one ahead."""
+"""A thread map on threads that stay: starting some costs as much as the work of a short call."""
 
 from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from contextvars import copy_context
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -98,39 +97,23 @@ def in_threads(kernel: Callable[..., Any], count: int, *given: Any) -> list[Any]
     )
 
 
-def one_ahead(works: Iterable[Callable[[], _Result]]) -> Generator[_Result, None, None]:
-    """Yield the result of each piece of work, while a thread does the next one.
-
-    Works are taken here, in order and one more than has been yielded, and done one after another.
-    With one thread there is nobody to do the next. Who may leave before the end closes the
-    iterator (`contextlib.closing`), which waits until no more work is done.
-    """
-    if thread_count() == 1:
-        for work in works:
-            yield work()
-        return
-    with ThreadPoolExecutor(1, thread_name_prefix="rtradar-ahead") as ahead:
-        current: Future[_Result] | None = None
-        for work in works:
-            following = ahead.submit(copy_context().run, work)
-            if current is not None:
-                yield current.result()
-            current = following
-        if current is not None:
-            yield current.result()
-
-
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Let products of matrices take one thread each inside, in the whole process.
 
     After each product OpenBLAS's threads wait for the next in a loop, which takes a core from those
-    of `thread_map`.
+    of `thread_map` (`validation/cost/threads.py`).
     """
-    from threadpoolctl import threadpool_limits  # looks through all libraries that are loaded
-
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _libraries().limit(limits=1, user_api="blas"):
         yield
+
+
+@lru_cache(maxsize=1)
+def _libraries() -> Any:
+    # Looking through all that are loaded takes as long as the samples of a block.
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def _all_of(shared: list[Callable[[], None]]) -> None:

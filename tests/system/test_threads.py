@@ -10,16 +10,16 @@ import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import wait
-from contextlib import closing
 from functools import partial
 
 import pytest
+from threadpoolctl import ThreadpoolController
 
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
     in_threads,
-    one_ahead,
+    one_blas_thread,
     thread_count,
     thread_environment,
     thread_limit,
@@ -159,51 +159,13 @@ def test_parts_of_the_work_cover_all_items_once() -> None:
         assert [item for part in parts for item in part] == list(range(count))
 
 
-@pytest.mark.parametrize("count", ["1", "2"])
-def test_work_is_done_in_order_and_at_most_one_ahead(
-    count: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv(THREADS_VARIABLE, count)
-    done: list[int] = []
+def test_matrix_products_take_one_thread_inside_and_as_many_as_before_after() -> None:
+    def counts() -> list[int]:
+        libraries = ThreadpoolController().select(user_api="blas").info()
+        return [library["num_threads"] for library in libraries]
 
-    def work(item: int) -> int:
-        done.append(item)
-        return item
-
-    seen = []
-    for item in one_ahead(partial(work, item) for item in range(10)):
-        seen.append(item)
-        assert done == list(range(len(done)))
-        assert len(done) <= item + 2
-    assert seen == list(range(10))
-
-
-def test_an_error_in_work_ahead_is_raised_where_its_result_is_due(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setenv(THREADS_VARIABLE, "2")
-
-    def work(item: int) -> int:
-        if item == 2:
-            raise ValueError("item 2")
-        return item
-
-    results = one_ahead(partial(work, item) for item in range(10))
-    assert [next(results), next(results)] == [0, 1]
-    with pytest.raises(ValueError, match="item 2"):
-        next(results)
-
-
-def test_closing_waits_until_no_work_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(THREADS_VARIABLE, "2")
-    begun, ended = [], []
-
-    def work(item: int) -> None:
-        begun.append(item)
-        time.sleep(0.01)
-        ended.append(item)
-
-    with closing(one_ahead(partial(work, item) for item in range(10))) as results:
-        next(results)
-    assert begun == ended
-    assert len(begun) <= 2
+    before = counts()
+    assert before
+    with one_blas_thread():
+        assert set(counts()) == {1}
+    assert counts() == before
