@@ -22,7 +22,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from scipy.special import gammaincc
 
@@ -31,6 +30,7 @@ from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, ran
 from rtradar.process.cfar import order_rank
 from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
+from rtradar.system.threads import in_threads
 from rtradar.validate.rows import Row, judged, main, reported
 
 GUARD, TRAIN, QUANTILE = 2, 4, 0.75
@@ -54,16 +54,17 @@ class Rate(NamedTuple):
     conditional_error: float | None
 
 
-@compiled(parallel=True)
 def noise_levels(power, ranks, guard, reach):
     """Order statistic, mean and number of the training cells of every cell, by sorting them."""
+    levels = (np.empty(power.shape), np.empty(power.shape), np.empty(power.shape, np.int64))
+    in_threads(_noise_levels, len(power), power, ranks, guard, reach, *levels)
+    return levels
+
+
+@compiled()
+def _noise_levels(start, stop, power, ranks, guard, reach, ordered, averaged, counts):
     n_range, n_velocity = power.shape
-    ordered, averaged, counts = (
-        np.empty(power.shape),
-        np.empty(power.shape),
-        np.empty(power.shape, np.int64),
-    )
-    for i in prange(n_range):
+    for i in range(start, stop):
         ring = np.empty((2 * reach + 1) ** 2)
         for j in range(n_velocity):
             n = 0
@@ -75,7 +76,6 @@ def noise_levels(power, ranks, guard, reach):
             ordered[i, j] = np.partition(ring[:n], ranks[n] - 1)[ranks[n] - 1]
             averaged[i, j] = ring[:n].mean()
             counts[i, j] = n
-    return ordered, averaged, counts
 
 
 RING_SIZES = range(1, (2 * (GUARD + TRAIN) + 1) ** 2 + 1)

@@ -21,7 +21,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
@@ -29,6 +28,7 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.body.body import ellipsoid_meshes, unit_sphere
 from rtradar.kernels.jit import compiled
+from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import available, select, use
 from rtradar.trace.bounces import SUBDIVISIONS, BodySurfaces
 from rtradar.validate.rows import Row, judged, main, reported
@@ -121,15 +121,24 @@ def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> N
     """First part that each ray meets, by every triangle in float64 (Moeller and Trumbore, 1997)."""
     vertices, faces = unit_sphere(SUBDIVISIONS)
     part = np.empty(len(origins), dtype=np.int64)
-    _first(
-        origins, targets - origins, body.centres, body.frames, body.semi_axes, vertices, faces, part
+    in_threads(
+        _first,
+        len(origins),
+        origins,
+        targets - origins,
+        body.centres,
+        body.frames,
+        body.semi_axes,
+        vertices,
+        faces,
+        part,
     )
     return part
 
 
-@compiled(parallel=True)
-def _first(origins, directions, centres, frames, semi_axes, vertices, faces, found):
-    for ray in prange(len(origins)):
+@compiled()
+def _first(start, stop, origins, directions, centres, frames, semi_axes, vertices, faces, found):
+    for ray in range(start, stop):
         best, found[ray] = np.inf, -1
         for part in range(len(centres)):
             # In the axes of the part, scaled to its unit sphere; fractions of the length stay.

@@ -26,7 +26,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 from physical_optics import lit_points, wave_number
 from scipy.signal.windows import hann
@@ -40,6 +39,7 @@ from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import BISECTIONS
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
+from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.validate import rows
@@ -120,15 +120,23 @@ class Target:
 
     def field(self, occluder: Array, radius: float) -> complex:
         """F with the shadow of a sphere at ``occluder (3,)`` [m], over the free one."""
-        shadowed = _shadowed(self.points, self.contribution, occluder - ANTENNA, radius, self.cell)
-        return complex(shadowed / self.contribution.sum())
+        shadowed = in_threads(
+            _shadowed,
+            len(self.points),
+            self.points,
+            self.contribution,
+            occluder - ANTENNA,
+            radius,
+            self.cell,
+        )
+        return complex(sum(shadowed) / self.contribution.sum())
 
 
-@compiled(parallel=True, fastmath=True)
-def _shadowed(points, contribution, occluder, radius, cell):
+@compiled(fastmath=True)
+def _shadowed(start, stop, points, contribution, occluder, radius, cell):
     total_re, total_im = 0.0, 0.0
     square = occluder[0] ** 2 + occluder[1] ** 2 + occluder[2] ** 2
-    for i in prange(points.shape[0]):
+    for i in range(start, stop):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         length = np.sqrt(x * x + y * y + z * z)
         along = (x * occluder[0] + y * occluder[1] + z * occluder[2]) / length
