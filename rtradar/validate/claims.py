@@ -25,6 +25,7 @@ _MEASURE = re.compile(r"^def measure\(", re.MULTILINE)
 _MAIN = re.compile(
     r"^from rtradar\.validate\.rows import (?:\([^)]*|[^\n(]*)\bmain\b", re.MULTILINE
 )
+_FRAMES = 40  # lines of those in which a script hung
 _KEY = re.compile(r'\bkey="([^"{}]+)"')
 
 
@@ -114,11 +115,15 @@ def run_claim(
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False
-        )
-        said = done.stderr.strip().splitlines() or ["nothing on stderr"]
-        rows, trouble = [], f"ended with status {done.returncode} and left no rows: {said[-1]}"
+        # Files, for a process that outlives the script would keep pipes open.
+        errors = folder / "stderr"
+        with errors.open("wb") as stderr:
+            done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=stderr, check=False)
+        text = errors.read_text(encoding="utf-8", errors="replace")
+        said = text.strip().splitlines() or ["nothing on stderr"]
+        hung = [place for place, line in enumerate(said) if line.startswith("Timeout (")]
+        last = " ".join(said[hung[0] :][:_FRAMES]) if hung else said[-1]
+        rows, trouble = [], f"ended with status {done.returncode} and left no rows: {last}"
         cpu_seconds = 0.0
         with suppress(OSError, ValueError, KeyError, TypeError):
             content = json.loads(written.read_text(encoding="utf-8"))
@@ -126,7 +131,7 @@ def run_claim(
             cpu_seconds = float(content["cpu_seconds"])
             trouble = "" if rows else "gave no rows"
     if rows and done.returncode not in (0, int(not all(row.passed for row in rows))):
-        trouble = f"ended with status {done.returncode}: {said[-1]}"
+        trouble = f"ended with status {done.returncode}: {last}"
     kept = [row for row in rows if key is None or row.key == key]
     seconds = time.perf_counter() - began
     return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import json
 import math
 import os
@@ -11,6 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, astuple, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
+
+QUICK_LIMIT_S = 900.0
+"""A script that takes longer with ``--quick`` hangs: the slowest takes four minutes."""
 
 _MOST_DRAWN = 40
 
@@ -133,7 +137,8 @@ def main(
 ) -> int:
     """Read the options of a script, measure, print the table, and return the exit status.
 
-    ``measure`` gets True for ``--quick``. ``figure`` draws rows into a PNG file, `draw` by default.
+    ``measure`` gets True for ``--quick``, and may then take `QUICK_LIMIT_S`. ``figure`` draws rows
+    into a PNG file, `draw` by default.
     """
     parser = argparse.ArgumentParser(description=description)
     add = parser.add_argument
@@ -141,7 +146,11 @@ def main(
     add("--quick", action="store_true", help="measure fewer cases, in seconds instead of minutes")
     add("--figure", type=Path, metavar="DIR", help="draw the rows as a PNG file in this folder")
     options = parser.parse_args()
+    if options.quick:
+        # What hangs ends, and says where.
+        faulthandler.dump_traceback_later(QUICK_LIMIT_S, exit=True)
     rows = measure(options.quick)
+    faulthandler.cancel_dump_traceback_later()
     print(table(rows))
     if options.json:
         # What this process and its children used, whatever runs beside it.

@@ -35,6 +35,16 @@ def measure(quick):
 if __name__ == "__main__":
     sys.exit(main("Floors.", measure))
 """
+HANGS = """
+import subprocess, sys, time
+from rtradar.validate import rows
+from rtradar.validate.rows import main
+rows.QUICK_LIMIT_S = 0.2
+def measure(quick):
+    subprocess.Popen([sys.executable, "-c", "import time; time.sleep(8)"])
+    time.sleep(60)
+sys.exit(main("Hangs.", measure))
+"""
 BROKEN = """
 from rtradar.validate.rows import main
 def measure(quick): ...
@@ -129,6 +139,17 @@ def test_a_script_that_breaks_fails(folder: Path, capsys: pytest.CaptureFixture[
         "FAILED  zz ended with status 1 and left no rows: RuntimeError: no measurement"
         in capsys.readouterr().out
     )
+
+
+def test_a_script_that_hangs_ends_and_says_where(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # So does one that leaves a process behind, which keeps what it writes to.
+    (folder / "zz.py").write_text(HANGS)
+    assert main(["validate", "--quick"]) == 1
+    said = capsys.readouterr().out
+    assert "FAILED  zz ended with status 1 and left no rows: Timeout (0:00:00.2" in said
+    assert " in measure " in said
 
 
 @pytest.mark.parametrize(
