@@ -3,8 +3,8 @@
 A cell of the matrix is one whole run in memory, of 0.05 s by a small radar, whose maps must be
 finite and hold power. Cells are chosen so that any two values of two factors meet in one of them (a
 pairwise array, made greedily with a fixed seed); without ``--quick`` all cells follow, of the
-levels that are quick. Nothing in the matrix is forbidden by physics: a cell that is refused or
-fails is named on stderr.
+levels that are quick, a process to each core. Nothing in the matrix is forbidden by physics: a cell
+that is refused or fails is named on stderr.
 
     python validation/robustness/matrix.py [--quick] [--json FILE]
 """
@@ -12,11 +12,14 @@ fails is named on stderr.
 from __future__ import annotations
 
 import itertools
+import multiprocessing
+import os
 import random
 import sys
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,7 @@ import numpy as np
 
 import rtradar as rt
 from rtradar.errors import InputError
+from rtradar.system.threads import thread_environment
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
@@ -140,11 +144,12 @@ def trouble_of(cell: Cell) -> tuple[str, str]:
     return "", ""
 
 
-def rows_of(name: str, cells: Sequence[Cell]) -> list[Row]:
-    """Run all cells, name what went wrong on stderr, and count it."""
+def rows_of(name: str, cells: Sequence[Cell], found: Iterable[tuple[str, str]]) -> list[Row]:
+    """Name what went wrong in each cell, by `trouble_of`, on stderr, and count it."""
     counts = Counter[str]()
-    for number, cell in enumerate(cells, 1):
-        kind, why = trouble_of(cell)
+    for number, (cell, (kind, why)) in enumerate(zip(cells, found, strict=True), 1):
+        if number % 100 == 0:
+            print(f"{name}: {number} of {len(cells)}", file=sys.stderr, flush=True)
         if kind:
             counts[kind] += 1
             print(f"{kind}, {number} {' '.join(cell.values())}: {why}", file=sys.stderr, flush=True)
@@ -164,16 +169,22 @@ def rows_of(name: str, cells: Sequence[Cell]) -> list[Row]:
 
 
 def measure(quick: bool) -> list[Row]:
-    array = pairwise(FACTORS)
     if quick:
         few = {name: values for name, values in FACTORS.items() if name != "level"}
         few["level"] = ("analytic", "specular")
-        return rows_of("two levels, pairwise", pairwise(few))
-    rows = rows_of("all levels, pairwise", array)
+        array = pairwise(few)
+        return rows_of("two levels, pairwise", array, map(trouble_of, array))
+    array = pairwise(FACTORS)
     quick_levels = tuple(level for level in FACTORS["level"] if level not in SLOW)
-    return rows + rows_of(
-        "quick levels, all cells", whole_product(FACTORS | {"level": quick_levels})
-    )
+    product = whole_product(FACTORS | {"level": quick_levels})
+    os.environ.update(thread_environment(1))  # of the processes, one to a core
+    # Started anew, because threads do not follow into a forked process.
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        first, then = pool.map(trouble_of, array), pool.map(trouble_of, product)
+        return [
+            *rows_of("all levels, pairwise", array, first),
+            *rows_of("quick levels, all cells", product, then),
+        ]
 
 
 if __name__ == "__main__":
