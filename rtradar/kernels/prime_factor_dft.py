@@ -1,11 +1,11 @@
-"""Power over Doppler: DFTs over slow time whose number of cycles is a product of coprime factors.
+"""DFTs over slow time whose number of cycles is a product of coprime factors.
 
 FFT libraries are made for small prime factors. A frame of 100 ms has 133 = 7 x 19 or 666 = 18 x 37
 cycles here, and the factors 19 and 37 take most of a library's time. By the prime-factor algorithm
 (Good 1958) such a DFT is a DFT of each length in turn, without twiddle factors between. Each is
 small enough for plain sums, over half of the terms because cosines are even and sines odd. Range
 bins lie side by side in vector lanes. Samples are weighted as they are read, and only their power
-is written, so that no spectrum is ever stored.
+or the values of chosen cells are written, so that no whole spectrum is ever stored.
 """
 
 from __future__ import annotations
@@ -93,16 +93,53 @@ def add_doppler_power(
     range)``, contiguous, have in ``channels``, in steps of one, with ``weights (cycle,)``; all are
     of single precision.
     """
-    # Numba compiles anew for an array that may be written to: this one is always read-only.
-    spectra = spectra.view()
-    spectra.flags.writeable = False
-    _add_power(spectra, channels.start, channels.stop, weights, dft, power)
+    none = np.empty(0, np.int64), np.empty((0, 0), np.int64)
+    values = np.empty((0, 0, 0), np.complex64)
+    _transform(
+        _read_only(spectra), channels.start, channels.stop, weights, dft, power, none, values
+    )
 
 
 def doppler_power_reference(spectra, channels, weights):
     """The power that `add_doppler_power` adds, by SciPy."""
     chosen = spectra[:, channels.start : channels.stop] * weights[:, None, None]
     return (np.abs(scipy.fft.fft(chosen, axis=0, overwrite_x=True)) ** 2).sum(axis=1)
+
+
+def pick_cells(
+    spectra: NDArray[np.complex64],
+    channels: range,
+    weights: NDArray[np.float32],
+    dft: PrimeFactorDft,
+    cells: tuple[NDArray[np.int64], NDArray[np.int64]],
+    values: NDArray[np.complex64],
+) -> None:
+    """Fill in some channels the chosen cells of weighted DFTs over the cycles.
+
+    ``cells`` are the Doppler bin ``(cell,)`` in the order of the DFT and the range bins ``(cell,
+    offset)`` of each; ``values (cell, offset, channel)`` are filled. The rest is as for
+    `add_doppler_power`.
+    """
+    turns, bins = cells
+    place = np.argsort(dft.bin_at)[turns], bins
+    power = np.empty((0, 0), np.float32)
+    _transform(
+        _read_only(spectra), channels.start, channels.stop, weights, dft, power, place, values
+    )
+
+
+def pick_cells_reference(spectra, weights, cells):
+    """The values of `pick_cells` in all channels, by SciPy."""
+    turns, bins = cells
+    transformed = scipy.fft.fft(spectra * weights[:, None, None], axis=0, overwrite_x=True)
+    return transformed[turns[:, None], :, bins]
+
+
+def _read_only(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    # Numba compiles anew for an array that may be written to: this one is always read-only.
+    spectra = spectra.view()
+    spectra.flags.writeable = False
+    return spectra
 
 
 # Rows are `_ROW` long, a constant, and the rows of a function lie in as few arrays as possible: if
@@ -228,21 +265,21 @@ def _fold_line(store, line):
 
 
 @inlined()
-def _transform_line(cosines, sines, store, line, last):
-    """Sum the folded terms of one line to its frequencies: to the grid, or to power in the end."""
+def _transform_line(cosines, sines, store, line, to_power):
+    """Sum the folded terms of one line to its frequencies, in the grid or as added power."""
     first, step, factor, at_half = line
     pairs, one = (factor - 1) // 2, np.float32(1)
     # Frequencies without a partner: 0, and half of an even factor.
     _put(_row(store.alone, 0), store.total)
     _add_signed(store.even, pairs, one, store.total)
-    if last:
+    if to_power:
         _add_squares(store.total, _powers(store.sums, first))
     else:
         _put(store.total, _row(store.grid, first))
     if factor % 2 == 0:
         _put(_row(store.alone, factor // 2 % 2), store.total)
         _add_signed(store.even, pairs, -one, store.total)
-        if last:
+        if to_power:
             _add_squares(store.total, _powers(store.sums, at_half))
         else:
             _put(store.total, _row(store.grid, at_half))
@@ -256,7 +293,7 @@ def _transform_line(cosines, sines, store, line, last):
         for k in range(min(_TOGETHER, pairs - group)):
             low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
             cosine, sine = _row(store.cosine_parts, k), _row(store.sine_parts, k)
-            if last:
+            if to_power:
                 _add_unfolded_squares(
                     cosine, sine, _powers(store.sums, low), _powers(store.sums, high)
                 )
@@ -264,8 +301,23 @@ def _transform_line(cosines, sines, store, line, last):
                 _unfold(cosine, sine, _row(store.grid, low), _row(store.grid, high))
 
 
+@inlined()
+def _pick(store, cells, begin, end, channel, values):
+    """Fill values of a channel that lie in these range bins from the transformed grid."""
+    places, bins = cells
+    for cell in range(len(places)):
+        row = _row(store.grid, places[cell])
+        for offset in range(bins.shape[1]):
+            c = bins[cell, offset] - begin
+            if 0 <= c < end - begin:
+                values[cell, offset, channel] = complex(row[c], row[_COLUMNS + c])
+
+
+# One function for both, because each takes a second or two to compile.
 @compiled(fastmath={"contract"})
-def _add_power(spectra, channel_begin, channel_end, weights, dft, power):
+def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, values):
+    """Add power (doppler, range), unless it is empty; else fill values at cells (place, bins)."""
+    to_power = len(power) > 0
     cycles, _, n_range = spectra.shape
     n_1, n_2 = dft.factors
     terms = max(dft.cosines[0].shape[1], dft.cosines[1].shape[1])
@@ -300,8 +352,9 @@ def _add_power(spectra, channel_begin, channel_end, weights, dft, power):
                     at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
                     line = first, step, factor, at_half
                     _fold_line(store, line)
-                    _transform_line(cosines, sines, store, line, last)
-        for place in range(cycles):
+                    _transform_line(cosines, sines, store, line, to_power and last)
+            _pick(store, cells, begin, end, channel, values)
+        for place in range(cycles if to_power else 0):
             own, out = _powers(store.sums, place), power[dft.bin_at[place], begin:end]
             for c in range(len(out)):
                 out[c] += own[c]

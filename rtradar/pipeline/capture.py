@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,7 +27,7 @@ from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.receiver import ReceiverStage
 from rtradar.system.files import uninterruptible
-from rtradar.system.threads import one_blas_thread
+from rtradar.system.threads import one_blas_thread, side_by_side
 
 
 class SpectraSink(Protocol):
@@ -128,11 +129,19 @@ class Capture:
         @one_blas_thread()
         def if_samples(echoes: Echoes, first: int) -> NDArray[np.complex64]:
             n = len(echoes.tx)
-            with stages.time("signal"):
+            samples, chirps = samples_of[:n], np.arange(first, first + n)
+
+            def tones() -> None:
                 times = radar.chirp_times(n, first)
-                samples = synthesize(echoes, radar, times, dtype=np.complex64, out=samples_of[:n])
+                synthesize(echoes, radar, times, dtype=np.complex64, out=samples)
                 if ghosts is not None:
-                    ghosts.add(samples, np.arange(first, first + n))
+                    ghosts.add(samples, chirps)
+
+            with stages.time("signal"):
+                if room is None:
+                    tones()
+                else:
+                    side_by_side(tones, partial(room.compute, chirps))
             phases = None
             if self.receiver is not None:
                 with stages.time("receiver"):
@@ -140,7 +149,7 @@ class Capture:
                     self.receiver.turn_moving(samples, phases)
             if room is not None:
                 with stages.time("clutter"):
-                    room.add(samples, np.arange(first, first + n))
+                    room.add(samples, chirps)
             if self.receiver is not None:
                 with stages.time("receiver"):
                     self.receiver.transmit(samples, phases, first)

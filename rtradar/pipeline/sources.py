@@ -15,11 +15,11 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.process import range_spectrum
+from rtradar.process.power_maps import doppler_power
 from rtradar.process.window_functions import WindowName, weights
 from rtradar.system.threads import thread_map
 
@@ -41,7 +41,7 @@ _UNEXPECTED = 10.0
 """A cell with so many times the power of what is expected in it of anybody is nobody's: noise, the
 room's or a shadow's. Echoes that interfere make less of a difference."""
 
-_AT_ONCE = 2048
+_AT_ONCE = 512  # pairs of an echo and a range bin: what a thread works on fits the cache of a core
 
 Array = NDArray[np.float64]
 
@@ -101,32 +101,32 @@ class Sources:
         radar, n_cycles = self._capture.radar, self._cycles
         range_m, power, owner = self._course(start_cycle)
         place = range_m / radar.range_bin_m
-        field = np.sqrt(power) * self._doppler
         # As far as an echo is not weak.
         reach = (self._falls * power.max(axis=1)[:, None] > self._weak_m2).sum(axis=1)
         low, high = place.min(axis=1) - reach, place.max(axis=1) + reach
         echo, row = np.nonzero((rows >= low[:, None]) & (rows <= high[:, None]))
         turns = 2 / radar.wavelength_m * range_m
-        tone = (field * np.exp(2j * np.pi * (turns - np.rint(turns)))).astype(np.complex64)
-        steps = np.rint(_FINE * place).astype(np.int32)
+        tone = np.sqrt(power) * np.exp(2j * np.pi * (turns - np.rint(turns)))
+        # An echo to a column, as the transform takes it.
+        tones = np.ascontiguousarray(tone.T, dtype=np.complex64)
+        steps = np.ascontiguousarray(np.rint(_FINE * place).T, dtype=np.int32)
         n_owners = len(self._capture.body.names) + len(self._capture.scene.objects)
-        found = np.zeros((n_owners * radar.samples_per_chirp, n_cycles))
+        found = np.zeros((n_cycles, n_owners * radar.samples_per_chirp))
         target = owner[echo] * radar.samples_per_chirp + rows[row]
         order = np.argsort(target, kind="stable")
         echo, row, target = echo[order], row[order], target[order]
 
         def spectra(first: int) -> tuple[NDArray[np.int64], Array]:
             own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
-            away = (_FINE * (bins + self._reach)).astype(np.int32)[:, None] - steps[own]
-            signal = self._spread.take(away, mode="clip") * tone[own]
-            parts = scipy.fft.fft(signal, axis=1, overwrite_x=True).view(np.float32)
-            spectrum = parts[:, ::2] ** 2 + parts[:, 1::2] ** 2
+            away = (_FINE * (bins + self._reach)).astype(np.int32) - steps[:, own]
+            signal = self._spread.take(away, mode="clip") * tones[:, own]
+            spectrum = doppler_power(signal[:, None], range(1), self._doppler, 1)
             targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
-            return targets, np.add.reduceat(spectrum, begin, axis=0)
+            return targets, np.add.reduceat(spectrum, begin, axis=1)
 
         for targets, power_m2 in thread_map(spectra, range(0, len(echo), _AT_ONCE)):
-            found[targets] += power_m2
-        maps = found.reshape(n_owners, radar.samples_per_chirp, n_cycles)
+            found[:, targets] += power_m2
+        maps = found.T.reshape(n_owners, radar.samples_per_chirp, n_cycles)
         return np.asarray(radar.n_channels * np.fft.fftshift(maps, axes=2))
 
     def _course(self, start_cycle: int) -> tuple[Array, Array, NDArray[np.int64]]:

@@ -87,16 +87,19 @@ def power_map(
     else:
         # Under DDM the rows of all Tx hold the same sum; those of the first are not rotated.
         chosen = range(radar.n_rx if divided else radar.n_channels)
-    power = _doppler_power(channels, chosen, scale, radar.n_rx)
+    power = doppler_power(channels, chosen, scale, radar.n_rx)
     if divided:
         power = without_copies(power, radar, radar.n_rx, window_functions)
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
 
-def _doppler_power(
+def doppler_power(
     channels: NDArray[np.complexfloating], chosen: range, window: NDArray[np.float64], together: int
 ) -> NDArray[np.floating]:
-    """Power (doppler, range) of chosen ``channels (cycle, channel, range)``, some to a thread."""
+    """Power (doppler, range) of chosen ``channels (cycle, channel, range)``, some to a thread.
+
+    Samples are weighted by the ``window (cycle,)``; Doppler is in the order of the DFT.
+    """
     n_cycles, _, n_range = channels.shape
     kind = complex_kind(channels)
     real = np.float32 if kind == np.complex64 else np.float64

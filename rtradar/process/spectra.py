@@ -10,7 +10,6 @@ echo, and a map of 666 cycles takes 131 MB instead of 262 MB.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.kernels.prime_factor_dft import pick_cells, prime_factor_dft
 from rtradar.process.steering import range_walk
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
@@ -26,9 +26,6 @@ from rtradar.system.threads import thread_map
 
 _CHIRPS_PER_BATCH = 128
 """Chirps of one transform: 8 receivers x 256 samples x 8 bytes make 2 MB, the cache of a core."""
-
-_CACHE_BYTES = 2_500_000
-"""What a thread transforms at once for cells: several channels of a short frame, one of a long."""
 
 
 @dataclass(frozen=True)
@@ -235,25 +232,26 @@ def cell_spectra(
     walk = range_walk(radar)
     steps = (rows[:, None] + np.arange(-walk, walk + 1)) % n_range
     # Index 0 of the map is the DFT bin of the most negative velocity.
-    turns = np.broadcast_to(((columns - n_cycles // 2) % n_cycles)[:, None], steps.shape)
+    turns = (columns - n_cycles // 2) % n_cycles
     values = np.empty((*steps.shape, radar.n_channels), dtype=cube.dtype)
-    scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)[:, None, None]
+    scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
+    dft = prime_factor_dft(n_cycles) if cube.dtype == np.complex64 else None
+    channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
     used, place = np.unique(steps, return_inverse=True)
-    place = place.reshape(steps.shape)
-    # Before the used range bins are picked out, NumPy copies all of them.
-    at_once = min(radar.n_rx, max(1, _CACHE_BYTES // (n_cycles * n_range * cube.itemsize)))
-    batches = math.ceil(radar.n_rx / at_once)
 
-    def transform(item: int) -> None:
+    def transform(first: int) -> None:
         # Channels of one Tx lie side by side in what is filled.
-        tx, rx = item // batches, item % batches * at_once
-        weighted = np.take(cube[:, tx, rx : rx + at_once], used, axis=2)
-        weighted *= scale
-        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
-        first = tx * radar.n_rx + rx
-        values[:, :, first : first + weighted.shape[1]] = doppler[turns, :, place]
+        own = range(first, first + radar.n_rx)
+        if dft is not None:
+            pick_cells(channels, own, scale, dft, (turns, steps), values)
+            return
+        for channel in own:
+            # One channel at a time fits the cache of a core.
+            weighted = channels[:, channel, used] * scale[:, None]
+            doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
+            values[:, :, channel] = doppler[turns[:, None], place.reshape(steps.shape)]
 
-    thread_map(transform, range(radar.n_tx * batches))
+    thread_map(transform, range(0, radar.n_channels, radar.n_rx))
     return values
 
 

@@ -127,7 +127,7 @@ class RoomIf:
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)
-        self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
+        self._lost: dict[int, _Samples] = {}
         self._slow: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 
     @property
@@ -156,18 +156,29 @@ class RoomIf:
         if self._shadow is None:
             samples += self._whole[tx]
             return
+        self.compute(chirps)
         keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
             inside = np.flatnonzero(keyframes == keyframe)
             some = slice(int(inside[0]), int(inside[-1]) + 1)
-            lost = [
-                self._lost.get(k, partial(self._find, k)) for k in range(keyframe - 1, keyframe + 3)
-            ]
+            lost = [self._lost[k] for k in range(keyframe - 1, keyframe + 3)]
             if not any(one.any() for one in lost):
                 samples[some] += self._whole[tx[some]]
                 continue
             self._blend(samples[some], tx[some], weights[some], np.stack(lost))
+
+    def compute(self, chirps: NDArray[np.int64]) -> None:
+        """Compute what the body occludes at the keyframes around some chirps, ascending.
+
+        `add` does it where it was not done before. It takes nothing from the model of the echoes,
+        so that both can be computed side by side.
+        """
+        if self._shadow is None:
+            return
+        keyframes, _ = keyframe_before(self._radar, chirps, self._shadow.step)
+        needed = np.unique(keyframes[:, None] + np.arange(-1, 3)).tolist()
+        self._lost = {k: self._lost[k] if k in self._lost else self._find(k) for k in needed}
 
     def _blend(
         self,

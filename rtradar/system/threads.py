@@ -97,6 +97,11 @@ def in_threads(kernel: Callable[..., Any], count: int, *given: Any) -> list[Any]
     )
 
 
+def side_by_side(*tasks: Callable[[], None]) -> None:
+    """Do tasks that share nothing, in threads; return when all are done."""
+    thread_map(lambda number: tasks[number](), range(len(tasks)))
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Let products of matrices take one thread each inside, in the whole process.

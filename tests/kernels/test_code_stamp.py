@@ -324,6 +324,7 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
     # These are plain functions that call compiled ones.
     plain = {
         "prime_factor_dft.add_doppler_power",
+        "prime_factor_dft.pick_cells",
         "nufft.sum_by_nufft",
         "anchored_tones.add_anchored_tones",
     }
@@ -348,13 +349,13 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
         (
             "rtradar.kernels.jit.on_cache_lines",
-            "rtradar.kernels.prime_factor_dft._add_power",
+            "rtradar.kernels.prime_factor_dft._transform",
             "rtradar.kernels.scatter.specular_point.solve",
         ),
         (
             "rtradar.kernels.scatter.specular_point.newton",
             "rtradar.kernels.scatter.specular_point.solve",
-            "rtradar.kernels.prime_factor_dft._add_power",
+            "rtradar.kernels.prime_factor_dft._transform",
         ),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
+from rtradar.kernels.prime_factor_dft import add_doppler_power, pick_cells, prime_factor_dft
 
 PRODUCTS = [
     (
@@ -57,6 +57,28 @@ def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, 
     expected = plain(spectra, weights)
     # Rounding of float32 sums of some hundred terms, beside the largest.
     np.testing.assert_allclose(power - before, expected, rtol=0, atol=3e-6 * expected.max())
+
+
+@given(
+    n_cycles=st.sampled_from([n for n, pairs in PRODUCTS if pairs]),
+    n_range=st.sampled_from([1, 5, 130, 257, 600]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_it_picks_cells_of_the_dft(n_cycles: int, n_range: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    parts = rng.standard_normal((n_cycles, 3, n_range, 2)).astype(np.float32)
+    spectra, weights = parts.view(np.complex64)[..., 0], rng.uniform(0, 1, n_cycles)
+    dft = prime_factor_dft(n_cycles)
+    assert dft is not None
+    turns, bins = rng.integers(n_cycles, size=7), rng.integers(n_range, size=(7, 2))
+    values = np.full((7, 2, 3), np.nan, np.complex64)
+    pick_cells(spectra, range(1, 3), weights.astype(np.float32), dft, (turns, bins), values)
+    # The other channels are left as they are.
+    assert np.isnan(values[..., 0]).all()
+    whole = np.fft.fft(spectra * weights[:, None, None], axis=0)
+    expected = whole[turns[:, None], 1:, bins]
+    # Rounding of float32 sums of some hundred terms, beside the largest of the whole.
+    np.testing.assert_allclose(values[..., 1:], expected, rtol=0, atol=3e-6 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("factor", range(2, 41))

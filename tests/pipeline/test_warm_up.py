@@ -14,12 +14,12 @@ from rtradar.system.threads import THREADS_VARIABLE
 
 FIRST_USE = """
 import rtradar as rt
-from rtradar.kernels.prime_factor_dft import _add_power
+from rtradar.kernels.prime_factor_dft import _transform
 from rtradar.kernels.scatter.specular_point import solve
 from rtradar.kernels.tone_sum import add_tones
 motion, radar = rt.synthetic_motion("walk", seed=0, duration_s=0.15), rt.Radar.preset("paper-12ghz")
 rt.run(motion, radar, fidelity="analytic", snr_db=20)
-for function in add_tones, _add_power, solve:
+for function in add_tones, _transform, solve:
     assert len(function.signatures) == 1
     print(sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values()))
 """

@@ -20,6 +20,7 @@ from rtradar.system.threads import (
     THREADS_VARIABLE,
     in_threads,
     one_blas_thread,
+    side_by_side,
     thread_count,
     thread_environment,
     thread_limit,
@@ -46,6 +47,14 @@ def test_an_error_in_a_thread_is_raised() -> None:
 
     with pytest.raises(ValueError, match="item 0"):
         thread_map(fail, range(2))
+
+
+def test_tasks_side_by_side_are_all_done() -> None:
+    done = set[int]()
+    side_by_side(partial(done.add, 1), partial(done.add, 2))
+    assert done == {1, 2}
+    with pytest.raises(KeyError):
+        side_by_side(partial(done.add, 3), partial(done.remove, 9))
 
 
 def test_after_an_error_no_other_item_is_begun() -> None:
