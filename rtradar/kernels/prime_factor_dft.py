@@ -313,7 +313,7 @@ def _pick(store, cells, begin, end, channel, values):
                 values[cell, offset, channel] = complex(row[c], row[_COLUMNS + c])
 
 
-# One function for both, because each takes a second or two to compile.
+# One function for both, because it takes longer to compile than most.
 @compiled(fastmath={"contract"})
 def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, values):
     """Add power (doppler, range), unless it is empty; else fill values at cells (place, bins)."""

@@ -141,6 +141,7 @@ class Capture:
                 if room is None:
                     tones()
                 else:
+                    # They share no cache: shadows ask nothing of the model.
                     side_by_side(tones, partial(room.compute, chirps))
             phases = None
             if self.receiver is not None:

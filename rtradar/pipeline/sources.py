@@ -41,7 +41,7 @@ _UNEXPECTED = 10.0
 """A cell with so many times the power of what is expected in it of anybody is nobody's: noise, the
 room's or a shadow's. Echoes that interfere make less of a difference."""
 
-_AT_ONCE = 512  # pairs of an echo and a range bin: what a thread works on fits the cache of a core
+_AT_ONCE = 2048
 
 Array = NDArray[np.float64]
 

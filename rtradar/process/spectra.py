@@ -237,21 +237,25 @@ def cell_spectra(
     scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     dft = prime_factor_dft(n_cycles) if cube.dtype == np.complex64 else None
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
-    used, place = np.unique(steps, return_inverse=True)
-
-    def transform(first: int) -> None:
+    if dft is not None:
         # Channels of one Tx lie side by side in what is filled.
-        own = range(first, first + radar.n_rx)
-        if dft is not None:
-            pick_cells(channels, own, scale, dft, (turns, steps), values)
-            return
-        for channel in own:
-            # One channel at a time fits the cache of a core.
-            weighted = channels[:, channel, used] * scale[:, None]
-            doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
-            values[:, :, channel] = doppler[turns[:, None], place.reshape(steps.shape)]
+        thread_map(
+            lambda first: pick_cells(
+                channels, range(first, first + radar.n_rx), scale, dft, (turns, steps), values
+            ),
+            range(0, radar.n_channels, radar.n_rx),
+        )
+        return values
+    used, place = np.unique(steps, return_inverse=True)
+    place = place.reshape(steps.shape)
 
-    thread_map(transform, range(0, radar.n_channels, radar.n_rx))
+    def transform(channel: int) -> None:
+        # One channel at a time fits the cache of a core.
+        weighted = channels[:, channel, used] * scale[:, None]
+        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
+        values[:, :, channel] = doppler[turns[:, None], place]
+
+    thread_map(transform, range(radar.n_channels))
     return values
 
 

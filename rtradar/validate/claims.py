@@ -25,7 +25,7 @@ _MEASURE = re.compile(r"^def measure\(", re.MULTILINE)
 _MAIN = re.compile(
     r"^from rtradar\.validate\.rows import (?:\([^)]*|[^\n(]*)\bmain\b", re.MULTILINE
 )
-_FRAMES = 40  # lines of those in which a script hung
+_FRAMES = 40  # the most lines that tell where a script hung
 _KEY = re.compile(r'\bkey="([^"{}]+)"')
 
 

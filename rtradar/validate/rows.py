@@ -149,8 +149,10 @@ def main(
     if options.quick:
         # What hangs ends, and says where.
         faulthandler.dump_traceback_later(QUICK_LIMIT_S, exit=True)
-    rows = measure(options.quick)
-    faulthandler.cancel_dump_traceback_later()
+    try:
+        rows = measure(options.quick)
+    finally:
+        faulthandler.cancel_dump_traceback_later()
     print(table(rows))
     if options.json:
         # What this process and its children used, whatever runs beside it.

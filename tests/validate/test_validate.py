@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -281,3 +283,25 @@ def test_the_claims_of_this_checkout_have_their_scripts() -> None:
         "robustness",
         "cost",
     }
+
+
+IMPORTS = """
+import runpy, sys
+from pathlib import Path
+for script in map(Path, sys.argv[1:]):
+    sys.path.insert(0, str(script.parent))
+    try:
+        runpy.run_path(str(script), run_name="imported")
+    except Exception as error:
+        print(f"{script.name}: {type(error).__name__}: {error}")
+    sys.path.pop(0)
+"""
+
+
+def test_every_script_can_be_imported() -> None:
+    # Type checks leave them out, and most run only where everything is validated.
+    scripts = [str(claim.script) for claim in validate.claims(validate.validation_folder())]
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTS, *scripts], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == ""

@@ -121,18 +121,8 @@ def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> N
     """First part that each ray meets, by every triangle in float64 (Moeller and Trumbore, 1997)."""
     vertices, faces = unit_sphere(SUBDIVISIONS)
     part = np.empty(len(origins), dtype=np.int64)
-    in_threads(
-        _first,
-        len(origins),
-        origins,
-        targets - origins,
-        body.centres,
-        body.frames,
-        body.semi_axes,
-        vertices,
-        faces,
-        part,
-    )
+    rays, parts = (origins, targets - origins), (body.centres, body.frames, body.semi_axes)
+    in_threads(_first, len(origins), *rays, *parts, vertices, faces, part)
     return part
 
 

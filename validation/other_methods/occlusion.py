@@ -120,15 +120,8 @@ class Target:
 
     def field(self, occluder: Array, radius: float) -> complex:
         """F with the shadow of a sphere at ``occluder (3,)`` [m], over the free one."""
-        shadowed = in_threads(
-            _shadowed,
-            len(self.points),
-            self.points,
-            self.contribution,
-            occluder - ANTENNA,
-            radius,
-            self.cell,
-        )
+        given = self.points, self.contribution, occluder - ANTENNA, radius, self.cell
+        shadowed = in_threads(_shadowed, len(self.points), *given)
         return complex(sum(shadowed) / self.contribution.sum())
 
 

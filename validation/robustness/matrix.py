@@ -179,12 +179,15 @@ def measure(quick: bool) -> list[Row]:
     product = whole_product(FACTORS | {"level": quick_levels})
     os.environ.update(thread_environment(1))  # of the processes, one to a core
     # Started anew, because threads do not follow into a forked process.
-    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn"))
+    try:
         first, then = pool.map(trouble_of, array), pool.map(trouble_of, product)
         return [
             *rows_of("all levels, pairwise", array, first),
             *rows_of("quick levels, all cells", product, then),
         ]
+    finally:
+        pool.shutdown(cancel_futures=True)  # an interrupt does not wait for all cells
 
 
 if __name__ == "__main__":
