@@ -334,6 +334,42 @@ def _delayed_lengths(k: Any) -> Calls:
     return call, lambda: k.delayed_lengths_reference(*given)
 
 
+def _unit_vectors(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    vectors = rng.normal(size=(*shape, 3))
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _fields(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    return rng.normal(size=(*shape, 3, 2)).view(np.complex128)[..., 0]
+
+
+@kernel_case("scatter.mirrors.slab_fields", "5000 waves at 3 nodes after five terms of a slab")
+def _slab_fields(k: Any) -> Calls:
+    rng = np.random.default_rng(0)
+    normal, wavenumber = np.array([0.48, 0.6, 0.64]), _WAVENUMBER * np.array([0.9, 1.0, 1.1])
+    slab = normal, np.array([5.2 - 0.3j, 5.1 - 0.3j, 5.0 - 0.2j]), wavenumber, 0.1, 1e-3
+    kinds = [(0.0, 0, True), (0.0, 1, True), (5.1, 0, False), (5.1, 3, False), (5.1, 4, True)]
+    slabs = [k.SlabPass(*slab, *kind) for kind in kinds]
+    given = _fields(rng, 3, 5000), _unit_vectors(rng, 5000)
+    out = np.empty((len(slabs), 3, 5000, 3), dtype=np.complex128)
+
+    def call() -> np.ndarray:
+        for one, own in zip(slabs, out, strict=True):
+            k.slab_fields(*given, one, own)
+        return out
+
+    return call, lambda: np.array([k.slab_fields_reference(*given, one) for one in slabs])
+
+
+@kernel_case("scatter.mirrors.received_from_conductors", "273 echoes, 8 keyframes, 3 nodes")
+def _received_from_conductors(k: Any) -> Calls:
+    rng, ends = np.random.default_rng(0), (8, 2, 2, 273)
+    given = *(_fields(rng, 3, *ends) for _ in "tr"), *(_unit_vectors(rng, *ends) for _ in "tr")
+    out = (np.empty((3, 8, 2, 2, 2, 273), dtype=np.complex128),)
+    call = filled(k.received_from_conductors, 0, 8, *given, out=out)
+    return call, lambda: k.received_from_conductors_reference(*given)
+
+
 # -- objects that move -----------------------------------------------------------------------------
 
 

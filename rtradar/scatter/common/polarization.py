@@ -179,20 +179,6 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     return apply_te_tm(field, directions, onward, normals, te, tm)
 
 
-def received_from_conductor(sent: Field, received: Field, normals: Array) -> Field:
-    """Compute what a receiver gets of fields that conductors reflect, as by `body_reflection`.
-
-    ``sent (node, keyframe, line, tx_end, echo, 3)`` arrives, and ``received (node, keyframe, line,
-    rx_end, echo, 3)`` is what the receiver would send; the ``normals (keyframe, line, tx_end,
-    rx_end, echo, 3)`` are those of `bisector`. Returned is (node, keyframe, line, tx_end, rx_end,
-    echo). No vector of the reflected field is made, which takes several times as long.
-    """
-    straight = np.einsum("nkltec,nklrec->nkltre", sent, received)
-    of_sent = np.einsum("nkltec,kltrec->nkltre", sent, normals)
-    of_received = np.einsum("nklrec,kltrec->nkltre", received, normals)
-    return np.asarray(2 * of_sent * of_received - straight)
-
-
 def material_factor(
     to_tx: Array, to_rx: Array, eta: Field, polarization: Literal["v", "h"]
 ) -> Field:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
 from rtradar.body.body import Poses
+from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
@@ -25,7 +26,6 @@ from rtradar.scatter.common.polarization import (
     Surfaces,
     bisector,
     over_copolar,
-    received_from_conductor,
     sent_field,
     unit,
 )
@@ -33,7 +33,7 @@ from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.path_echoes import AT_ONCE, EchoColumns, Met
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.system.threads import thread_map
+from rtradar.system.threads import in_threads, thread_map
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
 
@@ -252,20 +252,23 @@ def _left(
     received: Field,
 ) -> Field:
     """Co-polar field over that of the bare return, (node, keyframe, line, 2, rx_end, echo)."""
-    out, back = (leg.arriving[..., chosen, :] for leg in legs)
-    out, back = out[:, :, :, None], back[:, :, None]
-    normals = bisector(-out, -back)
-    # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
+    back_tx, back_rx = (-leg.arriving[..., chosen, :] for leg in legs)
+    to_tx, to_rx = back_tx[:, :, :, None], back_rx[:, :, None]
     if around.surfaces.conduct:
-        factor = -received_from_conductor(sent, received, normals)
+        shape = *sent.shape[:4], received.shape[3], len(chosen)
+        factor = np.empty(shape, dtype=np.complex128)
+        fields = (np.ascontiguousarray(array) for array in (sent, received, back_tx, back_rx))
+        in_threads(received_from_conductors, shape[1], *fields, factor)
     else:
-        arrives = sent[:, :, :, :, None], out, normals
+        arrives = sent[:, :, :, :, None], -to_tx, bisector(to_tx, to_rx)
         returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
-        factor = np.asarray(-np.sum(received[:, :, :, None] * returned, axis=-1))
+        factor = np.asarray(np.sum(received[:, :, :, None] * returned, axis=-1))
+    # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
+    np.negative(factor, out=factor)
     own = np.flatnonzero(np.isin(chosen, known))
     if len(own):
         # The bare return of these holds the co-polar fraction of a conductor.
-        ways = -out[..., own, :], -back[..., own, :]
+        ways = to_tx[..., own, :], to_rx[..., own, :]
         factor[..., own] = over_copolar(factor[..., own], *ways, around.radar.polarization)
     return factor
 

@@ -181,14 +181,15 @@ class WallEdges:
 
         Equation :eq:`wall-edge` of the theory page.
         """
-        number = np.copysign(2 * np.sqrt(detour / self.wavelength_m), depth)
+        out = (depth >= 0).astype(np.complex128)
+        # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
+        near = detour < self.resolution_m
+        longer, lit = detour[near], out[near]
+        number = np.copysign(2 * np.sqrt(longer / self.wavelength_m), depth[near])
         sine, cosine = fresnel(number)
         field = 0.5 + (1 + 1j) / 2 * (cosine - 1j * sine)
-        # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
-        near = np.minimum(detour / self.resolution_m, 1.0)
-        resolved = np.where(near < 1.0, np.sinc(near), 0.0)
-        lit = depth >= 0
-        return np.asarray(lit + (field - lit) * resolved)
+        out[near] += (field - lit) * np.sinc(longer / self.resolution_m)
+        return out
 
 
 def _detour(source: Array, target: Array, axis: int, end: float) -> Array:

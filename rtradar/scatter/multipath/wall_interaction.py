@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.scatter.common.polarization import apply_te_tm
+from rtradar.kernels.scatter.mirrors import SlabPass, slab_fields
 from rtradar.scatter.multipath.image_paths import Leg
-from rtradar.scatter.multipath.slab_series import POLARIZATIONS, WHOLE, Term, WallSeries
+from rtradar.scatter.multipath.slab_series import WHOLE, Term, WallSeries
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Wall
 
@@ -36,14 +36,7 @@ def reflect(
     Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3) of one term of the slab, without
     the phase of its path and of the term's extra length.
     """
-    normal = wall.normal
-    against = directions @ normal
-    onward = directions - 2 * against[..., None] * normal
-    cosine, frequency = np.minimum(np.abs(against), 1.0), _nodes(frequency_hz, against)
-    te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in POLARIZATIONS)
-    wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
-    lost = np.exp(-2 * (wavenumber * wall.roughness_m * cosine) ** 2)
-    return apply_te_tm(field, directions, onward, normal, te * lost, tm * lost)
+    return _after(wall, field, directions, frequency_hz, term)
 
 
 def transmit(
@@ -53,16 +46,30 @@ def transmit(
 
     The ray goes straight on: the small shift to the side is left out, its phase is not.
     """
-    cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
-    frequency = _nodes(frequency_hz, cosine)
-    te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in POLARIZATIONS)
-    return apply_te_tm(field, directions, directions, wall.normal, te, tm)
+    return _after(wall, field, directions, frequency_hz, term)
 
 
-def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
-    """Frequencies (node, 1, ..., 1) for as many axes as ``like`` has."""
+def _after(
+    wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term
+) -> Field:
+    """Field (node, ..., 3) after the passes of a term through a wall."""
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    return frequency.reshape(-1, *(1,) * like.ndim)
+    slab = SlabPass(
+        wall.normal,
+        wall.material.eta(frequency),
+        2 * np.pi * frequency / SPEED_OF_LIGHT_MPS,
+        float(wall.thickness_m),
+        float(wall.roughness_m),
+        float(term.index_squared),
+        term.passes,
+        term.rest and not term.solid,
+    )
+    ways = np.ascontiguousarray(directions, dtype=np.float64)
+    comes = np.broadcast_to(field, (len(frequency), *ways.shape)).astype(np.complex128, order="C")
+    out = np.empty(comes.shape, dtype=np.complex128)
+    each = len(frequency), -1, 3
+    slab_fields(comes.reshape(each), ways.reshape(-1, 3), slab, out.reshape(each))
+    return out
 
 
 class Passage(NamedTuple):

@@ -17,7 +17,6 @@ from rtradar.scatter.common.polarization import (
     body_material,
     body_reflection,
     material_factor,
-    received_from_conductor,
 )
 from rtradar.scene import material
 
@@ -148,10 +147,12 @@ def test_a_model_of_skin_is_the_conductor_times_its_factor(fidelity: str) -> Non
 def test_what_a_conductor_sends_to_a_receiver_is_the_product_with_its_reflected_field() -> None:
     rng = np.random.default_rng(0)
     fields = rng.normal(size=(2, 3, 4, 2, 2, 5, 3, 2)).view(np.complex128)[..., 0]
-    normals = unit(rng.normal(size=(4, 2, 2, 2, 5, 3)))
+    to_tx, to_rx = unit(rng.normal(size=(2, 4, 2, 2, 5, 3)))
     sent, received = fields
+    normals = bisector(to_tx[:, :, :, None], to_rx[:, :, None])
     eta = np.full(3, np.inf)
     returned = body_reflection(sent[:, :, :, :, None], -normals, normals, eta)
     expected = (received[:, :, :, None] * returned).sum(axis=-1)
-    found = received_from_conductor(sent, received, normals)
+    found = np.empty(expected.shape, dtype=np.complex128)
+    received_from_conductors(0, 4, sent, received, to_tx, to_rx, found)
     assert np.allclose(found, expected, rtol=0, atol=1e-12)
