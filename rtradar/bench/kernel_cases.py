@@ -92,6 +92,24 @@ def _anchored(k: Any) -> Calls:
     return call, lambda: k.anchored_tones_reference(*given, 256)
 
 
+@kernel_case("anchored_tones.fill_anchors", "321 echoes at 3 anchors of 12 Tx, 8 receivers", 1e-6)
+def _fill_anchors(k: Any) -> Calls:
+    rng, echoes, changing = np.random.default_rng(0), 321, 60
+    chirps, which = rng.permutation(36).reshape(3, 12), rng.permutation(echoes)
+    length, weights = rng.random((36, 8, echoes)), rng.normal(size=(4, 3)).astype(np.float32)
+    amplitude = _samples(3, 36, 8, echoes)
+    shape, dtype = (3, 12, 8), np.float32
+    level = np.empty((2, *shape, echoes), dtype), np.empty((2, 2, *shape, changing), dtype)
+    anchors = k.Anchors(np.empty((*shape, echoes)), *level)
+
+    def call() -> Any:
+        k.fill_anchors(0, 36, chirps, length, amplitude, which, weights, tuple(anchors))
+        return anchors
+
+    given = chirps, length, amplitude, which, weights, changing
+    return call, lambda: k.fill_anchors_reference(*given)
+
+
 @kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
 def _noise(k: Any) -> Calls:
     streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])

@@ -73,6 +73,49 @@ class Sweep(NamedTuple):
     sample_rate: float
 
 
+@compiled(fastmath={"contract"})
+def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors):
+    """Fill `Anchors` with some echoes, ``which (kept,)``, at chirps ``start`` to ``stop``.
+
+    Each of the ``chirps (anchor, tx)`` is one of ``length (chirp, rx, echo)`` and ``amplitude
+    (node, chirp, rx, echo)``. Amplitudes are summed over the nodes by ``weights (4, node)``
+    float32: the first for echoes that stay the same over the sweep, the others for the powers of u.
+    """
+    nodes, _, receivers, _ = amplitude.shape
+    lengths, level, change = anchors
+    flat, transmitters = len(which) - change.shape[5], chirps.shape[1]
+    for item in range(start, stop):
+        anchor, tx = item // transmitters, item % transmitters
+        chirp = chirps[anchor, tx]
+        for receiver in range(receivers):
+            for kept in range(len(which)):
+                echo = which[kept]
+                lengths[anchor, tx, receiver, kept] = length[chirp, receiver, echo]
+                total = np.complex64(0)
+                for node in range(nodes):
+                    weight = weights[0 if kept < flat else 1, node]
+                    total += weight * amplitude[node, chirp, receiver, echo]
+                level[0, anchor, tx, receiver, kept] = total.real
+                level[1, anchor, tx, receiver, kept] = total.imag
+            for power in range(2):
+                for kept in range(flat, len(which)):
+                    total = np.complex64(0)
+                    for node in range(nodes):
+                        own = amplitude[node, chirp, receiver, which[kept]]
+                        total += weights[2 + power, node] * own
+                    change[power, 0, anchor, tx, receiver, kept - flat] = total.real
+                    change[power, 1, anchor, tx, receiver, kept - flat] = total.imag
+
+
+def fill_anchors_reference(chirps, length, amplitude, which, weights, changing):
+    """The `Anchors` that `fill_anchors` fills, in plain NumPy."""
+    own = np.einsum("sn,nacre->sacre", weights, amplitude[:, chirps][..., which])
+    own[1][..., : len(which) - changing] = own[0][..., : len(which) - changing]
+    level, *change = (np.stack([part.real, part.imag]) for part in own[1:])
+    change = np.array(change)[..., len(which) - changing :]
+    return Anchors(length[chirps][..., which], level, change)
+
+
 class _Windows(NamedTuple):
     """The windows of tones, and what undoes them after the FFT.
 

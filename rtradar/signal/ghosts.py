@@ -15,13 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
-from rtradar.kernels.anchored_tones import ANCHORS, Anchors, Between, Sweep, add_anchored_tones
+from rtradar.kernels.anchored_tones import (
+    ANCHORS,
+    Anchors,
+    Between,
+    Sweep,
+    add_anchored_tones,
+    fill_anchors,
+)
 from rtradar.radar import Radar
 from rtradar.signal.synthesis import (
     powers_of_sample_number,
     synthesize,
     warn_of_motion_in_chirp,
 )
+from rtradar.system.threads import in_threads
 
 APART_S = (12e-3, 8e-3, 5e-3, 3e-3, 2e-3)
 """Distances between anchors [s], the longest first, of which the first that is good enough counts.
@@ -77,14 +85,12 @@ class GhostIf:
         changing: int,
     ) -> None:
         self._model, self._radar = model, radar
-        self._kept, self._changing = kept, kept[len(kept) - changing :]
+        self._kept, self._changing = kept, changing
         gaps = max(ANCHORS - 1, math.ceil((n_cycles - 1) / apart))
         self.cycles = np.unique(np.rint(np.linspace(0, n_cycles - 1, gaps + 1)).astype(np.int64))
         # The anchors that are held, from the first on.
-        shape = 0, radar.n_tx, radar.n_rx, len(kept)
-        none = np.zeros((2, *shape), dtype=np.float32)
-        change = np.zeros((2, 2, *shape[:3], changing), dtype=np.float32)
-        self._first, self._held = 0, Anchors(np.zeros(shape), none, change)
+        shape = 0, radar.n_tx, radar.n_rx
+        self._first, self._held = 0, _empty_anchors(shape, len(kept), changing)
 
     def add(self, samples: NDArray[np.complex64], chirps: NDArray[np.int64]) -> None:
         """Add the samples of some chirps to ``samples (chirp, rx, sample)`` complex64, in place.
@@ -131,24 +137,25 @@ class GhostIf:
         chirps = (cycles[:, None] * len(each) + each).ravel()
         echoes = self._model.ghosts(chirps)
         warn_of_motion_in_chirp(echoes, self._radar, self._radar.centres_of(chirps))
-        order = np.argsort(echoes.tx[: len(each)])
-        shape = len(cycles), len(each), echoes.length.shape[1]
-
-        def by_tx(values: NDArray[Any]) -> NDArray[Any]:
-            number = values.shape[-1]
-            return np.ascontiguousarray(values.reshape(*shape, number)[:, order])
-
-        def parts(values: NDArray[np.complexfloating]) -> NDArray[np.float32]:
-            return np.stack([by_tx(values.real), by_tx(values.imag)])
-
+        order = len(each) * np.arange(len(cycles))[:, None] + np.argsort(echoes.tx[: len(each)])
         # Flat echoes have their mean over the sweep, the others their amplitude in its middle.
-        flat = self._kept[: len(self._kept) - len(self._changing)]
         powers = _powers_of_u(echoes, self._radar)
-        (mean,) = _weighted(echoes.amplitude, _MEAN_OF_POWERS @ powers, flat)
-        middle, *change = _weighted(echoes.amplitude, powers, self._changing)
-        level = np.concatenate([mean, middle], axis=2)
-        changes = np.array([parts(own) for own in change])
-        return Anchors(by_tx(echoes.length[..., self._kept]), parts(level), changes)
+        weights = np.concatenate([_MEAN_OF_POWERS @ powers, powers]).astype(np.float32)
+        found = _empty_anchors(
+            (len(cycles), len(each), echoes.length.shape[1]), len(self._kept), self._changing
+        )
+        given = order, echoes.length, echoes.amplitude, self._kept, weights, tuple(found)
+        in_threads(fill_anchors, order.size, *given)
+        return found
+
+
+def _empty_anchors(shape: tuple[int, int, int], kept: int, changing: int) -> Anchors:
+    """Make room for echoes at anchors, of which the last change; shape is (anchor, tx, rx)."""
+    return Anchors(
+        np.empty((*shape, kept)),
+        np.empty((2, *shape, kept), dtype=np.float32),
+        np.empty((2, 2, *shape, changing), dtype=np.float32),
+    )
 
 
 def ghosts_within(
@@ -184,7 +191,7 @@ def ghosts_within(
         return None, exact
     level, tilt, curve = (
         (np.abs(own) ** 2).mean(axis=(0, 1))
-        for own in _weighted(some.amplitude, _powers_of_u(some, radar), np.arange(len(some.part)))
+        for own in np.tensordot(_powers_of_u(some, radar), some.amplitude, axes=1)
     )
     strong = _worth(level, power_m2 * _SHARE)
     # Times the variances of u and of its square over the sweep.
@@ -228,20 +235,6 @@ def _powers_of_u(echoes: Echoes, radar: Radar) -> NDArray[np.float64]:
     """
     powers = powers_of_sample_number(echoes.frequency, radar, 0.5)
     return np.concatenate([powers, np.zeros((MOST_NODES - len(powers), powers.shape[1]))])
-
-
-def _weighted(
-    amplitude: NDArray[np.complexfloating],
-    weights: NDArray[np.float64],
-    which: NDArray[np.int64],
-) -> NDArray[np.complex64]:
-    """Sums (sum, chirp, rx, some) over the nodes of some amplitudes (node, chirp, rx, echo)."""
-    chosen = np.take(amplitude, which, axis=-1)
-    out = np.zeros((len(weights), *chosen.shape[1:]), dtype=np.complex64)
-    for own, row in zip(out, weights.astype(np.float32), strict=True):
-        for weight, values in zip(row, chosen, strict=True):
-            own += weight * values
-    return out
 
 
 def _worth(power: NDArray[np.floating], least: float) -> NDArray[np.bool_]:

@@ -25,8 +25,8 @@ def at_nodes(amplitude: NDArray[Any], frequency: Array, nodes: Array) -> NDArray
     return np.asarray(np.tensordot(weights, amplitude, axes=1))
 
 
-def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
-    """Return some of the echoes, each as often as ``which (echo,)`` names it."""
+def take(echoes: Echoes, which: NDArray[np.int64] | slice) -> Echoes:
+    """Return some of the echoes, each as often as ``which (echo,)`` names it, or views of a slice."""
     return dataclasses.replace(
         echoes,
         length=echoes.length[..., which],
