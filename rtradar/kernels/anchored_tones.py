@@ -111,8 +111,8 @@ def fill_anchors_reference(chirps, length, amplitude, which, weights, changing):
     """The `Anchors` that `fill_anchors` fills, in plain NumPy."""
     own = np.einsum("sn,nacre->sacre", weights, amplitude[:, chirps][..., which])
     own[1][..., : len(which) - changing] = own[0][..., : len(which) - changing]
-    level, *change = (np.stack([part.real, part.imag]) for part in own[1:])
-    change = np.array(change)[..., len(which) - changing :]
+    level, *powers = (np.stack([part.real, part.imag]) for part in own[1:])
+    change = np.array(powers)[..., len(which) - changing :]
     return Anchors(length[chirps][..., which], level, change)
 
 

@@ -14,6 +14,7 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.scatter.silhouettes import Shadow
 from rtradar.kernels.still_room import add_blended, cubic_weights
 from rtradar.radar import Radar
+from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.signal.synthesis import synthesize
@@ -79,7 +80,10 @@ def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group
         together = replace(
             chosen[0],
             length=np.concatenate([own.length for own in chosen], axis=-1),
-            amplitude=np.concatenate([own.amplitude for own in chosen], axis=-1),
+            # In the precision of the samples.
+            amplitude=np.concatenate(
+                [own.amplitude for own in chosen], axis=-1, dtype=np.complex64, casting="same_kind"
+            ),
             part=np.concatenate([own.part for own in chosen]),
             bounces=np.concatenate([own.bounces for own in chosen]),
         )
@@ -95,8 +99,7 @@ def _amplitude(
         if len(echoes.frequency) <= _SHADOW_NODES:
             return echoes.amplitude[..., which], echoes.frequency
         nodes = sweep_nodes(radar, _SHADOW_NODES)
-    weights = interpolation_weights(echoes.frequency, nodes)
-    return np.tensordot(weights, echoes.amplitude[..., which], axes=1), nodes
+    return at_nodes(echoes.amplitude[..., which], echoes.frequency, nodes), nodes
 
 
 class RoomIf:

@@ -26,7 +26,7 @@ def at_nodes(amplitude: NDArray[Any], frequency: Array, nodes: Array) -> NDArray
 
 
 def take(echoes: Echoes, which: NDArray[np.int64] | slice) -> Echoes:
-    """Return some of the echoes, each as often as ``which (echo,)`` names it, or views of a slice."""
+    """Return some of the echoes, as often as ``which (echo,)`` names each, or views of a slice."""
     return dataclasses.replace(
         echoes,
         length=echoes.length[..., which],

@@ -9,11 +9,13 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import (
     antenna_field,
+    bisector,
     body_material,
     body_reflection,
     material_factor,
