@@ -33,7 +33,6 @@ from rtradar.radar import Radar
 from rtradar.settings import RunSettings
 from rtradar.signal import separate
 from rtradar.signal.multiplexing import chirps_together
-from rtradar.system.threads import side_by_side
 
 CLOUD_POINTS = 3000
 """Points in the RDT cloud (paper, section 3.2.4)."""
@@ -192,9 +191,13 @@ class CloudMaker:
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
-            angles, source = self._angles_and_source(start, cube, power, mask)
-            if angles is not None:
+            angles = source = None
+            if self._source_of is not None:
+                with stages.time("sources"):
+                    source = self._source_of(start, power, mask)
+            if measured_angles(radar):
                 with stages.time("angle"):
+                    angles = frame_angles(cube, mask, radar, window_functions)
                     found = (
                         spatial_points(angles, radar, middle, source)
                         if sines is None
@@ -204,31 +207,6 @@ class CloudMaker:
                     columns = found.points, found.velocity, found.power, found.time, who
                     self._spatial.add(np.column_stack(columns))
             yield Frame(middle, power, mask, angles, source)
-
-    def _angles_and_source(
-        self,
-        start: int,
-        cube: NDArray[np.complexfloating],
-        power: NDArray[np.floating],
-        mask: NDArray[np.bool_],
-    ) -> tuple[AngleSpectra | None, NDArray[np.int64] | None]:
-        """Angle spectra of the detected cells of a frame, and who returned them.
-
-        Both are found side by side: loops of NumPy find the one, compiled ones the other.
-        """
-        radar, windows = self._processing.radar, self._processing.window_functions
-        source_of, stages = self._source_of, self._processing.stages
-        angles: list[AngleSpectra] = []
-        source: list[NDArray[np.int64]] = []
-        tasks: list[tuple[str, Callable[[], None]]] = []
-        if source_of is not None:
-            tasks.append(("sources", lambda: source.append(source_of(start, power, mask))))
-        if measured_angles(radar):
-            tasks.append(("angle", lambda: angles.append(frame_angles(cube, mask, radar, windows))))
-        if tasks:
-            with stages.time(tasks[-1][0]):
-                side_by_side(*(task for _, task in tasks))
-        return angles[0] if angles else None, source[0] if source else None
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""

@@ -1,9 +1,8 @@
-"""What three rules for threads save: the time of a run without each over that with all.
+"""What two rules for threads save: the time of a run without each over that with both.
 
-Products of matrices take one thread; in a room the shadow in the clutter is computed beside the
-tones of the echoes; and angles are found beside who returned each cell. Runs are of a walk, in
-memory, by `specular` with the paper's radar at 12 GHz and clutter removal by the mean, warm, in
-turn. The median of the ratios of neighbours counts.
+Products of matrices take one thread, and in a room the shadow in the clutter is computed beside the
+tones of the echoes. Runs are of a walk, in memory, by `specular` with the paper's radar at 12 GHz
+and clutter removal by the mean, warm, in turn. The median of the ratios of neighbours counts.
 
     python validation/cost/threads.py [--quick] [--json FILE]
 """
@@ -19,7 +18,7 @@ from typing import Any
 from unittest import mock
 
 import rtradar as rt
-from rtradar.pipeline import capture, processing
+from rtradar.pipeline import capture
 from rtradar.system import threads
 from rtradar.validate.rows import Row, main, reported
 
@@ -43,9 +42,6 @@ def _without() -> dict[str, AbstractContextManager[Any]]:
         "matrix products by all threads": mock.patch.object(threads, "_libraries", _Unlimited),
         "tones and shadow one after another": mock.patch.object(
             capture, "side_by_side", _one_after_another
-        ),
-        "angles and sources one after another": mock.patch.object(
-            processing, "side_by_side", _one_after_another
         ),
     }
 
