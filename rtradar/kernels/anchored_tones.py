@@ -91,20 +91,17 @@ def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors
             for kept in range(len(which)):
                 echo = which[kept]
                 lengths[anchor, tx, receiver, kept] = length[chirp, receiver, echo]
-                total = np.complex64(0)
-                for node in range(nodes):
-                    weight = weights[0 if kept < flat else 1, node]
-                    total += weight * amplitude[node, chirp, receiver, echo]
-                level[0, anchor, tx, receiver, kept] = total.real
-                level[1, anchor, tx, receiver, kept] = total.imag
-            for power in range(2):
-                for kept in range(flat, len(which)):
+                for power in range(1 if kept < flat else 3):
                     total = np.complex64(0)
                     for node in range(nodes):
-                        own = amplitude[node, chirp, receiver, which[kept]]
-                        total += weights[2 + power, node] * own
-                    change[power, 0, anchor, tx, receiver, kept - flat] = total.real
-                    change[power, 1, anchor, tx, receiver, kept - flat] = total.imag
+                        weight = weights[0 if kept < flat else power + 1, node]
+                        total += weight * amplitude[node, chirp, receiver, echo]
+                    if power == 0:
+                        level[0, anchor, tx, receiver, kept] = total.real
+                        level[1, anchor, tx, receiver, kept] = total.imag
+                    else:
+                        change[power - 1, 0, anchor, tx, receiver, kept - flat] = total.real
+                        change[power - 1, 1, anchor, tx, receiver, kept - flat] = total.imag
 
 
 def fill_anchors_reference(chirps, length, amplitude, which, weights, changing):

@@ -213,14 +213,7 @@ def cell_spectra(
         Where the shape does not fit the radar, the cells are no whole numbers within the map, or
         the radar has no line of channels to measure an angle.
     """
-    cube = np.asarray(spectra)
-    shape = radar.n_tx, radar.n_rx
-    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
-        raise InputError(
-            f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar "
-            f"'{radar.name}' needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, "
-            "any)"
-        )
+    cube = _frame_of(radar, spectra)
     n_cycles, n_range = cube.shape[0], cube.shape[3]
     rows = _indices(range_bins, n_range, "range_bins")
     columns = _indices(velocity_bins, n_cycles, "velocity_bins")
@@ -257,6 +250,18 @@ def cell_spectra(
 
     thread_map(transform, range(radar.n_channels))
     return values
+
+
+def _frame_of(radar: Radar, spectra: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+    """Check that range spectra are those of one frame of a radar."""
+    cube, shape = np.asarray(spectra), (radar.n_tx, radar.n_rx)
+    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
+        raise InputError(
+            f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar "
+            f"'{radar.name}' needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, "
+            "any)"
+        )
+    return cube
 
 
 def _indices(bins: ArrayLike, n: int, name: str) -> NDArray[np.int64]:

@@ -58,24 +58,23 @@ def _term(face, once, slab):
 @inlined()
 def _coefficients(cosine, node, slab):
     """TE and TM coefficient of a slab, without the phase that is taken out."""
-    eta = slab.eta[node]
+    eta, wavenumber, odd = slab.eta[node], slab.wavenumber[node], slab.passes % 2
+    rough = 0.0 if odd else wavenumber * slab.roughness * cosine
+    lost = math.exp(-2 * rough * rough)
     if cmath.isinf(eta):
-        return (-1.0 + 0j, 1.0 + 0j) if slab.passes == 0 else (0j, 0j)
+        return (-lost + 0j, lost + 0j) if slab.passes == 0 else (0j, 0j)
     inner = cmath.sqrt(eta - 1 + cosine * cosine)
     if inner.imag > 0:
         inner = -inner
     total, of_tm = cosine + inner, eta * cosine + inner
     te = (cosine - inner) / total if total != 0 else 0j
     tm = (eta * cosine - inner) / of_tm if of_tm != 0 else 0j
-    wavenumber, odd = slab.wavenumber[node], slab.passes % 2
     once = cmath.exp(-1j * wavenumber * slab.thickness * inner)
     extra = slab.thickness * cosine * odd
     if slab.index_squared > 0:
         within = math.sqrt(slab.index_squared - 1 + cosine * cosine)
         extra = slab.passes * slab.thickness * within
-    taken = cmath.exp(1j * wavenumber * extra)
-    if not odd:
-        taken *= math.exp(-2 * (wavenumber * slab.roughness * cosine) ** 2)
+    taken = lost * cmath.exp(1j * wavenumber * extra)
     return _term(te, once, slab) * taken, _term(tm, once, slab) * taken
 
 

@@ -25,14 +25,19 @@ def at_nodes(amplitude: NDArray[Any], frequency: Array, nodes: Array) -> NDArray
     return np.asarray(np.tensordot(weights, amplitude, axes=1))
 
 
-def take(echoes: Echoes, which: NDArray[np.int64] | slice) -> Echoes:
-    """Return some of the echoes, as often as ``which (echo,)`` names each, or views of a slice."""
+def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
+    """Return some of the echoes, each as often as ``which (echo,)`` names it.
+
+    Of neighbours the arrays are views.
+    """
+    side_by_side = len(which) > 0 and bool(np.all(np.diff(which) == 1))
+    some = slice(int(which[0]), int(which[-1]) + 1) if side_by_side else which
     return dataclasses.replace(
         echoes,
-        length=echoes.length[..., which],
-        amplitude=echoes.amplitude[..., which],
-        part=echoes.part[which],
-        bounces=echoes.bounces[which],
+        length=echoes.length[..., some],
+        amplitude=echoes.amplitude[..., some],
+        part=echoes.part[some],
+        bounces=echoes.bounces[some],
     )
 
 

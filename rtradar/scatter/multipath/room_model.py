@@ -307,10 +307,7 @@ class RoomModel:
         After `prune` they are the same ones at every chirp.
         """
         echoes = self.optical_echoes(np.asarray(chirps, dtype=np.int64), ghosts=True)
-        which = np.flatnonzero(echoes.bounces > 1)
-        # As views where they lie side by side: nothing is copied then.
-        apart = len(which) == 0 or len(which) <= which[-1] - which[0]
-        return take(echoes, which if apart else slice(which[0], which[-1] + 1))
+        return take(echoes, np.flatnonzero(echoes.bounces > 1))
 
     def without_ghosts(self) -> RoomModel:
         """Return the model of the direct echoes alone, with what is already known of them."""
