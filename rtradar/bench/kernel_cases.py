@@ -110,6 +110,31 @@ def _fill_anchors(k: Any) -> Calls:
     return call, lambda: k.fill_anchors_reference(*given)
 
 
+# -- expected echoes -------------------------------------------------------------------------------
+
+
+@kernel_case("expected_echoes.follow_echoes", "315 echoes, 136 cycles, 9 instants", 1e-6)
+def _follow(k: Any) -> Calls:
+    rng, shape = np.random.default_rng(0), (9, 315)
+    power = rng.random(shape) * (rng.random(shape) > 0.2)  # some are not seen
+    looks = k.Looks(
+        np.arange(9) * 17 + 3, 7.5e-4, 2 + rng.random(shape), rng.normal(size=shape), power
+    )
+    out = np.empty((136, 315), dtype=np.int32), np.empty((136, 315), dtype=np.complex64)
+    call = filled(k.follow_echoes, 0, 136, 3, looks, 93.4, 13000.0, out=out)
+    return call, lambda: k.follow_echoes_reference(3, 136, looks, 93.4, 13000.0)
+
+
+@kernel_case("expected_echoes.fields_in_bins", "2048 echoes and bins, 136 cycles", 1e-6)
+def _in_bins(k: Any) -> Calls:
+    rng = np.random.default_rng(0)
+    steps = rng.integers(20000, 30000, (136, 315), dtype=np.int32)
+    echo, away = rng.integers(0, 315, 2048), rng.integers(22000, 34000, 2048)
+    given = echo, away, steps, _samples(136, 315), rng.random(4097, dtype=np.float32)
+    call = filled(k.fields_in_bins, 0, 136, *given, out=(np.empty((136, 2048), np.complex64),))
+    return call, lambda: k.fields_in_bins_reference(*given)
+
+
 @kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
 def _noise(k: Any) -> Calls:
     streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -27,7 +26,7 @@ from rtradar.signal.ghosts import AHEAD
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.receiver import ReceiverStage
 from rtradar.system.files import uninterruptible
-from rtradar.system.threads import one_blas_thread, side_by_side
+from rtradar.system.threads import one_blas_thread
 
 
 class SpectraSink(Protocol):
@@ -131,18 +130,11 @@ class Capture:
             n = len(echoes.tx)
             samples, chirps = samples_of[:n], np.arange(first, first + n)
 
-            def tones() -> None:
+            with stages.time("signal"):
                 times = radar.chirp_times(n, first)
                 synthesize(echoes, radar, times, dtype=np.complex64, out=samples)
                 if ghosts is not None:
                     ghosts.add(samples, chirps)
-
-            with stages.time("signal"):
-                if room is None:
-                    tones()
-                else:
-                    # They share no cache: shadows ask nothing of the model.
-                    side_by_side(tones, partial(room.compute, chirps))
             phases = None
             if self.receiver is not None:
                 with stages.time("receiver"):
@@ -166,6 +158,8 @@ class Capture:
         # block is computed.
         def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
             with stages.time("scatter"), one_blas_thread():
+                if room is not None:
+                    room.begin(chirps)
                 echoes = self.tones.echoes(chirps)
                 if ghosts is not None:
                     ghosts.compute(chirps, AHEAD)

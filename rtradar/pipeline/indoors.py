@@ -21,9 +21,9 @@ from rtradar.signal.ghosts import GhostIf, ghosts_within
 from rtradar.signal.moving_clutter import MovingRoomIf
 from rtradar.signal.static_clutter import RoomIf
 
-_OF_GHOSTS = 0.75
-"""Part of the tolerated power of errors that ghosts may take; the shadow in the clutter may take
-what they leave."""
+_LEFT_OUT, _OF_GHOSTS = 0.08, 0.75
+"""Part of the tolerated power of errors that the weakest ghosts may take, which are left out, and
+that all ghosts may; the shadow in the clutter may take what they leave."""
 
 
 class Indoors(NamedTuple):
@@ -57,20 +57,20 @@ def indoors(
     What is not worth its cost is taken out of the model.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
-    paths = model.prune(n_chirps, noise)
+    allowed = 0.0
+    if settings.path_tolerance_db is not None:
+        allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
+    paths = model.prune(n_chirps, noise, _LEFT_OUT * allowed)
     order = max(settings.order, 1)
 
     def trace(seen: Scene) -> Clutter:
         return Clutter(radar, seen, variant=variant, order=order).prune(noise)
 
     clutter = trace(scene)
-    allowed = error = 0.0
-    ghosts, said = None, dict[str, Any]()
-    if settings.path_tolerance_db is not None:
-        allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
-        if allowed > 0 and model.has_ghost_tones:
-            ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed)
-            error = said.pop("error_m2")
+    error, ghosts, said = model.left_out_m2, None, dict[str, Any]()
+    if allowed > 0 and model.has_ghost_tones:
+        ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed - error)
+        error += said.pop("error_m2")
     if isinstance(scene, MovingScene):
         room: RoomIf = MovingRoomIf(radar, scene, radar.duration_of(n_chirps), trace)
     else:
@@ -89,7 +89,11 @@ def indoors(
     }
     if allowed > 0:
         said["error_db"] = 10 * math.log10(error / person_power_m2) if error > 0 else None
-        summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
+        summary["approximation"] = {
+            "tolerance_db": settings.path_tolerance_db,
+            "left_out": model.left_out,
+            **said,
+        }
     limits = []
     if isinstance(scene, MovingScene):
         limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))

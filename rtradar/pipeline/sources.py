@@ -11,17 +11,17 @@ does not matter how echoes interfere.
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.expected_echoes import Looks, fields_in_bins, follow_echoes
 from rtradar.pipeline.capture import Capture
 from rtradar.process import range_spectrum
 from rtradar.process.power_maps import doppler_power
 from rtradar.process.window_functions import WindowName, weights
-from rtradar.system.threads import thread_map
+from rtradar.system.threads import in_threads, thread_map
 
 _INSTANTS = 8
 """Times in a frame at which echoes are looked at."""
@@ -53,12 +53,6 @@ class _Echoes(NamedTuple):
     rate_mps: Array
     power_m2: Array
     owner: NDArray[np.int64]
-
-    def of(self, kept: NDArray[np.int64]) -> _Echoes:
-        """Return some of the echoes."""
-        return _Echoes(
-            self.range_m[kept], self.rate_mps[kept], self.power_m2[kept], self.owner[kept]
-        )
 
 
 class Sources:
@@ -99,17 +93,18 @@ class Sources:
         are filled.
         """
         radar, n_cycles = self._capture.radar, self._cycles
-        range_m, power, owner = self._course(start_cycle)
-        place = range_m / radar.range_bin_m
-        # As far as an echo is not weak.
-        reach = (self._falls * power.max(axis=1)[:, None] > self._weak_m2).sum(axis=1)
-        low, high = place.min(axis=1) - reach, place.max(axis=1) + reach
-        echo, row = np.nonzero((rows >= low[:, None]) & (rows <= high[:, None]))
-        turns = 2 / radar.wavelength_m * range_m
-        tone = np.sqrt(power) * np.exp(2j * np.pi * (turns - np.rint(turns)))
+        looks, owner = self._looks(start_cycle)
+        n_echoes = len(owner)
         # An echo to a column, as the transform takes it.
-        tones = np.ascontiguousarray(tone.T, dtype=np.complex64)
-        steps = np.ascontiguousarray(np.rint(_FINE * place).T, dtype=np.int32)
+        steps = np.empty((n_cycles, n_echoes), dtype=np.int32)
+        fields = np.empty((n_cycles, n_echoes), dtype=np.complex64)
+        scales = 2 / radar.wavelength_m, _FINE / radar.range_bin_m
+        in_threads(follow_echoes, n_cycles, start_cycle, looks, *scales, steps, fields)
+        # As far as an echo is not weak.
+        most_m2 = looks.power_m2.max(axis=0, initial=0.0)
+        reach = _FINE * (self._falls * most_m2[:, None] > self._weak_m2).sum(axis=1)
+        low, high = steps.min(axis=0) - reach, steps.max(axis=0) + reach
+        echo, row = np.nonzero((_FINE * rows >= low[:, None]) & (_FINE * rows <= high[:, None]))
         n_owners = len(self._capture.body.names) + len(self._capture.scene.objects)
         found = np.zeros((n_cycles, n_owners * radar.samples_per_chirp))
         target = owner[echo] * radar.samples_per_chirp + rows[row]
@@ -118,8 +113,9 @@ class Sources:
 
         def spectra(first: int) -> tuple[NDArray[np.int64], Array]:
             own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
-            away = (_FINE * (bins + self._reach)).astype(np.int32) - steps[:, own]
-            signal = self._spread.take(away, mode="clip") * tones[:, own]
+            away = _FINE * (bins + self._reach)
+            signal = np.empty((n_cycles, len(own)), dtype=np.complex64)
+            fields_in_bins(0, n_cycles, own, away, steps, fields, self._spread, signal)
             spectrum = doppler_power(signal[:, None], range(1), self._doppler, 1)
             targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
             return targets, np.add.reduceat(spectrum, begin, axis=1)
@@ -129,25 +125,18 @@ class Sources:
         maps = found.T.reshape(n_owners, radar.samples_per_chirp, n_cycles)
         return np.asarray(radar.n_channels * np.fft.fftshift(maps, axes=2))
 
-    def _course(self, start_cycle: int) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Range [m] and power [m^2] of the echoes (echo, cycle) over a frame, and their owners."""
+    def _looks(self, start_cycle: int) -> tuple[Looks, NDArray[np.int64]]:
+        """The echoes at the instants of a frame that are not weak in it, and their owners."""
         at = self._instants(start_cycle)
         seen = self._seen(at)
         count = min(len(one.owner) for one in seen)  # more may come while they are asked for
-        power = np.array([one.power_m2[:count] for one in seen])
-        kept = np.flatnonzero(power.max(axis=0) > max(self._weak_m2, 0.0))
-        cycles = np.arange(start_cycle, start_cycle + self._cycles)
-        range_m = np.empty((len(kept), self._cycles))
-        power_m2 = np.empty_like(range_m)
-        for interval, (before, after) in enumerate(pairwise(seen)):
-            apart, last = at[interval + 1] - at[interval], interval == len(at) - 2
-            inside = (at[interval] <= cycles) & (cycles < at[interval + 1] + last)
-            t = (cycles[inside] - at[interval]) / max(apart, 1)
-            apart_s = int(apart) * self._capture.radar.cycle_duration_s
-            here, there = before.of(kept), after.of(kept)
-            range_m[:, inside] = _cubic(here, there, apart_s, t)
-            power_m2[:, inside] = np.outer(here.power_m2, 1 - t) + np.outer(there.power_m2, t)
-        return range_m, power_m2, seen[0].owner[kept]
+        range_m, rate_mps, power_m2 = (
+            np.array([array[:count] for array in column])
+            for column in list(zip(*seen, strict=True))[:3]
+        )
+        kept = np.flatnonzero(power_m2.max(axis=0) > max(self._weak_m2, 0.0))
+        own = range_m[:, kept], rate_mps[:, kept], power_m2[:, kept]
+        return Looks(at, self._capture.radar.cycle_duration_s, *own), seen[0].owner[kept]
 
     def _instants(self, start_cycle: int) -> NDArray[np.int64]:
         """Cycles about a frame at which echoes are looked at; past a gap there is nothing."""
@@ -207,26 +196,6 @@ class Sources:
             by_range = (np.abs(spectra.astype(np.complex128)) ** 2).sum(axis=(0, 1))
             power += by_range[:, None] * np.fft.fftshift(np.abs(np.fft.fft(self._doppler)) ** 2)
         return power
-
-
-def _cubic(before: _Echoes, after: _Echoes, apart_s: float, t: Array) -> Array:
-    """Range (echo, n) by ranges and rates at both ends, at fractions ``t (n,)`` of the time.
-
-    Where an echo is not seen at one end, it goes on as at the other.
-    """
-    ends = []
-    for own, other, later_s in ((before, after, -apart_s), (after, before, apart_s)):
-        gone = own.power_m2 == 0
-        there = other.range_m + later_s * other.rate_mps
-        rate = np.where(gone, other.rate_mps, own.rate_mps)
-        ends.append((np.where(gone, there, own.range_m), apart_s * rate))
-    (start, start_rate), (end, end_rate) = ends
-    return np.asarray(
-        np.outer(start, (1 + 2 * t) * (1 - t) ** 2)
-        + np.outer(start_rate, t * (1 - t) ** 2)
-        + np.outer(end, t**2 * (3 - 2 * t))
-        + np.outer(end_rate, t**2 * (t - 1))
-    )
 
 
 def _spread(window: WindowName, n: int) -> tuple[NDArray[np.float32], int]:

@@ -39,8 +39,8 @@ _MARGIN_DB = 1.5
 """What is measured at some instants may be so much larger over the capture [dB]. It is measured in
 the middle between anchors, where the error of a cubic has 2.9 dB more power than on average."""
 
-_SHARE = 0.1
-"""Part of the tolerated power that the ghosts left out may take, and as much the changes."""
+_OF_CHANGES = 0.1
+"""Part of the tolerated power that changes over the sweep may take that are left out."""
 
 _STREAMS = 8
 """Ranges from which ghosts are added in turn."""
@@ -179,33 +179,32 @@ def ghosts_within(
     GhostIf or None
         None where no distance between anchors is good enough.
     dict
-        What was approximated, for JSON: the number of ghosts, of those left out and of those that
-        change over the sweep, the distance between anchors [s], and the error's power [m^2].
+        What was approximated, for JSON: the number of ghosts and of those that change over the
+        sweep, the distance between anchors [s], and the error's power [m^2].
     """
     spread = np.unique(np.linspace(0, n_chirps - 1, _POWER_CHIRPS).astype(np.int64))
     some = model.ghosts(spread)
-    said = {"ghosts": len(some.part), "left_out": 0, "changing": 0}
+    said = {"ghosts": len(some.part), "changing": 0}
     exact = said | {"anchors_apart_s": None, "error_m2": 0.0}
     # A cubic over a gap between frames would be far off.
     if len(some.frequency) > MOST_NODES or radar.in_frames:
         return None, exact
-    level, tilt, curve = (
+    tilt, curve = (
         (np.abs(own) ** 2).mean(axis=(0, 1))
-        for own in np.tensordot(_powers_of_u(some, radar), some.amplitude, axes=1)
+        for own in np.tensordot(_powers_of_u(some, radar)[1:], some.amplitude, axes=1)
     )
-    strong = _worth(level, power_m2 * _SHARE)
     # Times the variances of u and of its square over the sweep.
-    changes = _worth(tilt / 12 + curve / 180, power_m2 * _SHARE)
+    changes = _worth(tilt / 12 + curve / 180, power_m2 * _OF_CHANGES)
     length = some.length.mean(axis=(0, 1))
-    groups = [np.flatnonzero(strong & ~changes), np.flatnonzero(strong & changes)]
-    kept = np.concatenate([_apart(own, length) for own in groups])
-    said |= {"left_out": int((~strong).sum()), "changing": len(groups[1])}
+    groups = [np.flatnonzero(~changes), np.flatnonzero(changes)]
+    order = np.concatenate([_apart(own, length) for own in groups])
+    said |= {"changing": len(groups[1])}
     n_cycles = n_chirps // radar.n_tx
     for apart_s in APART_S:
         apart = min(round(apart_s / radar.cycle_duration_s), (n_cycles - 1) // (ANCHORS - 1))
         if apart < 2:
             break
-        found = GhostIf(model, radar, n_cycles, apart, kept, len(groups[1]))
+        found = GhostIf(model, radar, n_cycles, apart, order, len(groups[1]))
         error = _error(found, model, radar)
         if error * 10 ** (_MARGIN_DB / 10) <= power_m2:
             apart_s = apart * radar.cycle_duration_s

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import NamedTuple, Protocol
+from functools import lru_cache, partial
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.signal.synthesis import synthesize
-from rtradar.system.threads import thread_map
+from rtradar.system.threads import begun, thread_map
 
 _Array = NDArray[np.float64]
 _Samples = NDArray[np.complex64]
@@ -28,6 +28,9 @@ _SHADOW_NODES = 3
 """Frequencies at which amplitudes of points are taken for their shadow: groups of facets half a
 range bin deep are then known to -25 dB, and on average to -40 dB."""
 _CHIRPS_A_THREAD = 16
+
+KEPT_ROOMS = 2
+"""Rooms whose samples stay in memory, as many as traced rooms do."""
 
 
 class MovingShadow(Protocol):
@@ -102,6 +105,45 @@ def _amplitude(
     return at_nodes(echoes.amplitude[..., which], echoes.frequency, nodes), nodes
 
 
+class _Still(tuple[Echoes, ...]):
+    """The echoes of each object of a room; two of the same arrays are one key."""
+
+    def _arrays(self) -> list[NDArray[Any]]:
+        return [array for own in self for array in (own.length, own.amplitude)]
+
+    def __hash__(self) -> int:
+        return hash(tuple(map(id, self._arrays())))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, _Still) or len(other) != len(self):
+            return False
+        pairs = zip(self._arrays(), other._arrays(), strict=True)
+        return all(one is another for one, another in pairs)
+
+
+@lru_cache(maxsize=KEPT_ROOMS)
+def _at_rest(
+    radar: Radar, objects: _Still, mirrors: tuple[int, ...]
+) -> tuple[list[_Group], _Samples, dict[int, _Samples]]:
+    """Groups of a room's objects, their IF samples in one cycle, and those of each mirror alone.
+
+    Kept as long as the traced room is: the next recording in it needs the same.
+    """
+    groups, of_mirrors = _grouped(objects, mirrors), dict[int, _Samples]()
+    whole = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex128)
+    for group in groups:
+        samples, number = _synthesized(group.echoes, radar), int(group.member.argmax())
+        whole += samples
+        if number in mirrors:
+            of_mirrors[number] = samples
+    return groups, whole.astype(np.complex64), of_mirrors
+
+
+def _synthesized(echoes: Echoes, radar: Radar) -> _Samples:
+    times = radar.chirp_times(radar.n_tx)
+    return np.asarray(synthesize(echoes, radar, times, dtype=np.complex64))
+
+
 class RoomIf:
     """IF samples of a room.
 
@@ -114,23 +156,16 @@ class RoomIf:
     def __init__(
         self, radar: Radar, objects: Iterable[Echoes], shadow: MovingShadow | None = None
     ) -> None:
-        self._radar, objects = radar, tuple(objects)
-        self._shadow = shadow if objects else None
-        mirrors = shadow.mirrors if shadow else ()
-        self._groups = _grouped(objects, mirrors)
-        self._mirrors: dict[int, _Samples] = {}
-        whole = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex128)
-        for group in self._groups:
-            samples, number = self._synthesized(group.echoes), int(group.member.argmax())
-            whole += samples
-            if number in mirrors:
-                self._mirrors[number] = samples
-        self._whole: _Samples = whole.astype(np.complex64)
+        self._radar, still = radar, _Still(objects)
+        self._shadow = shadow if still else None
+        mirrors = tuple(shadow.mirrors) if shadow else ()
+        self._groups, self._whole, self._mirrors = _at_rest(radar, still, mirrors)
         if shadow:
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)
         self._lost: dict[int, _Samples] = {}
+        self._begun: Callable[[], dict[int, _Samples]] | None = None
         self._slow: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 
     @property
@@ -159,8 +194,10 @@ class RoomIf:
         if self._shadow is None:
             samples += self._whole[tx]
             return
-        self.compute(chirps)
         keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
+        if not self._found().keys() >= set(self._keyframes(keyframes)):
+            self.begin(chirps)
+            self._found()
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
             inside = np.flatnonzero(keyframes == keyframe)
@@ -171,17 +208,30 @@ class RoomIf:
                 continue
             self._blend(samples[some], tx[some], weights[some], np.stack(lost))
 
-    def compute(self, chirps: NDArray[np.int64]) -> None:
-        """Compute what the body occludes at the keyframes around some chirps, ascending.
+    def begin(self, chirps: NDArray[np.int64]) -> None:
+        """Begin to compute what the body occludes around some chirps (chirp,), ascending.
 
-        `add` does it where it was not done before. It takes nothing from the model of the echoes,
-        so that both can be computed side by side.
+        It is done in another thread, and `add` waits for it. The model of the echoes is asked for
+        nothing, so that it may be asked for others meanwhile.
         """
         if self._shadow is None:
             return
-        keyframes, _ = keyframe_before(self._radar, chirps, self._shadow.step)
-        needed = np.unique(keyframes[:, None] + np.arange(-1, 3)).tolist()
-        self._lost = {k: self._lost[k] if k in self._lost else self._find(k) for k in needed}
+        needed = self._keyframes(keyframe_before(self._radar, chirps, self._shadow.step)[0])
+        self._lost = {k: lost for k, lost in self._found().items() if k in needed}
+        missing = [k for k in needed if k not in self._lost]
+        if missing:
+            self._begun = begun(lambda: {k: self._find(k) for k in missing})
+
+    def _keyframes(self, before: NDArray[np.int64]) -> list[int]:
+        """Numbers of the keyframes around chirps, of which those before them are given."""
+        return np.unique(before[:, None] + np.arange(-1, 3)).tolist()
+
+    def _found(self) -> dict[int, _Samples]:
+        """Wait for what was begun; only then are the caches free."""
+        if self._begun:
+            result, self._begun = self._begun, None
+            self._lost |= result()
+        return self._lost
 
     def _blend(
         self,
@@ -238,9 +288,5 @@ class RoomIf:
                     part=group.echoes.part[which],
                     bounces=group.echoes.bounces[which],
                 )
-                lost += self._synthesized(some)
+                lost += _synthesized(some, self._radar)
         return lost
-
-    def _synthesized(self, echoes: Echoes) -> _Samples:
-        times = self._radar.chirp_times(self._radar.n_tx)
-        return np.asarray(synthesize(echoes, self._radar, times, dtype=np.complex64))

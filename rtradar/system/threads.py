@@ -97,9 +97,17 @@ def in_threads(kernel: Callable[..., Any], count: int, *given: Any) -> list[Any]
     )
 
 
-def side_by_side(*tasks: Callable[[], None]) -> None:
-    """Do tasks that share nothing, in threads; return when all are done."""
-    thread_map(lambda number: tasks[number](), range(len(tasks)))
+def begun(work: Callable[[], _Result]) -> Callable[[], _Result]:
+    """Begin work in a thread that is free; return a function that waits for its result.
+
+    That function is to be called once. It does the work itself if no thread has begun it by then.
+    The work must share nothing that changes with what the caller does meanwhile, and make no large
+    products of matrices, for only the caller's thread can limit those of BLAS.
+    """
+    if thread_count() == 1:
+        return work
+    future = _pool().submit(work)
+    return lambda: work() if future.cancel() else future.result()
 
 
 @contextmanager

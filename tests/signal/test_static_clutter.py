@@ -125,17 +125,18 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
     assert np.abs(got - still).max() > 0.003 * np.abs(still).max()
 
 
-def test_what_was_computed_ahead_is_not_computed_again(
+def test_what_was_begun_is_not_computed_again(
     clutter: Clutter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chirps, shadow = np.arange(9, 900), ClutterShadow(clutter, Ball())
     expected = RoomIf(RADAR, clutter.cycle(), shadow).clutter_if(chirps)
     room, asked = RoomIf(RADAR, clutter.cycle(), shadow), list[int]()
-    room.compute(chirps)
+    room.begin(chirps)
+    np.testing.assert_array_equal(room.clutter_if(chirps[:9]), expected[:9])
     monkeypatch.setattr(shadow, "at", asked.append)
     np.testing.assert_array_equal(room.clutter_if(chirps), expected)
     # Of the same keyframes parts need no more than the whole.
-    room.compute(chirps[400:])
+    room.begin(chirps[400:])
     assert asked == []
 
 

@@ -18,9 +18,9 @@ from threadpoolctl import ThreadpoolController
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
+    begun,
     in_threads,
     one_blas_thread,
-    side_by_side,
     thread_count,
     thread_environment,
     thread_limit,
@@ -49,12 +49,27 @@ def test_an_error_in_a_thread_is_raised() -> None:
         thread_map(fail, range(2))
 
 
-def test_tasks_side_by_side_are_all_done() -> None:
-    done = set[int]()
-    side_by_side(partial(done.add, 1), partial(done.add, 2))
-    assert done == {1, 2}
+@pytest.mark.parametrize("count", ["1", "4"])
+def test_what_was_begun_is_done_once(monkeypatch: pytest.MonkeyPatch, count: str) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, count)
+    done = list[int]()
+    waited_for = begun(lambda: done.append(1))
+    waited_for()
+    assert done == [1]
     with pytest.raises(KeyError):
-        side_by_side(partial(done.add, 3), partial(done.remove, 9))
+        begun(lambda: {}[3])()
+
+
+@pytest.mark.usefixtures("four_threads")
+def test_what_no_thread_has_begun_is_done_by_who_waits() -> None:
+    done, who = threading.Event(), list[int]()
+    asleep = [threads._pool().submit(done.wait, 60) for _ in range(3)]
+    try:
+        begun(lambda: who.append(threading.get_ident()))()
+        assert who == [threading.get_ident()]
+    finally:
+        done.set()
+        wait(asleep)
 
 
 def test_after_an_error_no_other_item_is_begun() -> None:
@@ -168,13 +183,14 @@ def test_parts_of_the_work_cover_all_items_once() -> None:
         assert [item for part in parts for item in part] == list(range(count))
 
 
-def test_matrix_products_take_one_thread_inside_and_as_many_as_before_after() -> None:
-    def counts() -> list[int]:
-        libraries = ThreadpoolController().select(user_api="blas").info()
-        return [library["num_threads"] for library in libraries]
+def _blas_threads() -> list[int]:
+    libraries = ThreadpoolController().select(user_api="blas").info()
+    return [library["num_threads"] for library in libraries]
 
-    before = counts()
+
+def test_matrix_products_take_one_thread_inside_and_as_many_as_before_after() -> None:
+    before = _blas_threads()
     assert before
     with one_blas_thread():
-        assert set(counts()) == {1}
-    assert counts() == before
+        assert set(_blas_threads()) == {1}
+    assert _blas_threads() == before

@@ -1,7 +1,7 @@
 """What two rules for threads save: the time of a run without each over that with both.
 
-Products of matrices take one thread, and in a room the shadow in the clutter is computed beside the
-tones of the echoes. Runs are of a walk, in memory, by `specular` with the paper's radar at 12 GHz
+Products of matrices take one thread; in a room the shadow in the clutter is computed beside the
+echoes and their tones. Runs are of a walk, in memory, by `specular` with the radar `paper-12ghz`
 and clutter removal by the mean, warm, in turn. The median of the ratios of neighbours counts.
 
     python validation/cost/threads.py [--quick] [--json FILE]
@@ -11,37 +11,24 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from statistics import median
 from typing import Any
 from unittest import mock
 
 import rtradar as rt
-from rtradar.pipeline import capture
+from rtradar.signal import static_clutter
 from rtradar.system import threads
 from rtradar.validate.rows import Row, main, reported
 
 REPEATS = 5
 
 
-class _Unlimited:
-    """Stands for the libraries of matrix products, and leaves them their threads."""
-
-    def limit(self, **options: Any) -> Any:
-        return nullcontext()
-
-
-def _one_after_another(*tasks: Callable[[], None]) -> None:
-    for task in tasks:
-        task()
-
-
 def _without() -> dict[str, AbstractContextManager[Any]]:
     return {
-        "matrix products by all threads": mock.patch.object(threads, "_libraries", _Unlimited),
-        "tones and shadow one after another": mock.patch.object(
-            capture, "side_by_side", _one_after_another
+        "matrix products by all threads": mock.patch.object(threads, "_libraries", mock.Mock()),
+        "echoes and shadow one after another": mock.patch.object(
+            static_clutter, "begun", lambda work: work
         ),
     }
 

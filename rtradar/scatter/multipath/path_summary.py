@@ -43,11 +43,14 @@ def summarize(
     power: NDArray[np.float64],
     names: NDArray[Any],
     noise: float,
+    *,
+    weakest: NDArray[np.bool_],
 ) -> PathSummary:
     """Summarize one path.
 
-    By echo: whether it takes this path and whether it is kept, its power [m^2], and the name of its
-    part. ``noise`` is the noise power over the gain of processing [m^2].
+    By echo: whether it takes this path and whether it is kept, its power [m^2], the name of its
+    part, and whether it is among the ``weakest``, which a tolerance leaves out. ``noise`` is the
+    noise power over the gain of processing [m^2].
     """
     total = float(power[own].sum())
     lost = own & ~keep
@@ -56,7 +59,9 @@ def summarize(
         why.append(
             "never seen: no specular point in the wall, or in the shadow of furniture or body"
         )
-    if (power[lost] > 0).any():
+    if weakest[lost].any():
+        why.append("among the weakest echoes, which together are below the tolerance")
+    if (power[lost & ~weakest] > 0).any():
         why.append(f"more than {MARGIN_DB:g} dB below the noise after processing")
     over = 10 * math.log10(total / noise) if total > 0 and noise > 0 else None
     kept, dropped = names[own & keep].tolist(), names[lost].tolist()

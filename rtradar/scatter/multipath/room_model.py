@@ -115,7 +115,8 @@ class RoomModel:
     over its legs. ``paths`` are all paths, the direct one first;
     ``faces`` says of each face of furniture whether paths lead over it; ``not_followed``, known
     after `prune`, are the walls whose frequency response is not known to
-    `FIELD_ERROR`, with the fraction of the echo power that meets each.
+    `FIELD_ERROR`, with the fraction of the echo power that meets each. Of the weakest echoes that a
+    tolerance leaves out ``left_out`` is the number and ``left_out_m2`` the mean power [m^2].
     """
 
     def __init__(
@@ -185,6 +186,7 @@ class RoomModel:
         around_at = None if self._moving is None else partial(self._around_at, self._moving)
         self._keyframes = RoomKeyframes(self._around, columns, body, around_at)
         self.not_followed: dict[str, float] = {}
+        self.left_out, self.left_out_m2 = 0, 0.0
 
     def _around_at(self, scene: MovingScene, time_s: float) -> Surroundings:
         """What a radar that moves has around it at some time [s], in its axes then."""
@@ -374,8 +376,10 @@ class RoomModel:
 
     # -- what is worth its cost --------------------------------------------------------------------
 
-    def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathSummary, ...]:
-        """Leave out echoes over walls that stay below the noise, and summarize each path.
+    def prune(
+        self, n_chirps: int, noise_power_m2: float, tolerated_m2: float = 0.0
+    ) -> tuple[PathSummary, ...]:
+        """Leave out echoes over walls that are too weak to matter, and summarize each path.
 
         One chirp every 100 ms of the capture is evaluated, by geometric optics; without noise, or
         if these were too few, one every 20 ms. Left out is an echo whose mean power, after the gain
@@ -408,11 +412,17 @@ class RoomModel:
         echo, direct = np.array(columns.echo), columns.direct
         echo_power = np.zeros(len(direct))
         np.add.at(echo_power, echo, power)
-        keep = direct.copy()
-        keep[echo[worth]] = True
+        weakest = np.zeros_like(worth)
+        ghosts = np.flatnonzero(worth & ~direct[echo])
+        ghosts = ghosts[np.argsort(power[ghosts])]
+        weakest[ghosts[np.cumsum(power[ghosts]) <= tolerated_m2]] = True
+        self.left_out, self.left_out_m2 = int(weakest.sum()), float(power[weakest].sum())
+        worth &= ~weakest
+        keep, faint = direct.copy(), np.zeros_like(direct)
+        keep[echo[worth]], faint[echo[weakest]] = True, True
         names = np.array(self._body.part_names, dtype=object)[columns.part]
         summaries = tuple(
-            summarize(path, columns.path == number, keep, echo_power, names, noise)
+            summarize(path, columns.path == number, keep, echo_power, names, noise, weakest=faint)
             for number, path in enumerate(self.paths)
         )
         # Direct echoes have the first columns.

@@ -1,0 +1,93 @@
+"""Echoes over a frame, as they are expected on its map: their ranges and fields cycle by cycle."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.elementary import hermite_weights, phasor
+from rtradar.kernels.jit import compiled
+
+Array = NDArray[np.float64]
+
+
+class Looks(NamedTuple):
+    """Echoes at the instants at which they are looked at.
+
+    ``at (instant,)`` are cycles and ``cycle_s`` the duration of one [s]. Ranges [m], range rates
+    [m/s] and mean powers [m^2] are (instant, echo).
+    """
+
+    at: NDArray[np.int64]
+    cycle_s: float
+    range_m: Array
+    rate_mps: Array
+    power_m2: Array
+
+
+@compiled(fastmath={"contract"})
+def follow_echoes(start, stop, first, looks, turns_per_m, steps_per_m, steps, fields):
+    """Fill ``steps`` int32 and ``fields`` complex64 (cycle, echo) from cycle ``first`` on.
+
+    Between instants a range is a cubic, by ranges and rates at both, and the power a line. Where an
+    echo is not seen at one of them, it goes on as at the other. Steps are ranges times
+    ``steps_per_m``; fields are roots of powers, turned by ``turns_per_m`` of the range.
+    """
+    at, cycle_s, range_m, rate_mps, power_m2 = looks
+    for row in range(start, stop):
+        interval = min(np.searchsorted(at, first + row, side="right"), len(at) - 1) - 1
+        apart = max(at[interval + 1] - at[interval], 1)
+        t, apart_s = (first + row - at[interval]) / apart, apart * cycle_s
+        w0, w1, s0, s1 = hermite_weights(t, apart_s)
+        for echo in range(range_m.shape[1]):
+            power, after = power_m2[interval, echo], power_m2[interval + 1, echo]
+            r0, r1 = range_m[interval, echo], range_m[interval + 1, echo]
+            v0, v1 = rate_mps[interval, echo], rate_mps[interval + 1, echo]
+            gone, lost = power == 0, after == 0
+            q0, u0 = (r1 - apart_s * v1, v1) if gone else (r0, v0)
+            q1, u1 = (r0 + apart_s * v0, v0) if lost else (r1, v1)
+            place = w0 * q0 + w1 * q1 + s0 * u0 + s1 * u1
+            across, up = phasor(turns_per_m * place)
+            size = np.sqrt((1 - t) * power + t * after)
+            steps[row, echo] = np.int32(np.rint(steps_per_m * place))
+            fields[row, echo] = complex(size * across, size * up)
+
+
+def follow_echoes_reference(first, cycles, looks, turns_per_m, steps_per_m):
+    """The same steps and fields of some cycles, by NumPy."""
+    at, cycle_s, range_m, rate_mps, power_m2 = looks
+    cycle = first + np.arange(cycles)[:, None]
+    before = np.clip(np.searchsorted(at, cycle[:, 0], side="right"), 1, len(at) - 1) - 1
+    apart = np.diff(at)[before, None]
+    t, apart_s = (cycle - at[before, None]) / apart, apart * cycle_s
+    p0, p1 = power_m2[before], power_m2[before + 1]
+    (r0, r1), (v0, v1) = ((own[before], own[before + 1]) for own in (range_m, rate_mps))
+    q0, u0 = np.where(p0 == 0, (r1 - apart_s * v1, v1), (r0, v0))
+    q1, u1 = np.where(p1 == 0, (r0 + apart_s * v0, v0), (r1, v1))
+    place = q0 * (1 + 2 * t) * (1 - t) ** 2 + apart_s * u0 * t * (1 - t) ** 2
+    place += q1 * t**2 * (3 - 2 * t) + apart_s * u1 * t**2 * (t - 1)
+    fields = np.sqrt((1 - t) * p0 + t * p1) * np.exp(2j * np.pi * turns_per_m * place)
+    return np.rint(steps_per_m * place), fields
+
+
+@compiled()
+def fields_in_bins(start, stop, echo, away, steps, fields, spread, out):
+    """Fill ``out (cycle, n)`` with the fields of some echoes (n,) in a bin each, for some cycles.
+
+    ``spread`` is the field of an echo of 1 by the steps from it, which number ``away (n,)`` less
+    its own; beyond both ends it is 0.
+    """
+    for row in range(start, stop):
+        for n in range(len(echo)):
+            step = away[n] - steps[row, echo[n]]
+            inside = 0 <= step < len(spread)
+            out[row, n] = fields[row, echo[n]] * spread[step] if inside else 0
+
+
+def fields_in_bins_reference(echo, away, steps, fields, spread):
+    """The same by NumPy."""
+    step = away - steps[:, echo]
+    inside = (step >= 0) & (step < len(spread))
+    return np.where(inside, spread.take(step, mode="clip") * fields[:, echo], 0)
