@@ -19,7 +19,7 @@ from scipy import fft
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.nufft import closed_grid
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 ANCHORS = 4
 """Anchors around a chirp through which the cubic goes."""
@@ -37,7 +37,7 @@ _PLACES, _COARSER = 1024, 4
 """Places in a cell at which windows are tabulated, so many times fewer where the amplitude changes:
 more would leave the fastest cache, and take twice as long."""
 
-_CHIRPS_AT_ONCE = 48
+_CHIRPS_AT_ONCE = 24
 
 
 class Anchors(NamedTuple):
@@ -138,18 +138,19 @@ def add_anchored_tones(
     half, (level, powers, weights) = samples // 2, _windows(samples, cells)
     # Chirps of one Tx and of the same anchors in turn, so that these stay in the cache.
     order = np.lexsort((between.first, between.tx))
-    for begin in range(0, chirps, _CHIRPS_AT_ONCE):
+
+    def fill(begin: int) -> None:
         some = order[begin : begin + _CHIRPS_AT_ONCE]
-        first, weight, tx, carrier = between
-        own = Between(first[some], weight[some], tx[some], carrier[some])
+        own = Between(*(array[some] for array in between))
         changed = (np.diff(own.first) != 0) | (np.diff(own.tx) != 0)
         runs = np.concatenate([[0], np.flatnonzero(changed) + 1, [len(some)]])
         grid = np.empty((len(some), receivers, cells), dtype=np.complex64)
         items = (len(runs) - 1) * receivers
-        given = anchors, own, runs, sweep, half, level, powers, grid
-        in_threads(_spread_anchored, items, *given)
-        summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
-        in_threads(_add_rows, len(some), summed, weights, half, some, out)
+        _spread_anchored(0, items, anchors, own, runs, sweep, half, level, powers, grid)
+        summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True)
+        _add_rows(0, len(some), summed, weights, half, some, out)
+
+    thread_map(fill, range(0, chirps, _CHIRPS_AT_ONCE))
 
 
 @lru_cache

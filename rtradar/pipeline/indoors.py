@@ -21,7 +21,7 @@ from rtradar.signal.ghosts import GhostIf, ghosts_within
 from rtradar.signal.moving_clutter import MovingRoomIf
 from rtradar.signal.static_clutter import RoomIf
 
-_LEFT_OUT, _OF_GHOSTS = 0.08, 0.75
+_LEFT_OUT, _OF_GHOSTS = 0.04, 0.75
 """Part of the tolerated power of errors that the weakest ghosts may take, which are left out, and
 that all ghosts may; the shadow in the clutter may take what they leave."""
 
@@ -60,7 +60,7 @@ def indoors(
     allowed = 0.0
     if settings.path_tolerance_db is not None:
         allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
-    paths = model.prune(n_chirps, noise, _LEFT_OUT * allowed)
+    paths = model.prune(n_chirps, noise, _LEFT_OUT * allowed if model.has_ghost_tones else 0.0)
     order = max(settings.order, 1)
 
     def trace(seen: Scene) -> Clutter:

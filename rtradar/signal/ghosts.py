@@ -39,7 +39,7 @@ _MARGIN_DB = 1.5
 """What is measured at some instants may be so much larger over the capture [dB]. It is measured in
 the middle between anchors, where the error of a cubic has 2.9 dB more power than on average."""
 
-_OF_CHANGES = 0.1
+_OF_CHANGES = 0.2
 """Part of the tolerated power that changes over the sweep may take that are left out."""
 
 _STREAMS = 8
