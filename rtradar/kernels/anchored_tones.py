@@ -141,7 +141,8 @@ def add_anchored_tones(
 
     def fill(begin: int) -> None:
         some = order[begin : begin + _CHIRPS_AT_ONCE]
-        own = Between(*(array[some] for array in between))
+        first, weight, tx, carrier = between
+        own = Between(first[some], weight[some], tx[some], carrier[some])
         changed = (np.diff(own.first) != 0) | (np.diff(own.tx) != 0)
         runs = np.concatenate([[0], np.flatnonzero(changed) + 1, [len(some)]])
         grid = np.empty((len(some), receivers, cells), dtype=np.complex64)
