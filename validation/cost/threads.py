@@ -26,7 +26,9 @@ REPEATS = 5
 
 def _without() -> dict[str, AbstractContextManager[Any]]:
     return {
-        "matrix products by all threads": mock.patch.object(threads, "_libraries", mock.MagicMock()),
+        "matrix products by all threads": mock.patch.object(
+            threads, "_libraries", mock.MagicMock()
+        ),
         "echoes and shadow one after another": mock.patch.object(
             static_clutter, "begun", lambda work: work
         ),
