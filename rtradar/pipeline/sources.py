@@ -135,7 +135,8 @@ class Sources:
             for column in list(zip(*seen, strict=True))[:3]
         )
         kept = np.flatnonzero(power_m2.max(axis=0) > max(self._weak_m2, 0.0))
-        own = range_m[:, kept], rate_mps[:, kept], power_m2[:, kept]
+        # One layout, or Numba would compile for each that comes.
+        own = (np.take(array, kept, axis=1) for array in (range_m, rate_mps, power_m2))
         return Looks(at, self._capture.radar.cycle_duration_s, *own), seen[0].owner[kept]
 
     def _instants(self, start_cycle: int) -> NDArray[np.int64]:

@@ -228,6 +228,29 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
     np.testing.assert_array_equal(kept.length, again.length[..., stay])
 
 
+def test_the_weakest_are_left_out_as_far_as_is_tolerated(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    scene = Scene(walls=(wall("floor"), wall("left")))
+    room = single(frame_duration_s=0.1), one()
+    whole = build_model("specular", *room, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    whole.prune(100, 0.0)
+    echoes = whole.echoes(np.arange(0, 100, 4))
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
+    weakest = int(np.argmin(np.where(echoes.bounces > 1, power, np.inf)))
+    for share, count in ((0.5, 0), (1.5, 1)):
+        model = build_model("specular", *room, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+        summaries = model.prune(100, 0.0, share * power[weakest])
+        assert model.left_out == count
+        assert model.left_out_m2 == pytest.approx(count * power[weakest], rel=0.05)
+        lost = [summary for summary in summaries if summary.dropped]
+        assert [summary.path for summary in lost] == [whole.path_names[weakest]] * count
+        assert all("tolerance" in summary.why for summary in lost)
+    # Direct echoes stay, whatever is tolerated.
+    model.prune(100, 0.0, np.inf)
+    assert set(model.path_names) == {"body"}
+
+
 def test_without_noise_only_what_is_never_seen_is_left_out(
     backend: Backend, one: Make, wall: Make, single: Make
 ) -> None:
