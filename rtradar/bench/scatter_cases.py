@@ -432,7 +432,7 @@ def _occluded_fractions(k: Any) -> Calls:
     return call, lambda: (k.occluded_fractions_reference(*given, scales, 0.1),)
 
 
-@kernel_case("still_room.add_blended", "four keyframes of a room, blended over 500 chirps", 1e-5)
+@kernel_case("elementary.add_blended", "four keyframes of a room, blended over 500 chirps", 1e-5)
 def _add_blended(k: Any) -> Calls:
     rng = np.random.default_rng(0)
     fields = rng.normal(size=(5, 4, 2, 3000)).view(np.complex128).astype(np.complex64)[..., :1500]

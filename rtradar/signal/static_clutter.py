@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
+from rtradar.kernels.elementary import add_blended, cubic_weights
 from rtradar.kernels.scatter.silhouettes import Shadow
-from rtradar.kernels.still_room import add_blended, cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes

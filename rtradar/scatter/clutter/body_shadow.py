@@ -39,8 +39,8 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.elementary import cubic_weights
 from rtradar.kernels.scatter.silhouettes import Posed, Shadow
-from rtradar.kernels.still_room import cubic_weights
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import small_facets
 from rtradar.scatter.clutter.point_shadow import (
