@@ -110,6 +110,15 @@ def _fill_anchors(k: Any) -> Calls:
     return call, lambda: k.fill_anchors_reference(*given)
 
 
+@kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
+def _noise(k: Any) -> Calls:
+    streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])
+    out = np.empty((192, 8, 256), dtype=np.complex64)
+    given = streams, 12, np.float32(0.5)
+    call = filled(k.add_noise, *given, out=(out,), adds=True)
+    return call, lambda: k.noise_reference(*given, out.shape)
+
+
 # -- expected echoes -------------------------------------------------------------------------------
 
 
@@ -133,15 +142,6 @@ def _in_bins(k: Any) -> Calls:
     given = echo, away, steps, _samples(136, 315), rng.random(4097, dtype=np.float32)
     call = filled(k.fields_in_bins, 0, 136, *given, out=(np.empty((136, 2048), np.complex64),))
     return call, lambda: k.fields_in_bins_reference(*given)
-
-
-@kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
-def _noise(k: Any) -> Calls:
-    streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])
-    out = np.empty((192, 8, 256), dtype=np.complex64)
-    given = streams, 12, np.float32(0.5)
-    call = filled(k.add_noise, *given, out=(out,), adds=True)
-    return call, lambda: k.noise_reference(*given, out.shape)
 
 
 # -- receiver --------------------------------------------------------------------------------------

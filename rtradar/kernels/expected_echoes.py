@@ -60,7 +60,7 @@ def follow_echoes_reference(first, cycles, looks, turns_per_m, steps_per_m):
     at, cycle_s, range_m, rate_mps, power_m2 = looks
     cycle = first + np.arange(cycles)[:, None]
     before = np.clip(np.searchsorted(at, cycle[:, 0], side="right"), 1, len(at) - 1) - 1
-    apart = np.diff(at)[before, None]
+    apart = np.maximum(np.diff(at), 1)[before, None]
     t, apart_s = (cycle - at[before, None]) / apart, apart * cycle_s
     p0, p1 = power_m2[before], power_m2[before + 1]
     (r0, r1), (v0, v1) = ((own[before], own[before + 1]) for own in (range_m, rate_mps))

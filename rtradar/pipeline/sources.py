@@ -131,11 +131,11 @@ class Sources:
         seen = self._seen(at)
         count = min(len(one.owner) for one in seen)  # more may come while they are asked for
         range_m, rate_mps, power_m2 = (
-            np.array([array[:count] for array in column])
+            np.array([array[:count] for array in column], dtype=np.float64)
             for column in list(zip(*seen, strict=True))[:3]
         )
         kept = np.flatnonzero(power_m2.max(axis=0) > max(self._weak_m2, 0.0))
-        # One layout, or Numba would compile for each that comes.
+        # One layout and type, or Numba would compile for each that comes.
         own = (np.take(array, kept, axis=1) for array in (range_m, rate_mps, power_m2))
         return Looks(at, self._capture.radar.cycle_duration_s, *own), seen[0].owner[kept]
 

@@ -71,7 +71,7 @@ class GhostEchoes(Protocol):
 class GhostIf:
     """The IF samples of ghosts by anchors ``apart`` cycles from each other.
 
-    The capture has a number of cycles; ``kept`` are the ghosts that count, of which the last
+    The capture has a number of cycles; ``order (ghost,)`` is that of the ghosts, of which the last
     ``changing`` change over the sweep. ``cycles (anchor,)`` are the cycles of the anchors.
     """
 
@@ -81,23 +81,23 @@ class GhostIf:
         radar: Radar,
         n_cycles: int,
         apart: int,
-        kept: NDArray[np.int64],
+        order: NDArray[np.int64],
         changing: int,
     ) -> None:
         self._model, self._radar = model, radar
-        self._kept, self._changing = kept, changing
+        self._order, self._changing = order, changing
         gaps = max(ANCHORS - 1, math.ceil((n_cycles - 1) / apart))
         self.cycles = np.unique(np.rint(np.linspace(0, n_cycles - 1, gaps + 1)).astype(np.int64))
         # The anchors that are held, from the first on.
         shape = 0, radar.n_tx, radar.n_rx
-        self._first, self._held = 0, _empty_anchors(shape, len(kept), changing)
+        self._first, self._held = 0, _empty_anchors(shape, len(order), changing)
 
     def add(self, samples: NDArray[np.complex64], chirps: NDArray[np.int64]) -> None:
         """Add the samples of some chirps to ``samples (chirp, rx, sample)`` complex64, in place.
 
         The chirps (chirp,) are numbered from the start of the capture, ascending.
         """
-        if len(self._kept) == 0:
+        if len(self._order) == 0:
             return
         radar = self._radar
         self.compute(chirps)
@@ -142,9 +142,9 @@ class GhostIf:
         powers = _powers_of_u(echoes, self._radar)
         weights = np.concatenate([_MEAN_OF_POWERS @ powers, powers]).astype(np.float32)
         found = _empty_anchors(
-            (len(cycles), len(each), echoes.length.shape[1]), len(self._kept), self._changing
+            (len(cycles), len(each), echoes.length.shape[1]), len(self._order), self._changing
         )
-        given = order, echoes.length, echoes.amplitude, self._kept, weights, tuple(found)
+        given = order, echoes.length, echoes.amplitude, self._order, weights, tuple(found)
         in_threads(fill_anchors, order.size, *given)
         return found
 

@@ -29,8 +29,8 @@ _SHADOW_NODES = 3
 range bin deep are then known to -25 dB, and on average to -40 dB."""
 _CHIRPS_A_THREAD = 16
 
-KEPT_ROOMS = 2
-"""Rooms whose samples stay in memory, as many as traced rooms do."""
+_KEPT_ROOMS = 2
+"""Rooms whose samples stay in memory: as many as traced rooms, which this package must not know."""
 
 
 class MovingShadow(Protocol):
@@ -121,7 +121,7 @@ class _Still(tuple[Echoes, ...]):
         return all(one is another for one, another in pairs)
 
 
-@lru_cache(maxsize=KEPT_ROOMS)
+@lru_cache(maxsize=_KEPT_ROOMS)
 def _at_rest(
     radar: Radar, objects: _Still, mirrors: tuple[int, ...]
 ) -> tuple[list[_Group], _Samples, dict[int, _Samples]]:
@@ -229,8 +229,10 @@ class RoomIf:
     def _found(self) -> dict[int, _Samples]:
         """Wait for what was begun; only then are the caches free."""
         if self._begun:
-            result, self._begun = self._begun, None
-            self._lost |= result()
+            try:
+                self._lost |= self._begun()
+            finally:
+                self._begun = None
         return self._lost
 
     def _blend(

@@ -102,12 +102,22 @@ def begun(work: Callable[[], _Result]) -> Callable[[], _Result]:
 
     That function is to be called once. It does the work itself if no thread has begun it by then.
     The work must share nothing that changes with what the caller does meanwhile, and make no large
-    products of matrices, for only the caller's thread can limit those of BLAS.
+    products of matrices: `one_blas_thread` ends for them, too, when the caller leaves it.
     """
     if thread_count() == 1:
         return work
     future = _pool().submit(work)
-    return lambda: work() if future.cancel() else future.result()
+
+    def result() -> _Result:
+        if future.cancel():
+            return work()
+        try:
+            return future.result()
+        except BaseException:  # an interrupt: nobody works on behind the back of who has left
+            wait([future])
+            raise
+
+    return result
 
 
 @contextmanager

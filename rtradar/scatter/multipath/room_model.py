@@ -385,7 +385,8 @@ class RoomModel:
         if these were too few, one every 20 ms. Left out is an echo whose mean power, after the gain
         of the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the noise of
         one IF sample [m^2]; without noise, what is never visible. Window functions, which lose 1.8
-        dB each (Hann), are not counted: what is left out is weaker than that. Direct echoes always
+        dB each (Hann), are not counted: what is left out is weaker than that. Of the others the
+        weakest go whose mean powers add up to at most ``tolerated_m2`` [m^2]. Direct echoes always
         stay.
         """
         radar, columns = self._radar, self._columns
