@@ -140,7 +140,7 @@ def _in_bins(k: Any) -> Calls:
     steps = rng.integers(20000, 30000, (136, 315), dtype=np.int32)
     echo, away = rng.integers(0, 315, 2048), rng.integers(22000, 34000, 2048)
     given = echo, away, steps, _samples(136, 315), rng.random(4097, dtype=np.float32)
-    call = filled(k.fields_in_bins, 0, 136, *given, out=(np.empty((136, 2048), np.complex64),))
+    call = filled(k.fields_in_bins, *given, out=(np.empty((136, 2048), np.complex64),))
     return call, lambda: k.fields_in_bins_reference(*given)
 
 

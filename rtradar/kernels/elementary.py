@@ -120,7 +120,7 @@ def hermite_weights(fraction, width):
 
 @compiled(fastmath={"contract"})
 def add_blended(tx, weights, keyframes, whole, out):
-    """Add the samples of a room to ``out (chirp, value)`` complex64.
+    """Add what is at rest, less a blend of four keyframes, to ``out (chirp, value)`` complex64.
 
     Of ``whole (tx, value)`` complex64 is taken off the sum over keyframes of ``weights (chirp,
     keyframe)`` float32 times ``keyframes (keyframe, tx, value)``; ``tx (chirp,)`` transmits.

@@ -73,13 +73,13 @@ def follow_echoes_reference(first, cycles, looks, turns_per_m, steps_per_m):
 
 
 @compiled()
-def fields_in_bins(start, stop, echo, away, steps, fields, spread, out):
-    """Fill ``out (cycle, n)`` with the fields of some echoes (n,) in a bin each, for some cycles.
+def fields_in_bins(echo, away, steps, fields, spread, out):
+    """Fill ``out (cycle, n)`` with the fields of some ``echo (n,)`` in a bin each.
 
     ``spread`` is the field of an echo of 1 by the steps from it, which number ``away (n,)`` less
     its own; beyond both ends it is 0.
     """
-    for row in range(start, stop):
+    for row in range(len(out)):
         for n in range(len(echo)):
             step = away[n] - steps[row, echo[n]]
             inside = 0 <= step < len(spread)

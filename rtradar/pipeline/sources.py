@@ -104,7 +104,8 @@ class Sources:
         most_m2 = looks.power_m2.max(axis=0, initial=0.0)
         reach = _FINE * (self._falls * most_m2[:, None] > self._weak_m2).sum(axis=1)
         low, high = steps.min(axis=0) - reach, steps.max(axis=0) + reach
-        echo, row = np.nonzero((_FINE * rows >= low[:, None]) & (_FINE * rows <= high[:, None]))
+        asked = _FINE * rows
+        echo, row = np.nonzero((asked >= low[:, None]) & (asked <= high[:, None]))
         n_owners = len(self._capture.body.names) + len(self._capture.scene.objects)
         found = np.zeros((n_cycles, n_owners * radar.samples_per_chirp))
         target = owner[echo] * radar.samples_per_chirp + rows[row]
@@ -115,7 +116,7 @@ class Sources:
             own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
             away = _FINE * (bins + self._reach)
             signal = np.empty((n_cycles, len(own)), dtype=np.complex64)
-            fields_in_bins(0, n_cycles, own, away, steps, fields, self._spread, signal)
+            fields_in_bins(own, away, steps, fields, self._spread, signal)
             spectrum = doppler_power(signal[:, None], range(1), self._doppler, 1)
             targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
             return targets, np.add.reduceat(spectrum, begin, axis=1)

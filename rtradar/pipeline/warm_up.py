@@ -14,6 +14,7 @@ import numpy as np
 
 from rtradar.clouds import spatial_points
 from rtradar.echoes import Echoes
+from rtradar.kernels.expected_echoes import Looks, fields_in_bins, follow_echoes
 from rtradar.kernels.jit import is_on_disk
 from rtradar.kernels.tone_sum import add_tones
 from rtradar.pipeline.capture import chirps_of
@@ -43,6 +44,7 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
     frame = np.ones((radar.cycles_per_frame, radar.n_tx, radar.n_rx, 1), dtype=np.complex64)
     power_map(frame, radar)
     os_cfar(np.ones((16, 16), dtype=np.float32), looks=radar.n_channels)
+    _warm_up_sources()
     if measured_angles(radar):
         spectra = frame_angles(frame, np.arange(radar.cycles_per_frame)[None, :] == 0, radar)
         spatial_points(spectra, radar, 0.0)
@@ -50,6 +52,15 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
             range_azimuth(spectra, radar)
         if spectra.z is not None:
             range_elevation(spectra, radar)
+
+
+def _warm_up_sources() -> None:
+    """Compile or load what tells who returned a cell."""
+    looks = Looks(np.arange(2), 1.0, *np.ones((3, 2, 1)))
+    steps, fields = np.empty((1, 1), dtype=np.int32), np.empty((1, 1), dtype=np.complex64)
+    follow_echoes(0, 1, 0, looks, 1.0, 1.0, steps, fields)
+    none = np.zeros(1, dtype=np.int64)
+    fields_in_bins(none, none, steps, fields, np.ones(1, dtype=np.float32), fields.copy())
 
 
 def compile_for_another_process() -> None:

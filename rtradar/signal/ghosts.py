@@ -24,6 +24,7 @@ from rtradar.kernels.anchored_tones import (
     fill_anchors,
 )
 from rtradar.radar import Radar
+from rtradar.scatter.common.echo_sets import weakest
 from rtradar.signal.synthesis import (
     powers_of_sample_number,
     synthesize,
@@ -40,7 +41,7 @@ _MARGIN_DB = 1.5
 the middle between anchors, where the error of a cubic has 2.9 dB more power than on average."""
 
 _OF_CHANGES = 0.2
-"""Part of the tolerated power that changes over the sweep may take that are left out."""
+"""Part of the tolerated power for the changes over the sweep that are left out."""
 
 _STREAMS = 8
 """Ranges from which ghosts are added in turn."""
@@ -194,7 +195,7 @@ def ghosts_within(
         for own in np.tensordot(_powers_of_u(some, radar)[1:], some.amplitude, axes=1)
     )
     # Times the variances of u and of its square over the sweep.
-    changes = _worth(tilt / 12 + curve / 180, power_m2 * _OF_CHANGES)
+    changes = ~weakest(tilt / 12 + curve / 180, power_m2 * _OF_CHANGES)
     length = some.length.mean(axis=(0, 1))
     groups = [np.flatnonzero(~changes), np.flatnonzero(changes)]
     order = np.concatenate([_apart(own, length) for own in groups])
@@ -234,14 +235,6 @@ def _powers_of_u(echoes: Echoes, radar: Radar) -> NDArray[np.float64]:
     """
     powers = powers_of_sample_number(echoes.frequency, radar, 0.5)
     return np.concatenate([powers, np.zeros((MOST_NODES - len(powers), powers.shape[1]))])
-
-
-def _worth(power: NDArray[np.floating], least: float) -> NDArray[np.bool_]:
-    """Whether each is among the strongest, the others of which add up to less than ``least``."""
-    order = np.argsort(power)
-    worth = np.empty(len(power), dtype=bool)
-    worth[order] = np.cumsum(power[order], dtype=np.float64) > least
-    return worth
 
 
 def _apart(echoes: NDArray[np.int64], length: NDArray[np.float64]) -> NDArray[np.int64]:

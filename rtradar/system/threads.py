@@ -106,11 +106,13 @@ def begun(work: Callable[[], _Result]) -> Callable[[], _Result]:
     """
     if thread_count() == 1:
         return work
-    future = _pool().submit(work)
+    # As in `thread_map`: what is cancelled stays in the queue, and must not keep the work.
+    left = [work]
+    future = _pool().submit(lambda: left.pop()())
 
     def result() -> _Result:
         if future.cancel():
-            return work()
+            return left.pop()()
         try:
             return future.result()
         except BaseException:  # an interrupt: nobody works on behind the back of who has left

@@ -1,6 +1,7 @@
 """The IF of a room: exactly still without a person, and with one as each chirp made by itself."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
-from rtradar.signal import synthesize
+from rtradar.signal import static_clutter, synthesize
 from rtradar.signal.static_clutter import RoomIf
 
 RADAR = Radar(tx_y=2, tx_z=2, rx_y=2, rx_z=2, samples_per_chirp=192)
@@ -138,6 +139,28 @@ def test_what_was_begun_is_not_computed_again(
     # Of the same keyframes parts need no more than the whole.
     room.begin(chirps[400:])
     assert asked == []
+
+
+def test_samples_at_rest_are_made_once_for_the_same_echoes_before_the_same_radar(
+    clutter: Clutter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made, real = list[int](), static_clutter.synthesize
+
+    def counted(*given: Any, **options: Any) -> Any:
+        made.append(1)
+        return real(*given, **options)
+
+    static_clutter._at_rest.cache_clear()
+    monkeypatch.setattr(static_clutter, "synthesize", counted)
+    first, again = (RoomIf(RADAR, clutter.cycle()) for _ in range(2))
+    once = len(made)
+    assert once == len(first.cycle)
+    np.testing.assert_array_equal(first.clutter_if(np.arange(3)), again.clutter_if(np.arange(3)))
+    # The same numbers in other arrays, and another radar, are another room.
+    copies = [replace(own, length=own.length.copy()) for own in clutter.cycle()]
+    RoomIf(RADAR, copies)
+    RoomIf(replace(RADAR, name="other"), clutter.cycle())
+    assert len(made) == 3 * once
 
 
 def test_a_body_that_hides_nothing_leaves_the_room_as_it_is(clutter: Clutter) -> None:

@@ -32,8 +32,8 @@ from rtradar.trace.room_tracer import RoomTracer
 
 MOST_ORDER = 3
 KEPT_ROOMS = 2
-"""Rooms that stay in memory once they are traced; a furnished one may take 100 MB, and its samples
-and groups of echoes (`rtradar.signal.static_clutter`) as much."""
+"""Rooms that stay in memory once they are traced; a furnished one may take 100 MB, to which
+`rtradar.signal.static_clutter` adds its echoes once more, in groups."""
 
 
 @dataclass(frozen=True)

@@ -43,6 +43,14 @@ def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
     )
 
 
+def weakest(power: Array, most: float) -> NDArray[np.bool_]:
+    """Whether each is among the weakest, whose powers (echo,) add up to at most so much [m^2]."""
+    order = np.argsort(power)
+    among = np.empty(len(power), dtype=bool)
+    among[order] = np.cumsum(power[order], dtype=np.float64) <= most
+    return among
+
+
 def times_factor(echoes: Echoes, frequency: Array, factor: NDArray[Any]) -> Echoes:
     """Multiply amplitudes by a factor (node, chirp, rx, echo), a polynomial through a frequency.
 

@@ -25,7 +25,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.rooms import PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import take, times_factor, together
+from rtradar.scatter.common.echo_sets import take, times_factor, together, weakest
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import chirps_by_steps
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
@@ -413,14 +413,12 @@ class RoomModel:
         echo, direct = np.array(columns.echo), columns.direct
         echo_power = np.zeros(len(direct))
         np.add.at(echo_power, echo, power)
-        weakest = np.zeros_like(worth)
         ghosts = np.flatnonzero(worth & ~direct[echo])
-        ghosts = ghosts[np.argsort(power[ghosts])]
-        weakest[ghosts[np.cumsum(power[ghosts]) <= tolerated_m2]] = True
-        self.left_out, self.left_out_m2 = int(weakest.sum()), float(power[weakest].sum())
-        worth &= ~weakest
+        lost = ghosts[weakest(power[ghosts], tolerated_m2)]
+        self.left_out, self.left_out_m2 = len(lost), float(power[lost].sum())
+        worth[lost] = False
         keep, faint = direct.copy(), np.zeros_like(direct)
-        keep[echo[worth]], faint[echo[weakest]] = True, True
+        keep[echo[worth]], faint[echo[lost]] = True, True
         names = np.array(self._body.part_names, dtype=object)[columns.part]
         summaries = tuple(
             summarize(path, columns.path == number, keep, echo_power, names, noise, weakest=faint)
