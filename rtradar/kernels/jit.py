@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import njit, types
 from numba.core.caching import CompileResultCacheImpl, IndexDataCacheFile, NullCache
+from numba.core.registry import cpu_target
 from numba.extending import register_jitable
 
 from rtradar.kernels.code_stamp import note_options, stamp_of
@@ -20,6 +21,21 @@ _Function = Callable[..., Any]
 
 class CacheWarning(UserWarning):
     """Compiled code cannot be kept on disk: results are right, but every process compiles again."""
+
+
+class _NeverFound(dict[Any, Any]):
+    """What Numba has compiled of its own functions, products of complex numbers for one.
+
+    It looks there before it compiles one again, by name and types but not by ``fastmath``, which
+    would be that of whoever came first: how a function rounds would depend on what its process
+    compiled before. So that each has its own, nothing is found.
+    """
+
+    def get(self, key: Any, default: Any = None) -> Any:
+        return default
+
+
+cpu_target.target_context.cached_internal_func = _NeverFound()
 
 
 def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:

@@ -3,6 +3,7 @@
 import errno
 import math
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,25 @@ def test_dividing_by_zero_raises_nothing() -> None:
 
 def test_what_is_inlined_is_called_by_python_and_by_compiled_functions() -> None:
     assert half(3.0) == uncached(lambda number: half(number))(3.0) == 1.5
+
+
+@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
+def test_how_a_product_rounds_does_not_depend_on_what_was_compiled_before(
+    kind: type[np.complexfloating],
+) -> None:
+    """Multiplications have the liberties of their own function, before and after another's."""
+
+    def liberties(fastmath: bool | set[str]) -> set[str]:
+        product: Any = compiled(fastmath=fastmath)(lambda a, b: a * b)
+        product._cache = NullCache()
+        product(kind(1), kind(2))
+        (code,) = product.inspect_llvm().values()
+        return set(re.findall(r"= fmul (\w+ )?(?:float|double)", code))
+
+    assert liberties(False) == {""}
+    assert liberties({"contract"}) == {"contract "}
+    assert liberties(True) == {"fast "}
+    assert liberties(False) == {""}
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64, np.complex128])
