@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from people import answers_of, both, described
+from people import answers_of, both, described, long_enough
 from scipy.stats import t as student
 from sklearn.metrics import confusion_matrix
 
@@ -34,7 +34,6 @@ from rtradar.clouds.collection import Collection
 
 DATA_SETS = Path(__file__).resolve().parents[1]
 LEVELS = ("analytic-paper", "analytic", "specular", "fresnel")
-WINDOW_S = 1.6
 STRETCHES = 3
 """Recordings of each person and gait that are used; they are spread over those that there are."""
 
@@ -58,7 +57,7 @@ def specification(folder: Path, level: str, stretches: int) -> str:
     rows = [
         row
         for row in csv.DictReader((folder / "MANIFEST.csv").open())
-        if row["dataset"] == "gait" and float(row["seconds"]) > WINDOW_S + 0.05
+        if row["dataset"] == "gait" and long_enough(folder / row["file"])
     ]
     counts = Counter((row["person"], row["activity"]) for row in rows)
     text, seen = HEAD.format(level=level), Counter[tuple[str, str]]()
