@@ -74,11 +74,14 @@ ACTIVITIES = {
 WINDOW_S = 1.6
 
 
-def of_mocap(folder: Path) -> str:
-    """Specification of the recordings with skeletons; those too short for a window are left out."""
+def of_mocap(folder: Path, *, known: bool = True) -> str:
+    """Specification of the recordings with skeletons; those too short for a window are left out.
+
+    They are of `ACTIVITIES`, or of all others.
+    """
     text = ""
     for row in csv.DictReader((folder / "MANIFEST.csv").open()):
-        if row["activity"] not in ACTIVITIES or row["file"].endswith(".txt"):
+        if (row["activity"] in ACTIVITIES) != known or row["format"] not in ("AMC", "BVH"):
             continue
         rate, frames = float(row["fps"]), int(row["frames"])
         first, last = (int(row[key]) for key in ("start_frame", "end_frame"))
@@ -93,11 +96,14 @@ def of_mocap(folder: Path) -> str:
     return text
 
 
-def of_joints(folder: Path, most: int) -> str:
-    """Specification of the recordings of joint positions, ``most`` of each person and activity."""
+def of_joints(folder: Path, most: int, *, known: bool = True) -> str:
+    """Specification of the recordings of joint positions, ``most`` of each person and activity.
+
+    They are of `ACTIVITIES`, or of all others.
+    """
     text, taken = "", Counter[tuple[str, str]]()
     for row in csv.DictReader((folder / "MANIFEST.csv").open()):
-        if row["activity"] not in ACTIVITIES:
+        if (row["activity"] in ACTIVITIES) != known:
             continue
         if long_enough(folder / row["file"]):
             taken[row["person"], row["activity"]] += 1
@@ -122,7 +128,7 @@ def _recording(
 ) -> str:
     until = "" if end_s is None else f"end_s = {end_s:.4f}\n"
     return (
-        f'[[recordings]]\nfile = "{file}"\nlabel = "{ACTIVITIES[activity]}"\n'
+        f'[[recordings]]\nfile = "{file}"\nlabel = "{ACTIVITIES.get(activity, activity)}"\n'
         f'subject = "{subject}"\nlicence = "see its folder"\nstart_s = {start_s:.4f}\n{until}'
     )
 
@@ -134,6 +140,8 @@ def data_sets(out: Path, most: int) -> dict[str, str]:
     for name, variable, those in (
         ("mocap", "RTRADAR_MOCAP", of_mocap),
         ("joints", "RTRADAR_JOINTS", partial(of_joints, most=most)),
+        ("mocap_others", "RTRADAR_MOCAP", partial(of_mocap, known=False)),
+        ("joints_others", "RTRADAR_JOINTS", partial(of_joints, most=most, known=False)),
     ):
         if folder := os.environ.get(variable):
             found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
@@ -143,14 +151,15 @@ def data_sets(out: Path, most: int) -> dict[str, str]:
     return found
 
 
-def build(out: Path, only: list[str] | None, most: int) -> None:
+def build(out: Path, only: list[str] | None, most: int, workers: int = 1) -> None:
     """Build the data sets that are not complete."""
     out.mkdir(parents=True, exist_ok=True)
     for name, text in data_sets(out, most).items():
         if only is None or name in only:
             spec = out / f"{name}.toml"
             spec.write_text(text)
-            words = ["dataset", "build", str(spec), "--out", str(out / name), "--workers", "1"]
+            words = ["dataset", "build", str(spec), "--out", str(out / name)]
+            words += ["--workers", str(workers)]
             subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
 
 
@@ -224,21 +233,37 @@ def described(clouds: Collection) -> NDArray[np.float64]:
     return np.array([describe(window) for window in windows_of(clouds)])
 
 
+RECORDED_OVER_ACTORS = 3
+"""As how many clouds of actors each recorded one counts where both are learnt from. Where they
+count alike, actors teach less than they spoil once recordings are of some twenty people; counting
+3 and 5 times differs by no more than chance (``--measure curve``)."""
+
+Taught = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""Descriptions (cloud, number) and their classes (cloud,)."""
+
+
+def with_actors(recorded: Taught, actors: Taught, weight: int = RECORDED_OVER_ACTORS) -> Taught:
+    """Put recordings, each so many times, and actors together."""
+    (x, y), (more, of_more) = recorded, actors
+    return (
+        np.concatenate([x.repeat(weight, axis=0), more]),
+        np.concatenate([y.repeat(weight), of_more]),
+    )
+
+
 def left_out(
     features: NDArray[np.float64],
     truth: NDArray[np.int64],
     groups: Any,
     make: Any,
-    more: Any = None,
+    more: Taught | None = None,
 ) -> NDArray[np.float64]:
     """Chances (cloud, class) of each cloud from all of other groups, and from ``more`` beside."""
     chances = np.zeros((len(truth), truth.max() + 1))
     for group in np.unique(groups):
         learn = groups != group
-        x, y = features[learn], truth[learn]
-        if more is not None:
-            x, y = np.concatenate([x, more[0]]), np.concatenate([y, more[1]])
-        model = make().fit(x, y)
+        taught = features[learn], truth[learn]
+        model = make().fit(*(taught if more is None else with_actors(taught, more)))
         chances[np.ix_(~learn, model.classes_)] = model.predict_proba(features[~learn])
     return chances
 
@@ -369,29 +394,60 @@ def chosen_on_others(each: dict[str, Answers]) -> Answers:
     return first._replace(probabilities=chances)
 
 
-def learning_curve(actors: Collection, recorded: Collection, draws: int = 4) -> None:
-    """Balanced accuracy by recording over the number of real people, with and without actors."""
-    _, learnt = classes_of(actors)
-    _, truth = classes_of(recorded)
-    x, features, groups = described(actors), described(recorded), subjects_of(recorded)
-    for count in (0, 2, 5, 10, 20, 30):
-        found: dict[bool, list[float]] = {False: [], True: []}
+def learning_curve(actors: Collection, recorded: Collection, draws: int) -> None:
+    """Balanced accuracy by recording over the number of real people, with and without actors.
+
+    Beside each figure with actors is what they add, and the standard error of that over the draws
+    of people.
+    """
+    (_, learnt), (_, truth) = classes_of(actors), classes_of(recorded)
+    more, features, groups = (described(actors), learnt), described(recorded), subjects_of(recorded)
+
+    def known(taught: Taught, asked: NDArray[np.bool_]) -> float:
+        model, chances = both().fit(*taught), np.zeros((np.count_nonzero(asked), truth.max() + 1))
+        chances[:, model.classes_] = model.predict_proba(features[asked])
+        return balanced_accuracy(answers_of(recorded, chances, truth, asked).by_recording())
+
+    weights = (1, RECORDED_OVER_ACTORS, 5)
+    print("real people: known from them alone; with actors, each recording counting as 1, 3 and 5")
+    print(f"0 real people: -; {known(more, np.full(len(truth), True)):.1%}")
+    for count in (2, 5, 10, 20, 30):
+        found = []
         for draw in range(draws):
             some = np.random.default_rng(draw).permutation(np.unique(groups))[:count]
             learn = np.isin(groups, some)
-            for beside in (False, True):
-                rows, y = features[learn], truth[learn]
-                if beside:
-                    rows, y = np.concatenate([rows, x]), np.concatenate([y, learnt])
-                if not len(y):
-                    continue
-                model = both().fit(rows, y)
-                chances = np.zeros((np.count_nonzero(~learn), truth.max() + 1))
-                chances[:, model.classes_] = model.predict_proba(features[~learn])
-                asked = answers_of(recorded, chances, truth, ~learn)
-                found[beside].append(balanced_accuracy(asked.by_recording()))
-        shown = ["-" if not some else f"{np.mean(some):.1%}" for some in found.values()]
-        print(f"{count} real people: {shown[0]} alone, {shown[1]} with actors", flush=True)
+            own = features[learn], truth[learn]
+            taught = [own, *(with_actors(own, more, weight) for weight in weights)]
+            found.append([known(each, ~learn) for each in taught])
+        mean, shown = np.mean(found, axis=0), ""
+        for place in range(1, 1 + len(weights)):
+            gain = np.array(found)[:, place] - np.array(found)[:, 0]
+            error = gain.std(ddof=1) / np.sqrt(draws)
+            shown += f"; {mean[place]:.1%} ({gain.mean():+.1%}, standard error {error:.1%})"
+        print(f"{count} real people: {mean[0]:.1%}{shown}", flush=True)
+
+
+def others(out: Path) -> None:
+    """Print what the weights of the package call each activity of each source, known or not.
+
+    Those who move unlike any that the weights have learnt from are counted as well.
+    """
+    recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[str, bool]]]()
+    every = ("mocap", "mocap_others", "joints", "joints_others")
+    clouds = Collection(*(out / name for name in every if (out / name).exists()))
+    windows_s, subjects = clouds.column("duration_s").astype(float), clouds.column("subject")
+    for index, (label, subject) in enumerate(zip(clouds.labels, subjects, strict=True)):
+        windows = cut_windows(clouds.points(index), windows_s[index])
+        answer = recogniser.classes[recogniser.probabilities(windows).mean(axis=0).argmax()]
+        row = found.setdefault((str(label), str(subject).split("_")[0]), [])
+        row.append((answer, recogniser.distance(windows) > 1))
+    print(
+        f"{'activity':20}{'source':14}", *(f"{name:>14}" for name in recogniser.classes), "unlike"
+    )
+    for (label, source), answers in sorted(found.items()):
+        counts = Counter(answer for answer, _ in answers)
+        shown = "".join(f"{counts[name]:15}" for name in recogniser.classes)
+        print(f"{label:20}{source:14}{shown}{sum(unlike for _, unlike in answers):7}")
 
 
 def channels(out: Path) -> None:
@@ -412,15 +468,17 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3, help="trainings of each network, or 0")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     parser.add_argument(
-        "--measure", metavar="NAME,...", help="some of axes, shipped, learnt, people, curve"
+        "--measure", metavar="NAME,...", help="some of axes, shipped, learnt, people, curve, others"
     )
+    parser.add_argument("--draws", type=int, default=24, help="draws of people of the curve")
+    parser.add_argument("--workers", type=int, default=1, help="processes that build")
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
     )
     options = parser.parse_args()
     out = options.out
     if not options.no_build:
-        build(out, options.only and options.only.split(","), options.recordings)
+        build(out, options.only and options.only.split(","), options.recordings, options.workers)
     if options.only:
         return 0
     actors = Merged(out / "actors")
@@ -431,7 +489,8 @@ def main() -> int:
         "shipped": lambda: shipped(recorded),
         "learnt": lambda: to_recorded(actors, recorded, options.seeds),
         "people": lambda: people_left_out(actors, recorded),
-        "curve": lambda: learning_curve(actors, recorded),
+        "curve": lambda: learning_curve(actors, recorded, options.draws),
+        "others": lambda: others(out),
     }
     for name in options.measure.split(",") if options.measure else parts:
         parts[name]()
