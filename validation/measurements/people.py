@@ -71,6 +71,9 @@ ACTIVITIES = {
 }
 """Activities of an actor by the names that the recordings have."""
 
+OTHERS = ("sit", "bend", "squat", "wave", "jump", "stand", "walk_in_place", "fall")
+"""Activities of actors that the weights of the package have not learnt."""
+
 WINDOW_S = 1.6
 
 
@@ -146,6 +149,10 @@ def data_sets(out: Path, most: int) -> dict[str, str]:
         if folder := os.environ.get(variable):
             found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
     found["actors"] = (FEW.parent / "actors.toml").read_text()
+    head, _, _ = found["actors"].partition("[[synthetic]]")
+    found["actors_others"] = head + "".join(
+        f'[[synthetic]]\nlabel = "{label}"\ncount = 24\nsubjects = 200\n\n' for label in OTHERS
+    )
     found["channels_few"] = found["actors"].replace("count = 60", "count = 10")
     found["channels_all"] = found["channels_few"].replace("few_channels.toml", "paper-12ghz")
     return found
@@ -450,6 +457,23 @@ def others(out: Path) -> None:
         print(f"{label:20}{source:14}{shown}{sum(unlike for _, unlike in answers):7}")
 
 
+def fifth_class(actors: Collection, recorded: Collection, out: Path) -> None:
+    """Print what a forest knows, and calls another activity, that has learnt others as well."""
+    (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
+    x = np.concatenate([described(actors), described(more := Collection(out / "actors_others"))])
+    model = forest().fit(x, np.concatenate([learnt, np.full(len(more), len(names))]))
+    answers = answers_of(recorded, model.predict_proba(described(recorded)), truth)
+    told("forest that has learnt other activities", answers)
+    unknown = Collection(out / "mocap_others", out / "joints_others")
+    other = model.predict(described(unknown)) == len(names)
+    counts = {label: (unknown.labels == label) for label in np.unique(unknown.labels)}
+    for label, those in counts.items():
+        print(f"{label:20}{np.count_nonzero(those):5} windows, another: {other[those].mean():6.1%}")
+    still = ~np.char.startswith(unknown.labels.astype(str), "walk") & (unknown.labels != "run")
+    still |= unknown.labels == "walk_in_place"
+    print(f"all but those who walk or run: {other[still].mean():.1%} of {np.count_nonzero(still)}")
+
+
 def channels(out: Path) -> None:
     """What clouds of few channels differ in from those of all, feature by feature."""
     few, many = (described(Collection(out / f"channels_{name}")) for name in ("few", "all"))
@@ -468,7 +492,9 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=3, help="trainings of each network, or 0")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     parser.add_argument(
-        "--measure", metavar="NAME,...", help="some of axes, shipped, learnt, people, curve, others"
+        "--measure",
+        metavar="NAME,...",
+        help="some of axes, shipped, learnt, people, curve, others, fifth",
     )
     parser.add_argument("--draws", type=int, default=24, help="draws of people of the curve")
     parser.add_argument("--workers", type=int, default=1, help="processes that build")
@@ -491,6 +517,7 @@ def main() -> int:
         "people": lambda: people_left_out(actors, recorded),
         "curve": lambda: learning_curve(actors, recorded, options.draws),
         "others": lambda: others(out),
+        "fifth": lambda: fifth_class(actors, recorded, out),
     }
     for name in options.measure.split(",") if options.measure else parts:
         parts[name]()
