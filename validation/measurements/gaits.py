@@ -24,7 +24,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from people import answers_of, both, described, long_enough
+from people import answers_of, both, described
+from people_data import long_enough
 from scipy.stats import t as student
 from sklearn.metrics import confusion_matrix
 

@@ -10,18 +10,15 @@ of the actors is seen by all 96, too, and what the two radars' clouds differ in 
 from __future__ import annotations
 
 import argparse
-import csv
-import os
-import subprocess
 import sys
 from collections import Counter
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from people_data import build
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier, VotingClassifier
 from sklearn.metrics import confusion_matrix
@@ -29,7 +26,6 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-import rtradar as rt
 from rtradar.classify.baselines import axis_features
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import EDGES, SMALL
@@ -42,132 +38,6 @@ from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
 from rtradar.recognition.description import describe
 from rtradar.recognition.windows import cut_windows
-
-HEAD = """
-seed = 0
-folder = "{folder}"
-[windows]
-duration_s = 1.6
-place = "strike"
-count = 2
-[each]
-radar = ["few_channels.toml"]
-scene = ["free-space"]
-fidelity = ["analytic"]
-[drawn]
-heading_deg = [-30.0, 30.0]
-snr_db = [15.0, 25.0]
-offset_x_m = [-0.3, 0.3]
-offset_y_m = [-0.3, 0.3]
-"""
-FEW = Path(__file__).resolve().parents[1] / "few_channels.toml"
-ACTIVITIES = {
-    "walk": "walk",
-    "kick": "kick",
-    "punch": "punch",
-    "punching": "punch",
-    "jumping_jack": "jumping_jack",
-    "jumping_jacks": "jumping_jack",
-}
-"""Activities of an actor by the names that the recordings have."""
-
-OTHERS = ("sit", "bend", "squat", "wave", "jump", "stand", "walk_in_place", "fall")
-"""Activities of actors that the weights of the package have not learnt."""
-
-WINDOW_S = 1.6
-
-
-def of_mocap(folder: Path, *, known: bool = True) -> str:
-    """Specification of the recordings with skeletons; those too short for a window are left out.
-
-    They are of `ACTIVITIES`, or of all others.
-    """
-    text = ""
-    for row in csv.DictReader((folder / "MANIFEST.csv").open()):
-        if (row["activity"] in ACTIVITIES) != known or row["format"] not in ("AMC", "BVH"):
-            continue
-        rate, frames = float(row["fps"]), int(row["frames"])
-        first, last = (int(row[key]) for key in ("start_frame", "end_frame"))
-        start_s, end_s, length_s = (first - 1) / rate, last / rate, (frames - 1) / rate
-        spare = max(0.0, WINDOW_S + 0.2 - (end_s - start_s)) / 2  # of an activity that is shorter
-        start_s, end_s = max(0.0, start_s - spare), min(length_s - 1e-4, end_s + spare)
-        if end_s - start_s < WINDOW_S:
-            continue
-        text += _recording(row["file"], row["activity"], row["subject"], start_s, end_s)
-        if row["skeleton_file"]:
-            text += f'skeleton = "{row["skeleton_file"]}"\n'
-    return text
-
-
-def of_joints(folder: Path, most: int, *, known: bool = True) -> str:
-    """Specification of the recordings of joint positions, ``most`` of each person and activity.
-
-    They are of `ACTIVITIES`, or of all others.
-    """
-    text, taken = "", Counter[tuple[str, str]]()
-    for row in csv.DictReader((folder / "MANIFEST.csv").open()):
-        if (row["activity"] in ACTIVITIES) != known:
-            continue
-        if long_enough(folder / row["file"]):
-            taken[row["person"], row["activity"]] += 1
-            if taken[row["person"], row["activity"]] > most:
-                continue
-            text += _recording(
-                row["file"], row["activity"], f"{row['dataset']}_{row['person']}", 0.0
-            )
-    return text
-
-
-def long_enough(recording: Path) -> bool:
-    """Whether a file of joint positions holds a window.
-
-    Where it has a gap it is read from one side alone, and is shorter than its manifest says.
-    """
-    return rt.load_motion(recording).duration_s > WINDOW_S + 0.05
-
-
-def _recording(
-    file: str, activity: str, subject: str, start_s: float, end_s: float | None = None
-) -> str:
-    until = "" if end_s is None else f"end_s = {end_s:.4f}\n"
-    return (
-        f'[[recordings]]\nfile = "{file}"\nlabel = "{ACTIVITIES.get(activity, activity)}"\n'
-        f'subject = "{subject}"\nlicence = "see its folder"\nstart_s = {start_s:.4f}\n{until}'
-    )
-
-
-def data_sets(out: Path, most: int) -> dict[str, str]:
-    """Text of the specification of every data set, by its name."""
-    (out / "few_channels.toml").write_bytes(FEW.read_bytes())
-    found = {}
-    for name, variable, those in (
-        ("mocap", "RTRADAR_MOCAP", of_mocap),
-        ("joints", "RTRADAR_JOINTS", partial(of_joints, most=most)),
-        ("mocap_others", "RTRADAR_MOCAP", partial(of_mocap, known=False)),
-        ("joints_others", "RTRADAR_JOINTS", partial(of_joints, most=most, known=False)),
-    ):
-        if folder := os.environ.get(variable):
-            found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
-    found["actors"] = (FEW.parent / "actors.toml").read_text()
-    head, _, _ = found["actors"].partition("[[synthetic]]")
-    found["actors_others"] = head + "".join(
-        f'[[synthetic]]\nlabel = "{label}"\ncount = 24\nsubjects = 200\n\n' for label in OTHERS
-    )
-    found["channels_few"] = found["actors"].replace("count = 60", "count = 10")
-    found["channels_all"] = found["channels_few"].replace("few_channels.toml", "paper-12ghz")
-    return found
-
-
-def build(out: Path, only: list[str] | None, most: int, workers: int = 1) -> None:
-    """Build the data sets that are not complete."""
-    out.mkdir(parents=True, exist_ok=True)
-    for name, text in data_sets(out, most).items():
-        if only is None or name in only:
-            spec = out / f"{name}.toml"
-            spec.write_text(text)
-            words = ["dataset", "build", str(spec), "--out", str(out / name)]
-            words += ["--workers", str(workers)]
-            subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
 
 
 class Merged(Collection):
@@ -288,13 +158,17 @@ def one_axis(actors: Collection, recorded: Collection, draws: int = 4) -> None:
         for title, clouds in sides.items():
             features, truth = axis_features(clouds, axis), truths[title]
             groups, found = subjects_of(clouds) % 10, []  # ten parts of people are enough
+            table = np.zeros((len(least), len(least)))
             for draw in range(draws):
                 some = alike(truth, least, draw)
                 chances = left_out(features[some], truth[some], groups[some], forest)
                 found.append(balanced_accuracy(answers_of(clouds, chances, truth, some)))
+                table += confusion_matrix(truth[some], chances.argmax(axis=1))
+            recalls = ", ".join(f"{one:.0%}" for one in table.diagonal() / table.sum(axis=1))
             print(
                 f"{name} alone, {title}, other people, {least.tolist()} clouds: "
-                f"{np.mean(found):.1%}, of {draws} draws {min(found):.1%} to {max(found):.1%}",
+                f"{np.mean(found):.1%}, of {draws} draws {min(found):.1%} to {max(found):.1%}; "
+                f"by activity {recalls}",
                 flush=True,
             )
 
@@ -346,13 +220,10 @@ def by_source(title: str, answers: Answers, names: tuple[str, ...]) -> None:
 def shipped(recorded: Collection) -> None:
     """Ask the weights that come with the package about recordings."""
     names, truth = classes_of(recorded)
-    recogniser, windows_s = Recogniser.shipped(), recorded.column("duration_s").astype(float)
+    recogniser = Recogniser.shipped()
     order = [recogniser.classes.index(name) for name in names]
-    each = [
-        recogniser.probabilities(cut_windows(recorded.points(index), length_s)).mean(axis=0)[order]
-        for index, length_s in enumerate(windows_s)
-    ]
-    by_source("weights of the package", answers_of(recorded, np.array(each), truth), names)
+    chances = recogniser.probabilities(windows_of(recorded))[:, order]
+    by_source("weights of the package", answers_of(recorded, chances, truth), names)
 
 
 def people_left_out(actors: Collection, recorded: Collection) -> None:
@@ -401,7 +272,7 @@ def chosen_on_others(each: dict[str, Answers]) -> Answers:
     return first._replace(probabilities=chances)
 
 
-def learning_curve(actors: Collection, recorded: Collection, draws: int) -> None:
+def learning_curve(actors: Collection, recorded: Collection, draws: int = 24) -> None:
     """Balanced accuracy by recording over the number of real people, with and without actors.
 
     Beside each figure with actors is what they add, and the standard error of that over the draws
@@ -416,7 +287,7 @@ def learning_curve(actors: Collection, recorded: Collection, draws: int) -> None
         return balanced_accuracy(answers_of(recorded, chances, truth, asked).by_recording())
 
     weights = (1, RECORDED_OVER_ACTORS, 5)
-    print("real people: known from them alone; with actors, each recording counting as 1, 3 and 5")
+    print(f"known from real people alone; with actors, a recording counting as {weights} of them")
     print(f"0 real people: -; {known(more, np.full(len(truth), True)):.1%}")
     for count in (2, 5, 10, 20, 30):
         found = []
@@ -439,39 +310,41 @@ def others(out: Path) -> None:
 
     Those who move unlike any that the weights have learnt from are counted as well.
     """
-    recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[str, bool]]]()
+    recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[int, bool]]]()
     every = ("mocap", "mocap_others", "joints", "joints_others")
     clouds = Collection(*(out / name for name in every if (out / name).exists()))
-    windows_s, subjects = clouds.column("duration_s").astype(float), clouds.column("subject")
-    for index, (label, subject) in enumerate(zip(clouds.labels, subjects, strict=True)):
-        windows = cut_windows(clouds.points(index), windows_s[index])
-        answer = recogniser.classes[recogniser.probabilities(windows).mean(axis=0).argmax()]
-        row = found.setdefault((str(label), str(subject).split("_")[0]), [])
-        row.append((answer, recogniser.distance(windows) > 1))
-    print(
-        f"{'activity':20}{'source':14}", *(f"{name:>14}" for name in recogniser.classes), "unlike"
-    )
-    for (label, source), answers in sorted(found.items()):
-        counts = Counter(answer for answer, _ in answers)
-        shown = "".join(f"{counts[name]:15}" for name in recogniser.classes)
-        print(f"{label:20}{source:14}{shown}{sum(unlike for _, unlike in answers):7}")
+    windows = windows_of(clouds)
+    answers = recogniser.probabilities(windows).argmax(axis=1).tolist()
+    sources = [str(name).split("_")[0] for name in clouds.column("subject")]
+    for label, source, window, answer in zip(
+        clouds.labels.tolist(), sources, windows, answers, strict=True
+    ):
+        unlike = recogniser.distance([window]) > 1
+        found.setdefault((label, source), []).append((answer, unlike))
+    names = "".join(f"{name:>15}" for name in recogniser.classes)
+    print(f"{'activity':20}{'source':14}{names} unlike")
+    for (label, source), row in sorted(found.items()):
+        counts = Counter(answer for answer, _ in row)
+        shown = "".join(f"{counts[one]:15}" for one in range(len(recogniser.classes)))
+        print(f"{label:20}{source:14}{shown}{sum(unlike for _, unlike in row):7}")
 
 
 def fifth_class(actors: Collection, recorded: Collection, out: Path) -> None:
-    """Print what a forest knows, and calls another activity, that has learnt others as well."""
+    """Print what a forest that has learnt a fifth class, of other activities, puts into it."""
     (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
-    x = np.concatenate([described(actors), described(more := Collection(out / "actors_others"))])
+    more = described(Collection(out / "actors_others"))
+    x = np.concatenate([described(actors), more])
     model = forest().fit(x, np.concatenate([learnt, np.full(len(more), len(names))]))
     answers = answers_of(recorded, model.predict_proba(described(recorded)), truth)
     told("forest that has learnt other activities", answers)
     unknown = Collection(out / "mocap_others", out / "joints_others")
-    other = model.predict(described(unknown)) == len(names)
-    counts = {label: (unknown.labels == label) for label in np.unique(unknown.labels)}
-    for label, those in counts.items():
-        print(f"{label:20}{np.count_nonzero(those):5} windows, another: {other[those].mean():6.1%}")
-    still = ~np.char.startswith(unknown.labels.astype(str), "walk") & (unknown.labels != "run")
-    still |= unknown.labels == "walk_in_place"
-    print(f"all but those who walk or run: {other[still].mean():.1%} of {np.count_nonzero(still)}")
+    in_fifth, labels = model.predict(described(unknown)) == len(names), unknown.labels
+    for label in np.unique(labels):
+        own = in_fifth[labels == label]
+        print(f"{label:20}{own.size:5} windows, in the fifth class: {own.mean():6.1%}")
+    goes = [one for one in np.unique(labels) if one.startswith(("walk_", "run"))]
+    stays = ~np.isin(labels, goes) | np.isin(labels, ["walk_in_place", "run_in_place"])
+    print(f"all who stay in place: {in_fifth[stays].mean():.1%} of {np.count_nonzero(stays)}")
 
 
 def channels(out: Path) -> None:
@@ -496,15 +369,13 @@ def main() -> int:
         metavar="NAME,...",
         help="some of axes, shipped, learnt, people, curve, others, fifth",
     )
-    parser.add_argument("--draws", type=int, default=24, help="draws of people of the curve")
-    parser.add_argument("--workers", type=int, default=1, help="processes that build")
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
     )
     options = parser.parse_args()
     out = options.out
     if not options.no_build:
-        build(out, options.only and options.only.split(","), options.recordings, options.workers)
+        build(out, options.only and options.only.split(","), options.recordings)
     if options.only:
         return 0
     actors = Merged(out / "actors")
@@ -515,7 +386,7 @@ def main() -> int:
         "shipped": lambda: shipped(recorded),
         "learnt": lambda: to_recorded(actors, recorded, options.seeds),
         "people": lambda: people_left_out(actors, recorded),
-        "curve": lambda: learning_curve(actors, recorded, options.draws),
+        "curve": lambda: learning_curve(actors, recorded),
         "others": lambda: others(out),
         "fifth": lambda: fifth_class(actors, recorded, out),
     }
