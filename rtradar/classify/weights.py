@@ -15,12 +15,18 @@ from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.recognition.description import OUTLINE, describe
-from rtradar.recognition.recogniser import Recogniser
+from rtradar.recognition.recogniser import OTHER, Recogniser
 from rtradar.recognition.windows import cut_windows
 from rtradar.system.seeds import word
 
-MERGED = {"boxing": "punch"}
-"""Activities of actors that are answered by the name of another."""
+ANSWERS = {
+    "walk": "walk",
+    "kick": "kick",
+    "punch": "punch",
+    "boxing": "punch",
+    "jumping_jack": "jumping_jack",
+}
+"""What is answered about the activities of actors; about all others it is `OTHER`."""
 
 _TREES, _LEAST_IN_LEAF, _FOLDS = 300, 2, 5
 _USUAL = 0.995  # fraction of the windows that are not called unusual
@@ -29,6 +35,8 @@ _RIDGE = 1e-2  # of the variance of each number, so that nearly dependent ones d
 
 def train_recogniser(clouds: Collection, radar: Radar, *, seed: int = 0) -> Recogniser:
     """Train a forest on clouds of actors; folds over people calibrate it.
+
+    Actors who do something else than `ANSWERS` names are learnt as one more class, `OTHER`.
 
     Parameters
     ----------
@@ -57,7 +65,7 @@ def train_recogniser(clouds: Collection, radar: Radar, *, seed: int = 0) -> Reco
             for index, length in enumerate(lengths)
         ]
     )
-    labels = np.array([MERGED.get(label, label) for label in clouds.labels.tolist()])
+    labels = np.array([ANSWERS.get(label, OTHER) for label in clouds.labels.tolist()])
     names, truth = np.unique(labels, return_inverse=True)
     held_out = np.zeros((len(clouds), len(names)))
     for split in make_splits(clouds, "subject", folds=_FOLDS, seed=seed):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtradar.errors import InputError
-from rtradar.recognition.recogniser import Recogniser
+from rtradar.recognition.recogniser import OTHER, Recogniser
 from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
 from rtradar.system.files import read_arrays, read_json
 
@@ -30,8 +30,8 @@ def predict_run(folder: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Plain JSON values: ``activity``, ``probabilities`` by activity, the means over all windows,
-        ``windows`` (their number) and ``warnings``, a list of sentences.
+        Plain JSON values: ``activity``, ``probabilities`` by activity, the means over all windows
+        if it is one of those, ``windows`` (their number) and ``warnings``, a list of sentences.
 
     Raises
     ------
@@ -41,8 +41,10 @@ def predict_run(folder: Path) -> dict[str, Any]:
     points, summary = _read(folder)
     recogniser = Recogniser.shipped()
     windows = cut_windows(points, summary["capture_s"])
-    each = recogniser.probabilities(windows)
-    mean = each.mean(axis=0)
+    mean = recogniser.probabilities(windows).mean(axis=0)
+    chances = dict(zip(recogniser.classes, mean.tolist(), strict=True))
+    none_of_them = chances.pop(OTHER)
+    chances = {name: chance / (1 - none_of_them) for name, chance in chances.items()}
     warnings = [*_of_radar(summary, recogniser.card), *_of_scene(summary, recogniser.card)]
     if summary["capture_s"] < WINDOW_S + 2 * EDGE_S - 1e-6:
         warnings.append(
@@ -57,11 +59,15 @@ def predict_run(folder: Path) -> dict[str, Any]:
     if (distance := recogniser.distance(windows)) > 1:
         warnings.append(
             f"the motion is unlike any that was learnt from ({distance:.1f} times the distance "
-            f"within which 199 of 200 lie): it may be none of {', '.join(recogniser.classes)}"
+            "within which 199 of 200 lie)"
         )
-    if mean.max() < _UNSURE:
+    if none_of_them > _UNSURE:
+        warnings.append(
+            f"it is probably none of {', '.join(chances)} (probability {none_of_them:.2f}), but "
+            "something else that a person does"
+        )
+    if max(chances.values()) < _UNSURE:
         warnings.append(f"no activity has a probability of {_UNSURE:g}")
-    chances = {name: float(value) for name, value in zip(recogniser.classes, mean, strict=True)}
     return {
         "activity": max(chances, key=lambda name: chances[name]),
         "probabilities": chances,

@@ -23,6 +23,9 @@ from rtradar.system.files import atomic_file, read_arrays
 WEIGHTS = Path(__file__).with_name("weights.npz")
 """Weights that come with the package."""
 
+OTHER = "other"
+"""Class of what is none of the activities."""
+
 LEAST_POINTS = 24
 """Number of points of a window below which it says nothing."""
 
@@ -46,9 +49,10 @@ class Recogniser:
         Arrays ``roots (tree,)``; ``feature``, ``threshold``, ``below`` and ``above (node,)``, of
         which the first is -1 in a leaf; ``chances (node, class)``.
     card : dict
-        ``classes``, ``temperature`` by which the logarithms of probabilities are divided, ``radar``
-        (`range_bin_m`, `velocity_bin_mps`, `max_velocity_mps`), ``snr_db`` (least, most),
-        ``usual`` (``mean``, ``inverse_covariance``, ``most`` distance of outlines), and texts.
+        ``classes``, the activities and `OTHER`, ``temperature`` by which the logarithms of
+        probabilities are divided, ``radar`` (`range_bin_m`, `velocity_bin_mps`,
+        `max_velocity_mps`), ``snr_db`` (least, most), ``usual`` (``mean``, ``inverse_covariance``,
+        ``most`` distance of outlines), and texts.
     """
 
     forest: dict[str, NDArray[Any]]
@@ -87,7 +91,7 @@ class Recogniser:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """Names of the activities."""
+        """Names of the activities, and `OTHER`."""
         return tuple(self.card["classes"])
 
     def probabilities(self, windows: list[NDArray[np.float64]]) -> NDArray[np.float64]:

@@ -110,6 +110,17 @@ def test_unusual_motion_and_few_points_are_warned_of(tmp_path: Path) -> None:
     assert "windows have 2" in warnings  # of 60 points 1.4 s of 3 s hold 28, half of the least
 
 
+def test_something_else_than_the_activities_is_warned_of(tmp_path: Path) -> None:
+    run_folder(tmp_path, Radar.preset("paper-12ghz"))
+    stands = np.random.default_rng(0).normal([0, 4, 0], [0, 0.1, 0.08], size=(3000, 3))
+    stands[:, 0] = np.linspace(0, 3, 3000)
+    save_cloud_npz(tmp_path / "cloud_rdt.npz", stands)
+    answer = predict_run(tmp_path)
+    assert any("probably none of jumping_jack, kick" in one for one in answer["warnings"])
+    assert "other" not in answer["probabilities"]
+    assert sum(answer["probabilities"].values()) == pytest.approx(1)
+
+
 @pytest.mark.parametrize("name", ["summary.json", "cloud_rdt.npz"])
 @pytest.mark.parametrize("damage", [None, b"", b"{}", b"[1]"])
 def test_damaged_runs_are_one_line(tmp_path: Path, name: str, damage: bytes | None) -> None:

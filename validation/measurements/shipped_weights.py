@@ -2,9 +2,9 @@
 
     python validation/measurements/shipped_weights.py OUT [--install]
 
-Builds what OUT/clouds lacks of the data set `validation/actors.toml`, trains, and writes
-OUT/weights.npz, which follows from the code and the seed alone. With --install it becomes the
-weights of the package. The time of both steps is printed.
+Builds what OUT lacks of the data sets `validation/actors.toml` and `validation/other_actors.toml`,
+trains, and writes OUT/weights.npz, which follows from the code and the seed alone. With --install
+it becomes the weights of the package. The time of both steps is printed.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rtradar.radar import Radar
 from rtradar.recognition.recogniser import WEIGHTS
 
 DATA_SETS = Path(__file__).resolve().parents[1]
+NAMES = ("actors", "other_actors")
 
 
 def main() -> int:
@@ -29,12 +30,13 @@ def main() -> int:
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of clouds and weights")
     parser.add_argument("--install", action="store_true", help="replace the package's weights")
     options = parser.parse_args()
-    began, clouds = time.perf_counter(), options.out / "clouds"
-    words = ["dataset", "build", str(DATA_SETS / "actors.toml"), "--out", str(clouds)]
-    subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
+    began, folders = time.perf_counter(), [options.out / name for name in NAMES]
+    for folder in folders:
+        words = ["dataset", "build", str(DATA_SETS / f"{folder.name}.toml"), "--out", str(folder)]
+        subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
     built = time.perf_counter()
     radar = Radar.load(DATA_SETS / "few_channels.toml")
-    recogniser = train_recogniser(Collection(clouds), radar)
+    recogniser = train_recogniser(Collection(*folders), radar)
     path = options.out / "weights.npz"
     recogniser.save(path)
     print(
