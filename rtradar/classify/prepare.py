@@ -1,4 +1,4 @@
-"""Preparation of clouds for the network: stacking, sampling of points, augmentation and scaling.
+"""Preparation of samples for the network: stacking, sampling of points, augmentation and scaling.
 
 Time, range and velocity have different units. ``unit-sphere``, PointNet's normalisation of shapes,
 centres a cloud and divides all three axes by one number, so that seconds and m/s are compared as
@@ -21,7 +21,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from rtradar.classify.recipes import Augmentation, Scaling
+from rtradar.classify.recipes import Augmentation, Recipe, Scaling
+from rtradar.classify.spectrograms import stack_spectrograms, varied_spectrograms
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import stream
@@ -42,6 +43,24 @@ _TIME_SHIFT_S, _RANGE_SHIFT_M = 0.1, 0.1  # the largest in either direction
 _TEMPO = 0.15  # largest relative change of tempo: velocity is multiplied and time divided by it
 _ASPECT = 0.15  # largest relative loss of radial motion, as of a person who faces elsewhere
 _JITTER = (0.008, 0.012, 0.035)  # standard deviation [s, m, m/s], about a third of a map's cell
+
+
+def stacked_for(clouds: Collection, recipe: Recipe, *, seed: int = 0) -> Tensor:
+    """Stack what the network of a recipe takes: clouds in random order, or spectrograms."""
+    if recipe.takes_points:
+        return stack_clouds(clouds, seed=seed, edge_s=recipe.edge_s)
+    return stack_spectrograms(clouds, edge_s=recipe.edge_s)
+
+
+def for_network(stacked: Tensor, recipe: Recipe, *, training: bool) -> Tensor:
+    """Prepare clouds or spectrograms for the network, in training sampled and varied at random."""
+    if not recipe.takes_points:
+        varied = training and recipe.augmentation == "wide"
+        return varied_spectrograms(stacked) if varied else stacked
+    points = sampled(stacked, recipe.points, resample=training and recipe.resample)
+    if training:
+        return for_training(points, recipe.augmentation, recipe.scaling)
+    return scaled(points, recipe.scaling)
 
 
 def stack_clouds(clouds: Collection, *, seed: int = 0, edge_s: float = 0.0) -> Tensor:

@@ -14,7 +14,7 @@ Schedule = Literal["step", "one-cycle"]
 Scaling = Literal["unit-sphere", "physical"]
 Augmentation = Literal["none", "rotation", "physical", "wide"]
 Precision = Literal["float32", "bfloat16"]
-Network = Literal["pointnet", "pooled", "edges"]
+Network = Literal["pointnet", "pooled", "edges", "spectrogram"]
 
 _CHOICES = {
     "schedule": get_args(Schedule),
@@ -39,7 +39,8 @@ class Recipe:
     name : str
         Name of the predefined recipe it was derived from.
     points : int
-        Number of points that the network takes from each cloud, at least 1.
+        Number of points that the network takes from each cloud, at least 1; 0 if it takes a
+        spectrogram.
     batch : int
         Number of clouds in a batch, at least 2. The remainder is spread over the other batches, so
         that no cloud is dropped and no batch holds a single cloud.
@@ -67,12 +68,13 @@ class Recipe:
     resample : bool
         Whether the points of a cloud are resampled in every epoch; otherwise they stay the same.
     augmentation : {"none", "rotation", "physical", "wide"}
-        Augmentation of training clouds, see `rtradar.classify.prepare`.
+        Augmentation of training clouds, see `rtradar.classify.prepare`; spectrograms have only the
+        first and the last.
     precision : {"float32", "bfloat16"}
         Precision of the search for the maximum over the points during training. Values, gradients
         and predictions are always float32.
-    network : {"pointnet", "pooled", "edges"}
-        PointNet, or one of `rtradar.classify.small_networks`.
+    network : {"pointnet", "pooled", "edges", "spectrogram"}
+        PointNet, one of `rtradar.classify.small_networks`, or `rtradar.classify.spectrograms`.
     edge_s : float
         Time at both ends of each interval whose points are left out [s]. The surface from which
         points are drawn is closed there.
@@ -116,7 +118,10 @@ class Recipe:
     balanced: bool = False
 
     def __post_init__(self) -> None:
-        for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("step_epochs", 1)):
+        least_points = int(self.takes_points)
+        for field, least in (
+            ("points", least_points), ("batch", 2), ("epochs", 1), ("step_epochs", 1)
+        ):  # fmt: skip
             value = getattr(self, field)
             whole = isinstance(value, int) and not isinstance(value, bool)
             self._demand(field, whole and value >= least, f"a whole number, at least {least}")
@@ -134,10 +139,19 @@ class Recipe:
             value = words.get(getattr(self, field), getattr(self, field))
             object.__setattr__(self, field, value)
             self._demand(field, value in allowed, f"one of {', '.join(allowed)}")
+        if not self.takes_points:
+            self._demand("points", self.points == 0, "0, for a spectrogram has no points")
+            fits = self.augmentation in ("none", "wide")
+            self._demand("augmentation", fits, "none or wide, for a spectrogram is no cloud")
 
     def _demand(self, field: str, fulfilled: bool, wanted: str) -> None:
         if not fulfilled:
             raise InputError(f"recipe: {field} = {getattr(self, field)!r}; it must be {wanted}")
+
+    @property
+    def takes_points(self) -> bool:
+        """Whether the network takes clouds, not spectrograms."""
+        return self.network != "spectrogram"
 
     @property
     def epochs_run(self) -> int:
@@ -251,5 +265,8 @@ SMALL = LEAN.changed(
 EDGES = SMALL.changed(name="edges", network="edges")
 """The same with a network that looks at the neighbours of each point."""
 
-RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER, SMALL, EDGES)}
+SPECTROGRAM = SMALL.changed(name="spectrogram", points=0, network="spectrogram")
+"""Convolutions over the spectrogram, in place of the cloud."""
+
+RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER, SMALL, EDGES, SPECTROGRAM)}
 """Predefined recipes by name."""

@@ -17,6 +17,7 @@ from torch.nn import functional
 
 from rtradar.classify.pointnet import PointNet, PointwiseLayer
 from rtradar.classify.recipes import Recipe
+from rtradar.classify.spectrograms import SpectrogramNet
 
 _POINT_WIDTHS, _CLOUD_WIDTH = (3, 64, 64, 128), 128
 _NEIGHBOURS = 12
@@ -106,6 +107,8 @@ def _over_edges(layer: PointwiseLayer, values: Tensor, near: Tensor) -> Tensor:
 
 def build_network(n_classes: int, recipe: Recipe) -> nn.Module:
     """Build the network of a recipe, which gives log-probabilities and a penalty."""
-    kinds = {"pointnet": PointNet, "pooled": PooledNet, "edges": EdgeNet}
+    kinds = {
+        "pointnet": PointNet, "pooled": PooledNet, "edges": EdgeNet, "spectrogram": SpectrogramNet
+    }  # fmt: skip
     network: nn.Module = kinds[recipe.network](n_classes, recipe)
     return network

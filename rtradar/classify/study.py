@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from rtradar.classify import training
 from rtradar.classify.outcomes import Outcome, load_outcome, outcome_of, save_outcome
-from rtradar.classify.prepare import stack_clouds
+from rtradar.classify.prepare import stacked_for
 from rtradar.classify.recipes import Recipe
 from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import chosen, make_splits, values_of
@@ -73,7 +73,10 @@ class Study:
     @property
     def title(self) -> str:
         """Title of the study in tables."""
-        return f"{self.plan['recipe']['name']}, {self.plan['recipe']['points']} points"
+        recipe = self.plan["recipe"]
+        return (
+            f"{recipe['name']}, {recipe['points']} points" if recipe["points"] else recipe["name"]
+        )
 
 
 def check_plan(out: Path, plan: dict[str, Any]) -> None:
@@ -203,9 +206,7 @@ def train_study(
     values = values_of(clouds, split)
     missing = [n for n in numbers if not (training_folder(out, n) / _OUTCOME).exists()]
     if missing:
-        examples = Examples(
-            stack_clouds(clouds, seed=seed, edge_s=recipe.edge_s), torch.from_numpy(truth), names
-        )
+        examples = Examples(stacked_for(clouds, recipe, seed=seed), torch.from_numpy(truth), names)
         training.check_points(examples, recipe)
     write_plan(out, plan)
     with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:

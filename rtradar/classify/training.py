@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from rtradar.classify.prepare import for_training, sampled, scaled
+from rtradar.classify.prepare import for_network
 from rtradar.classify.recipes import Precision, Recipe
 from rtradar.classify.small_networks import build_network
 from rtradar.errors import BackendError, InputError
@@ -41,12 +41,13 @@ Row = dict[str, float]
 
 @dataclass(frozen=True)
 class Examples:
-    """Clouds with their classes.
+    """Clouds, or spectrograms, with their classes.
 
     Parameters
     ----------
-    points : (cloud, point, 3) float32 tensor
-        Clouds from `rtradar.classify.stack_clouds`.
+    points : (cloud, point, 3) or (cloud, time, velocity) float32 tensor
+        Clouds from `rtradar.classify.stack_clouds`, or spectrograms from
+        `rtradar.classify.stack_spectrograms`.
     classes : (cloud,) int64 tensor
         Class numbers, indices into ``names``.
     names : tuple of str
@@ -64,7 +65,7 @@ class Examples:
 
 def check_points(examples: Examples, recipe: Recipe) -> None:
     """Raise InputError if the clouds have fewer points than the recipe needs."""
-    if recipe.points > examples.points.shape[1]:
+    if recipe.takes_points and recipe.points > examples.points.shape[1]:
         raise InputError(
             f"--points {recipe.points}: the clouds hold {examples.points.shape[1]} points; "
             "give no more"
@@ -191,11 +192,10 @@ def predict(network: nn.Module, examples: Examples, recipe: Recipe) -> NDArray[n
     device = next(network.parameters()).device
     network.eval()
     with torch.no_grad():
-        points = sampled(examples.points, recipe.points, resample=False)
         # Clouds are independent of each other; batches only limit the memory.
         found = [
-            network(scaled(some, recipe.scaling).to(device))[0].cpu()
-            for some in torch.split(points, 32)
+            network(for_network(some, recipe, training=False).to(device))[0].cpu()
+            for some in torch.split(examples.points, 32)
         ]
     return torch.cat(found).numpy()
 
@@ -219,8 +219,7 @@ def _train_epoch(
     for number, batch in enumerate(batches):
         for group in optimiser.param_groups:
             group["lr"] = recipe.rate_at(epoch, number / len(batches))
-        points = sampled(train.points[batch], recipe.points, resample=recipe.resample)
-        points = for_training(points, recipe.augmentation, recipe.scaling).to(device)
+        points = for_network(train.points[batch], recipe, training=True).to(device)
         wanted = train.classes[batch].to(device)
         log_probabilities, skewness = network(points)
         loss = functional.cross_entropy(

@@ -120,7 +120,7 @@ def _add_train(train: OneLineParser) -> None:
     train.add_argument(
         "--recipe",
         default="lean",
-        help="lean, our own, paper, small or edges (default: %(default)s)",
+        help="lean, our own, paper, small, edges or spectrogram (default: %(default)s)",
     )
     train.option(
         "--split",
@@ -140,13 +140,13 @@ def _add_train(train: OneLineParser) -> None:
     train.option(
         "--points",
         "N",
-        "points of each cloud (default: lean and paper 1000, small and edges 128)",
+        "points of each cloud (default: lean and paper 1000, small and edges 128, spectrogram 0)",
         type=whole,
     )
     train.option(
         "--epochs",
         "N",
-        "number of epochs (default: lean 30, paper 200, small and edges 50)",
+        "number of epochs (default: lean 30, paper 200, the others 50)",
         type=whole,
     )
     train.option("--rate", "X", "learning rate (default: lean 2e-3, paper 1e-4)", type=number)

@@ -274,12 +274,12 @@ def test_the_help_of_train_has_the_defaults_of_the_recipes(
     words = " ".join(capsys.readouterr().out.split())
     for text in (
         f"number of epochs (default: lean {LEAN.epochs}, paper {PAPER.epochs}, "
-        f"small and edges {SMALL.epochs})",
+        f"the others {SMALL.epochs})",
         f"learning rate (default: lean {LEAN.rate:.0e}, paper {PAPER.rate:.0e})",
         f"the paper's (default: lean {LEAN.augmentation}, paper {PAPER.augmentation})",
     ):
         assert text.replace("e-0", "e-") in words
-    points = f"lean and paper {LEAN.points}, small and edges {SMALL.points}"
+    points = f"lean and paper {LEAN.points}, small and edges {SMALL.points}, spectrogram 0"
     assert f"points of each cloud (default: {points})" in words
     for recipe in RECIPES.values():
         assert f"all by one (default: {recipe.scaling})" in words

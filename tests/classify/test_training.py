@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from rtradar.classify import training
+from rtradar.classify import prepare, training
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import LEAN, PAPER, Recipe
 from rtradar.classify.study import classes_of
@@ -112,13 +112,13 @@ def test_no_cloud_is_dropped_and_none_stands_alone(
     examples: Examples, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sizes: list[int] = []
-    real = training.for_training
+    real = prepare.for_training
 
     def spy(points: torch.Tensor, *how: Any) -> torch.Tensor:
         sizes.append(len(points))
         return real(points, *how)
 
-    monkeypatch.setattr(training, "for_training", spy)
+    monkeypatch.setattr(prepare, "for_training", spy)
     seven = examples[np.arange(7)]
     train_network(seven, examples, PAPER.changed(points=8, epochs=1))
     assert sizes == [4, 3]

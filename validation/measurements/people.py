@@ -3,15 +3,14 @@
     python validation/measurements/people.py OUT [--only NAME,...] [--no-build] [--measure NAME,...]
 
 Builds the data sets that are not there yet: recordings of `RTRADAR_MOCAP` and `RTRADAR_JOINTS`, and
-actors, all in windows round the strikes, which begin at random. The radar has few channels; a part
-of the actors is seen by all 96, too, and what the two radars' clouds differ in is printed.
+actors, all in windows round the strikes, which begin at random. The radar has few channels; the
+recordings are seen by all 96, too.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -27,16 +26,17 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from rtradar.classify.baselines import axis_features
-from rtradar.classify.prepare import stack_clouds
-from rtradar.classify.recipes import EDGES, SMALL
+from rtradar.classify.prepare import stacked_for
+from rtradar.classify.recipes import EDGES, SMALL, SPECTROGRAM
 from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.splits import subjects_of
 from rtradar.classify.study import classes_of
 from rtradar.classify.training import Examples, predict, train_network
-from rtradar.classify.weights import MERGED
+from rtradar.classify.weights import ANSWERS
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
 from rtradar.recognition.description import describe
+from rtradar.recognition.recogniser import OTHER
 from rtradar.recognition.windows import cut_windows
 
 
@@ -46,7 +46,7 @@ class Merged(Collection):
     @property
     def labels(self) -> NDArray[np.str_]:
         """Activity of every cloud."""
-        return np.array([MERGED.get(label, label) for label in super().labels.tolist()])
+        return np.array([ANSWERS.get(label, label) for label in super().labels.tolist()])
 
 
 def answers_of(
@@ -97,6 +97,12 @@ def centroid() -> Any:
 
 MODELS = {"forest": forest, "linear": linear, "both": both}
 """What learns from descriptions, by name."""
+
+
+def recordings(out: Path, which: str = "") -> Collection:
+    """Return the data sets of recordings that are there, such as those ``which`` are _others."""
+    folders = (out / f"{source}{which}" for source in ("mocap", "joints"))
+    return Collection(*(folder for folder in folders if folder.exists()))
 
 
 def windows_of(clouds: Collection) -> list[NDArray[np.float64]]:
@@ -187,11 +193,13 @@ def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
     _, learnt = classes_of(actors)
     names, truth = classes_of(recorded)
     x, asked = described(actors), described(recorded)
+    found = {}
     for title, make in (("nearest centroid", centroid), *MODELS.items()):
-        told(title, answers_of(recorded, make().fit(x, learnt).predict_proba(asked), truth))
-    for recipe in (SMALL, EDGES):
+        found[title] = make().fit(x, learnt).predict_proba(asked)
+        told(title, answers_of(recorded, found[title], truth))
+    for recipe in (SMALL, EDGES, SPECTROGRAM):
         sets = [
-            Examples(stack_clouds(one, edge_s=recipe.edge_s), torch.from_numpy(those), names)
+            Examples(stacked_for(one, recipe), torch.from_numpy(those), names)
             for one, those in ((actors, learnt), (recorded, truth))
         ]
         each: list[NDArray[np.float64]] = []
@@ -201,8 +209,42 @@ def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
             told(f"network '{recipe.name}', seed {seed}", answers_of(recorded, each[-1], truth))
         if not each:
             continue
-        mean = answers_of(recorded, np.mean(each, axis=0), truth)
-        by_source(f"network '{recipe.name}', {seeds} seeds averaged", mean, names)
+        found[recipe.name] = np.mean(each, axis=0)
+        title = f"network '{recipe.name}', {seeds} seeds averaged"
+        by_source(title, answers_of(recorded, found[recipe.name], truth), names)
+        both_say = (found["forest"] + found[recipe.name]) / 2
+        told(f"{title}, and the forest", answers_of(recorded, both_say, truth))
+
+
+def networks(actors: Collection, recorded: Collection, parts: int = 5) -> None:
+    """Leave a fifth of the people out in turn, for networks over clouds and over spectrograms.
+
+    Their answers are averaged with each other's, and with those of `both`.
+    """
+    (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
+    groups, features = subjects_of(recorded) % parts, described(recorded)
+    found = {"both": left_out(features, truth, groups, both, (described(actors), learnt))}
+    for recipe in (SMALL, SPECTROGRAM):
+        more, own = (stacked_for(clouds, recipe) for clouds in (actors, recorded))
+        least = min(more.shape[1], own.shape[1])  # points are in random order
+        more, own = more[:, :least], own[:, :least]
+        found[recipe.name] = np.zeros((len(truth), len(names)))
+        for part in range(parts):
+            learn, ask = np.flatnonzero(groups != part), np.flatnonzero(groups == part)
+            some = np.tile(learn, RECORDED_OVER_ACTORS)
+            taught = Examples(
+                torch.cat([own[some], more]),
+                torch.from_numpy(np.append(truth[some], learnt)),
+                names,
+            )
+            asked = Examples(own[ask], torch.from_numpy(truth[ask]), names)
+            network, _ = train_network(taught, asked, recipe)
+            found[recipe.name][ask] = np.exp(predict(network, asked, recipe))
+    clouds, spectrograms = found["small"], found["spectrogram"]
+    found["clouds and spectrograms, networks"] = (clouds + spectrograms) / 2
+    found["both, and spectrograms"] = (found["both"] + spectrograms) / 2
+    for title, chances in found.items():
+        told(f"a fifth of the people left out, {title}", answers_of(recorded, chances, truth))
 
 
 def by_source(title: str, answers: Answers, names: tuple[str, ...]) -> None:
@@ -217,13 +259,14 @@ def by_source(title: str, answers: Answers, names: tuple[str, ...]) -> None:
     print(names, confusion_matrix(whole.truth, whole.probabilities.argmax(axis=1)), sep="\n")
 
 
-def shipped(recorded: Collection) -> None:
+def shipped(recorded: Collection, radar: str) -> None:
     """Ask the weights that come with the package about recordings."""
     names, truth = classes_of(recorded)
     recogniser = Recogniser.shipped()
     order = [recogniser.classes.index(name) for name in names]
     chances = recogniser.probabilities(windows_of(recorded))[:, order]
-    by_source("weights of the package", answers_of(recorded, chances, truth), names)
+    chances /= chances.sum(axis=1, keepdims=True)  # if it is one of these
+    by_source(f"weights of the package, {radar}", answers_of(recorded, chances, truth), names)
 
 
 def people_left_out(actors: Collection, recorded: Collection) -> None:
@@ -308,54 +351,37 @@ def learning_curve(actors: Collection, recorded: Collection, draws: int = 24) ->
 def others(out: Path) -> None:
     """Print what the weights of the package call each activity of each source, known or not.
 
-    Those who move unlike any that the weights have learnt from are counted as well.
+    Counted as well are windows of which they say that it is probably something else, and those
+    that are unlike any that they have learnt from.
     """
-    recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[int, bool]]]()
-    every = ("mocap", "mocap_others", "joints", "joints_others")
-    clouds = Collection(*(out / name for name in every if (out / name).exists()))
-    windows = windows_of(clouds)
-    answers = recogniser.probabilities(windows).argmax(axis=1).tolist()
+    recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[int, bool, bool]]]()
+    clouds = Collection(*recordings(out).folders, *recordings(out, "_others").folders)
+    windows, place = windows_of(clouds), recogniser.classes.index(OTHER)
+    chances = recogniser.probabilities(windows)
+    names = [name for name in recogniser.classes if name != OTHER]
+    answers = np.delete(chances, place, axis=1).argmax(axis=1).tolist()
+    other = chances[:, place] > 0.5
     sources = [str(name).split("_")[0] for name in clouds.column("subject")]
-    for label, source, window, answer in zip(
-        clouds.labels.tolist(), sources, windows, answers, strict=True
+    for label, source, window, answer, none in zip(
+        clouds.labels.tolist(), sources, windows, answers, other.tolist(), strict=True
     ):
         unlike = recogniser.distance([window]) > 1
-        found.setdefault((label, source), []).append((answer, unlike))
-    names = "".join(f"{name:>15}" for name in recogniser.classes)
-    print(f"{'activity':20}{'source':14}{names} unlike")
+        found.setdefault((label, source), []).append((answer, none, unlike))
+    titles = "".join(f"{name:>15}" for name in names)
+    print(f"{'activity':20}{'source':14}{titles}   other unlike")
     for (label, source), row in sorted(found.items()):
-        counts = Counter(answer for answer, _ in row)
-        shown = "".join(f"{counts[one]:15}" for one in range(len(recogniser.classes)))
-        print(f"{label:20}{source:14}{shown}{sum(unlike for _, unlike in row):7}")
-
-
-def fifth_class(actors: Collection, recorded: Collection, out: Path) -> None:
-    """Print what a forest that has learnt a fifth class, of other activities, puts into it."""
-    (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
-    more = described(Collection(out / "actors_others"))
-    x = np.concatenate([described(actors), more])
-    model = forest().fit(x, np.concatenate([learnt, np.full(len(more), len(names))]))
-    answers = answers_of(recorded, model.predict_proba(described(recorded)), truth)
-    told("forest that has learnt other activities", answers)
-    unknown = Collection(out / "mocap_others", out / "joints_others")
-    in_fifth, labels = model.predict(described(unknown)) == len(names), unknown.labels
-    for label in np.unique(labels):
-        own = in_fifth[labels == label]
-        print(f"{label:20}{own.size:5} windows, in the fifth class: {own.mean():6.1%}")
-    goes = [one for one in np.unique(labels) if one.startswith(("walk_", "run"))]
-    stays = ~np.isin(labels, goes) | np.isin(labels, ["walk_in_place", "run_in_place"])
-    print(f"all who stay in place: {in_fifth[stays].mean():.1%} of {np.count_nonzero(stays)}")
-
-
-def channels(out: Path) -> None:
-    """What clouds of few channels differ in from those of all, feature by feature."""
-    few, many = (described(Collection(out / f"channels_{name}")) for name in ("few", "all"))
-    spread = many.std(axis=0) + 1e-9
-    off = np.abs(few.mean(axis=0) - many.mean(axis=0)) / spread
-    print(
-        f"few channels: means of {off.size} features are off by {np.median(off):.2f} of their "
-        f"spread, at most {off.max():.2f}"
-    )
+        answered, none, unlike = zip(*row, strict=True)
+        counts = "".join(f"{answered.count(one):15}" for one in range(len(names)))
+        print(f"{label:20}{source:14}{counts}{sum(none):8}{sum(unlike):7}")
+    known = np.isin(clouds.labels, names)
+    goes = np.array([label.startswith(("walk_", "run")) for label in clouds.labels.tolist()])
+    goes &= ~np.isin(clouds.labels, ["walk_in_place", "run_in_place"])
+    for title, some in (
+        ("the activities that are named", known),
+        ("others, of people who go somewhere", ~known & goes),
+        ("others, of people who stay in place", ~known & ~goes),
+    ):
+        print(f"{title}: {other[some].mean():.1%} of {np.count_nonzero(some)} are called other")
 
 
 def main() -> int:
@@ -367,7 +393,7 @@ def main() -> int:
     parser.add_argument(
         "--measure",
         metavar="NAME,...",
-        help="some of axes, shipped, learnt, people, curve, others, fifth",
+        help="some of axes, shipped, channels, learnt, people, networks, curve, others",
     )
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
@@ -379,21 +405,20 @@ def main() -> int:
     if options.only:
         return 0
     actors = Merged(out / "actors")
-    recorded = Collection(*(out / name for name in ("mocap", "joints") if (out / name).exists()))
+    recorded = recordings(out)
     print("balanced accuracy of windows, of recordings (95 % over people)")
     parts = {
         "axes": lambda: one_axis(actors, recorded),
-        "shipped": lambda: shipped(recorded),
+        "shipped": lambda: shipped(recorded, "few channels"),
+        "channels": lambda: shipped(recordings(out, "_all_channels"), "96 channels"),
         "learnt": lambda: to_recorded(actors, recorded, options.seeds),
         "people": lambda: people_left_out(actors, recorded),
+        "networks": lambda: networks(actors, recorded),
         "curve": lambda: learning_curve(actors, recorded),
         "others": lambda: others(out),
-        "fifth": lambda: fifth_class(actors, recorded, out),
     }
     for name in options.measure.split(",") if options.measure else parts:
         parts[name]()
-    if (out / "channels_all").exists() and not options.measure:
-        channels(out)
     return 0
 
 

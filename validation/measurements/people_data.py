@@ -29,6 +29,7 @@ snr_db = [15.0, 25.0]
 offset_x_m = [-0.3, 0.3]
 offset_y_m = [-0.3, 0.3]
 """
+KEPT = 'keep = ["spectrograms"]\n'
 FEW = Path(__file__).resolve().parents[1] / "few_channels.toml"
 ACTIVITIES = {
     "walk": "walk",
@@ -39,9 +40,6 @@ ACTIVITIES = {
     "jumping_jacks": "jumping_jack",
 }
 """Activities of an actor by the names that the recordings have."""
-
-OTHERS = ("sit", "bend", "squat", "wave", "jump", "stand", "walk_in_place", "fall")
-"""Activities of actors that the weights of the package have not learnt."""
 
 WINDOW_S = 1.6
 
@@ -108,22 +106,16 @@ def _recording(
 def data_sets(out: Path, most: int) -> dict[str, str]:
     """Text of the specification of every data set, by its name."""
     (out / "few_channels.toml").write_bytes(FEW.read_bytes())
-    found = {}
-    for name, variable, those in (
+    found = {"actors": KEPT + (FEW.parent / "actors.toml").read_text()}
+    for name, variable, of in (
         ("mocap", "RTRADAR_MOCAP", of_mocap),
         ("joints", "RTRADAR_JOINTS", partial(of_joints, most=most)),
-        ("mocap_others", "RTRADAR_MOCAP", partial(of_mocap, known=False)),
-        ("joints_others", "RTRADAR_JOINTS", partial(of_joints, most=most, known=False)),
     ):
         if folder := os.environ.get(variable):
-            found[name] = HEAD.format(folder=f"${{{variable}}}") + those(Path(folder))
-    found["actors"] = (FEW.parent / "actors.toml").read_text()
-    head, _, _ = found["actors"].partition("[[synthetic]]")
-    found["actors_others"] = head + "".join(
-        f'[[synthetic]]\nlabel = "{label}"\ncount = 24\nsubjects = 200\n\n' for label in OTHERS
-    )
-    found["channels_few"] = found["actors"].replace("count = 60", "count = 10")
-    found["channels_all"] = found["channels_few"].replace("few_channels.toml", "paper-12ghz")
+            head = HEAD.format(folder=f"${{{variable}}}")
+            found[name] = KEPT + head + of(Path(folder))
+            found[f"{name}_all_channels"] = found[name].replace(FEW.name, "paper-12ghz")
+            found[f"{name}_others"] = head + of(Path(folder), known=False)
     return found
 
 
