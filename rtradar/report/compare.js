@@ -47,4 +47,4 @@ async function main() {
   document.documentElement.dataset.ready = "true";
 }
 
-main();
+unpackPlotly().then(main);

@@ -1,4 +1,4 @@
-// What all pages draw with. Needs Plotly and the JSON in #report-data.
+// What all pages draw with. Needs the JSON in #report-data and, compressed in #plotly, Plotly.
 
 const data = JSON.parse(document.getElementById("report-data").textContent);
 // These buttons and no others: by default Plotly also offers to share the data on its own site.
@@ -9,6 +9,14 @@ const config = {
 const velocityLabel = "Velocity [m/s] (positive: receding)";
 // Visible on white and on black, its middle too.
 const velocityColours = [[0, "#1f6fd6"], [0.5, "#9a9aa2"], [1, "#d9371f"]];
+
+/** Unpack Plotly and run it. What it adds to the page is named in the policy, as what is in the page is. */
+async function unpackPlotly() {
+  const packed = Uint8Array.from(atob(document.getElementById("plotly").textContent), (letter) => letter.charCodeAt(0));
+  const script = document.createElement("script");
+  script.textContent = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  document.head.append(script);
+}
 
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 

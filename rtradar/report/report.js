@@ -62,4 +62,4 @@ async function main() {
   document.documentElement.dataset.ready = "true";
 }
 
-main();
+unpackPlotly().then(main);

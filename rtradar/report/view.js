@@ -1,3 +1,3 @@
 // The page of `rtradar view`: the linked views and nothing else.
 
-drawLinked().then(() => { document.documentElement.dataset.ready = "true"; });
+unpackPlotly().then(drawLinked).then(() => { document.documentElement.dataset.ready = "true"; });

@@ -42,7 +42,7 @@ def write_report(
 ) -> None:
     """Write a run as a page: what was seen, body and maps that move together, pictures and tables.
 
-    The file includes plotly.js (about 5 MB), and its content security policy forbids any request.
+    The file includes plotly.js (2.3 MB), and its content security policy forbids any request.
 
     Parameters
     ----------
