@@ -97,6 +97,8 @@ def varied_spectrograms(images: Tensor) -> Tensor:
     varied = functional.grid_sample(
         images[:, None], places, padding_mode="reflection", align_corners=False
     )[:, 0]
+    # Reflected in time only: beyond the fastest velocity of an image there is nothing.
+    varied = varied.masked_fill(places[..., 0].abs() > 1, 0.0)
     speed = torch.linspace(-FASTEST_MPS, FASTEST_MPS, images.shape[2]).abs()
     filtered = torch.rand(count, 1) < _FILTERED
     slow = filtered & (speed < _SLOW_MPS * torch.rand(count, 1))
