@@ -76,6 +76,29 @@ def _zone_points(k: Any) -> Calls:
 
 
 @kernel_case(
+    "scatter.zones.edge_search.expected_edges", "edge of a shadow on sides of 100 zones", 0
+)
+def _expected_edges(k: Any) -> Calls:
+    (maps, (radars, *_, points)), bisections = _zones(100), 8
+    # The zone of each pose is on part 0, and a ball stands before its specular point.
+    zone, ball, radius = np.arange(100), points + 0.1 * (radars - points), 0.01
+    start, angles = maps.rim[:, 0].max() * np.ones((100, 2)), np.linspace(0, 6, 100)
+    start *= np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    sides = maps, zone, start, -start, radars
+    centres, frames = np.stack([points, ball], axis=1), np.tile(np.eye(3), (100, 2, 1, 1))
+    body = np.zeros(100, dtype=np.int64), zone, centres, frames, np.full((2, 3), radius)
+
+    def hidden(n: int, ends: Any) -> Any:
+        line, there = ends - radars[n], ball[n] - radars[n]
+        square = np.sum(line * line, axis=1)
+        return there @ there - (line @ there) ** 2 / square < radius**2
+
+    out = np.empty(100, dtype=np.int64)
+    call = filled(k.expected_edges, *sides, *body, bisections, out=(out,))
+    return call, lambda: k.expected_edges_reference(*sides[:4], hidden, bisections)
+
+
+@kernel_case(
     "scatter.zones.zone_edges.open_fractions", "cells of a zone cut by an edge, counted", 0.06
 )
 def _open_fractions(k: Any) -> Calls:

@@ -33,11 +33,12 @@ from scipy.signal.windows import hann
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.kernels.jit import compiled
+from rtradar.kernels.scatter.zones.fresnel_zones import MERIDIANS
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
-from rtradar.scatter.fresnel_zones.visible_fraction import BISECTIONS
+from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, bounds_of
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
@@ -421,7 +422,7 @@ class Both:
     """The tracer's answers, with a count of those that the closed form contradicts."""
 
     def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
-        self._tracer, self._reference, self._calls = tracer, reference, 0
+        self._tracer, self._reference = tracer, reference
         self.lines, self.different = 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
@@ -438,12 +439,12 @@ class Both:
         self, origins: Array, targets: Array, group: NDArray[np.int64], *given: Any
     ) -> NDArray[np.bool_]:
         seen = self._tracer.clear(origins, targets, group, *given)
-        # Lines to corners of cells; those that bisect a side come ever nearer to an outline.
-        if self._calls % (1 + BISECTIONS) == 0:
+        # Lines to all corners of cells; those that look for an edge come ever nearer to an outline.
+        corners = 1 + MERIDIANS * (len(bounds_of(SHADOW_RAYS)) - 1)
+        if not (np.bincount(group) % corners).any():
             self.lines += len(seen)
             expected = self._reference.clear(origins, targets, group, *given)
             self.different += int((seen != expected).sum())
-        self._calls += 1
         return seen
 
 

@@ -6,9 +6,9 @@ On cells along the meridians of `rtradar.kernels.scatter.zones.fresnel_zones`
 
 with dL exact in float64 for each pair of antennas, f the open fraction of a cell, and w a window
 that falls to 0 at the rim: without it the rim itself would diffract. Mitsuba decides whether an
-antenna sees a corner of a cell. Where it sees one end of a side and not the other, more rays bisect
-that side until the edge is known to 1 / 16384 of it. So V changes smoothly as an edge
-wanders over the zones, and is exactly 1 in full view and 0 behind.
+antenna sees a corner of a cell. Where it sees one end of a side and not the other, a closed form
+says where to look for the edge, and more rays confirm it to 1 / 16384 of the side. So V changes
+smoothly as an edge wanders over the zones, and is exactly 1 in full view and 0 behind.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.zones.edge_search import expected_edges
 from rtradar.kernels.scatter.zones.fresnel_zones import (
     CELLS,
     MERIDIANS,
@@ -34,8 +35,11 @@ from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
 BISECTIONS = 13
-"""Rays that find an edge on a side of a cell. As an edge wanders in steps of 0.002 zones, second
-differences of V are 2e-4 with 11 rays, 6e-5 with 13, and would be 5e-6 with exact edges."""
+"""How often a side of a cell is halved for the piece that its edge is on. As an edge wanders in
+steps of 0.002 zones, second differences of V are 2e-4 if 11 times, 6e-5 if 13 times, and would be
+5e-6 with exact edges."""
+
+_PIECES = 1 << BISECTIONS
 
 _AT_ONCE = 216
 """Pairs of a zone and an antenna whose rays are traced together, `SHADOW_RAYS` to each zone."""
@@ -44,7 +48,7 @@ _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
 
 SHADOW_RAYS, LEAST_SHADOW_RAYS, MOST_SHADOW_RAYS = 400, 8, 4096
-"""Points on each part to which rays are traced from each antenna, before edges are bisected."""
+"""Points on each part to which rays are traced from each antenna, before edges are looked for."""
 
 Array = NDArray[np.float64]
 Bounds = NDArray[np.int64]
@@ -178,16 +182,60 @@ def _edges(tracer: BodyTracer, zones: Zones, poses: Poses, maps: ZoneMaps, bound
     # From the open end to the blocked one.
     swap = blocked[z, a, m, j][:, None]
     start, way = np.where(swap, last, first), np.where(swap, first - last, last - first)
-    origins, low = zones.antennas[z, a], np.zeros((len(z), 1))
-    for step in range(BISECTIONS):
-        middle = low + 0.5 ** (step + 1)
-        seen = tracer.clear(origins, _points(maps, z, start + middle * way), z, *whose)
-        low = np.where(seen[:, None], middle, low)
-    found = start + (low + 0.5 ** (BISECTIONS + 1)) * way
+    piece = _pieces(tracer, maps, (z, start, way, zones.antennas[z, a]), whose)
+    found = start + ((piece + 0.5) / _PIECES)[:, None] * way
     radial = np.zeros((n, antennas, MERIDIANS, bands, 2))
     ring = np.zeros((n, antennas, MERIDIANS, bands + 1, 2))
     radial[sides[0]], ring[sides[1]] = np.split(found, lengths[:1])
     return Edges(blocked, radial, ring)
+
+
+def _pieces(
+    tracer: BodyTracer,
+    maps: ZoneMaps,
+    sides: tuple[NDArray[np.int64], Array, Array, Array],
+    whose: tuple[NDArray[np.int64], NDArray[np.int64], Poses],
+) -> NDArray[np.int64]:
+    """On which of `_PIECES` equal pieces of each side (zone, start, way, antenna) the edge is.
+
+    Rays are traced to both ends of the piece on which a closed form expects the edge. Where they do
+    not confirm it, rays go to the pieces beside it, ever farther away, and to the middle of what is
+    left.
+    """
+    zone, start, way, origins = sides
+    expected = _expected(maps, sides, whose)
+    low, high = np.zeros_like(expected), np.full_like(expected, _PIECES)  # open, and blocked
+    reach = 0
+    while len(rest := np.flatnonzero(high - low > 1)):
+        middle = (low[rest] + high[rest]) // 2
+        asked = [expected[rest] - reach, expected[rest] + 1 + reach]
+        asked = [np.where((low[rest] < at) & (at < high[rest]), at, middle) for at in asked]
+        side, at = np.tile(rest, 2), np.concatenate(asked)
+        places = _points(maps, zone[side], start[side] + (at / _PIECES)[:, None] * way[side])
+        seen = tracer.clear(origins[side], places, zone[side], *whose)
+        for one, is_open in zip(asked, np.split(seen, 2), strict=True):
+            inside = (low[rest] < one) & (one < high[rest])
+            low[rest[inside & is_open]] = one[inside & is_open]
+            high[rest[inside & ~is_open]] = one[inside & ~is_open]
+        reach = 2 * reach + 1
+    return low
+
+
+def _expected(
+    maps: ZoneMaps,
+    sides: tuple[NDArray[np.int64], Array, Array, Array],
+    whose: tuple[NDArray[np.int64], NDArray[np.int64], Poses],
+) -> NDArray[np.int64]:
+    part, pose, poses = whose
+    out = np.empty(len(sides[0]), dtype=np.int64)
+    body = tuple(np.ascontiguousarray(a) for a in (poses.centres, poses.frames, poses.semi_axes))
+
+    def fill(begin: int) -> None:
+        some = [np.ascontiguousarray(a[begin : begin + 1024]) for a in sides]
+        expected_edges(maps, *some, part, pose, *body, BISECTIONS, out[begin : begin + 1024])
+
+    thread_map(fill, range(0, len(out), 1024))
+    return out
 
 
 def _points(maps: ZoneMaps, zone: NDArray[np.int64], places: Array) -> Array:

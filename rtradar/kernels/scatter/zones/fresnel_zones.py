@@ -196,22 +196,27 @@ def lay_zones_reference(tx, rx, centre, frame, axes, point, wavenumber):
     return (vectors / np.sqrt(wavenumber / 2 * values) @ vectors.T) @ tangents
 
 
+@inlined()
+def zone_point(maps, zone, x, y, u, out):
+    """Fill in the point (3,) on the ellipsoid at a place of a zone; ``u (3,)`` is overwritten."""
+    pole, along = maps.pole[zone], maps.along[zone]
+    for i in range(3):
+        u[i] = x * along[0, i] + y * along[1, i]
+    turn = math.sqrt(dot(u, u))
+    scale = math.sin(turn) / turn if turn > 0 else 1.0
+    for i in range(3):
+        u[i] = math.cos(turn) * pole[i] + scale * u[i]
+    apply(maps.stretch[zone], u, out)
+    for i in range(3):
+        out[i] += maps.centre[zone, i]
+
+
 @compiled()
 def zone_points(maps, zone, x, y, out):
     """Fill in the points (n, 3) on ellipsoids at places x, y of zones (n,) in the plane of rho."""
     u = np.empty(3)
     for n in range(len(zone)):
-        z = zone[n]
-        pole, along = maps.pole[z], maps.along[z]
-        for i in range(3):
-            u[i] = x[n] * along[0, i] + y[n] * along[1, i]
-        turn = math.sqrt(dot(u, u))
-        scale = math.sin(turn) / turn if turn > 0 else 1.0
-        for i in range(3):
-            u[i] = math.cos(turn) * pole[i] + scale * u[i]
-        apply(maps.stretch[z], u, out[n])
-        for i in range(3):
-            out[n, i] += maps.centre[z, i]
+        zone_point(maps, zone[n], x[n], y[n], u, out[n])
 
 
 def zone_points_reference(maps, zone, x, y):

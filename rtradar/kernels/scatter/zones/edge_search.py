@@ -1,0 +1,103 @@
+"""Where an edge is expected on the side of a cell of Fresnel zones: a closed form, in float64.
+
+It only says where rays are worth tracing. Whether a line of sight is clear is for Mitsuba to say.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rtradar.kernels.elementary import apply, dot, subtract
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.zones.fresnel_zones import zone_point, zone_points_reference
+
+
+@inlined()
+def _meets_sphere(start, way):
+    """Whether the line from ``start`` to ``start + way`` (3,) comes within 1 of the origin."""
+    span, back, square = dot(way, way), -dot(start, way), dot(start, start)
+    if back <= 0:
+        return square < 1
+    if back >= span:
+        return square - 2 * back + span < 1
+    return square * span - back * back < span
+
+
+@inlined()
+def _candidates(origin, target, far, own, centres, longest, found):
+    """Fill in the parts whose balls the lines from an antenna to within ``far`` of a point meet."""
+    way, gap, count = np.empty(3), np.empty(3), 0
+    subtract(target, origin, way)
+    span = dot(way, way)
+    for part in range(len(longest)):
+        if part != own:
+            subtract(centres[part], origin, gap)
+            fraction = min(1.0, max(0.0, dot(gap, way) / span))
+            for i in range(3):
+                gap[i] -= fraction * way[i]
+            if dot(gap, gap) < (longest[part] + far) ** 2:
+                found[count] = part
+                count += 1
+    return count
+
+
+@compiled()
+def expected_edges(
+    maps, zone, start, way, origins, own, pose, centres, frames, semi_axes, bisections, out
+):
+    """Fill in on which of 2^bisections equal pieces of each side the edge is expected, (side,).
+
+    Sides go from ``start`` by ``way (side, 2)`` in the plane of rho of their ``zone (side,)``, from
+    the open end to the blocked one, as the antennas at ``origins (side, 3)`` [m] see them. Zones
+    are on the part ``own (zone,)``, which does not occlude itself, in the pose ``pose (zone,)`` of
+    a body: ``centres (pose, part, 3)``, ``frames (pose, part, 3, 3)``, ``semi_axes (part, 3)`` [m].
+    """
+    parts = len(semi_axes)
+    longest = np.empty(parts)
+    for part in range(parts):
+        longest[part] = max(semi_axes[part, 0], max(semi_axes[part, 1], semi_axes[part, 2]))
+    maps_of = np.empty(frames.shape)  # world axes to those in which a part is the unit sphere
+    for p in range(len(frames)):
+        for part in range(parts):
+            for i in range(3):
+                for j in range(3):
+                    maps_of[p, part, i, j] = frames[p, part, j, i] / semi_axes[part, i]
+    u, point, end, line, gap = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    a, b, near = np.empty(3), np.empty(3), np.empty(parts, dtype=np.int64)
+    for side in range(len(zone)):
+        z, origin = zone[side], origins[side]
+        x, y, dx, dy = start[side, 0], start[side, 1], way[side, 0], way[side, 1]
+        body, there = centres[pose[z]], maps_of[pose[z]]
+        zone_point(maps, z, x, y, u, point)
+        zone_point(maps, z, x + dx, y + dy, u, end)
+        subtract(end, point, gap)
+        count = _candidates(origin, point, math.sqrt(dot(gap, gap)), own[z], body, longest, near)
+        low, step = 0, 1 << bisections
+        for _ in range(bisections):
+            step >>= 1
+            fraction = (low + step) / (1 << bisections)
+            zone_point(maps, z, x + fraction * dx, y + fraction * dy, u, point)
+            subtract(point, origin, line)
+            blocked = False
+            for n in range(count):
+                subtract(origin, body[near[n]], gap)
+                apply(there[near[n]], gap, a)
+                apply(there[near[n]], line, b)
+                if _meets_sphere(a, b):
+                    blocked = True
+                    break
+            if not blocked:
+                low += step
+        out[side] = low
+
+
+def expected_edges_reference(maps, zone, start, way, hidden, bisections):
+    """Pieces (side,) of `expected_edges`, where ``hidden`` says it of points seen on a side."""
+    pieces, found = np.arange(1 << bisections) / (1 << bisections), []
+    for side, (z, first, along) in enumerate(zip(zone, start, way, strict=True)):
+        x, y = (first + pieces[:, None] * along).T
+        seen = ~hidden(side, zone_points_reference(maps, np.full(len(x), z), x, y))
+        found.append(np.flatnonzero(seen)[-1])
+    return np.array(found)
