@@ -19,7 +19,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import rtradar as rt
-from rtradar.system import threads
+from rtradar.system import figure_style, threads
 from rtradar.trace.backends.backend import Backend, available, select, use
 
 # The same examples every time, and no limit of time, because kernels are compiled when first used.
@@ -59,6 +59,7 @@ class _Pictures:
 
     drawn = False
     save = Figure.savefig
+    write_png = figure_style.write_png
 
     @staticmethod
     @cache
@@ -75,13 +76,28 @@ class _Pictures:
         kind = options.get("format") or Path(file).suffix[1:]
         if _Pictures.drawn or kind != "png":
             _Pictures.save(figure, file, **options)
-        elif hasattr(file, "write"):
+        else:
+            _Pictures.write_blank(file)
+
+    @staticmethod
+    def write_or_blank(figure: Figure, file: Any) -> None:
+        """Do what `figure_style.write_png` does, or save a blank picture."""
+        if _Pictures.drawn:
+            _Pictures.write_png(figure, file)
+        else:
+            _Pictures.write_blank(file)
+
+    @staticmethod
+    def write_blank(file: Any) -> None:
+        """Write a blank picture to a path, or to an open file."""
+        if hasattr(file, "write"):
             file.write(_Pictures.blank())
         else:
             Path(file).write_bytes(_Pictures.blank())
 
 
 Figure.savefig = _Pictures.save_or_blank
+figure_style.write_png = _Pictures.write_or_blank
 
 
 @pytest.hookimpl(tryfirst=True)

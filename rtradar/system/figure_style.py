@@ -112,7 +112,7 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
 
 
 def save_figure(figure: Any, file: Path | BinaryIO) -> None:
-    """Save a figure in the format of the path's suffix, or as PNG to an open file, and clear it.
+    """Save a figure as PNG, and clear it.
 
     Figure and axes refer to each other. Without clearing, the memory of one picture could
     still be in use with the next, until Python's garbage collector runs.
@@ -128,8 +128,26 @@ def save_figure(figure: Any, file: Path | BinaryIO) -> None:
 
     for text in figure.findobj(Text):  # names of files, radars and walls may have dollar signs
         text.set_parse_math(False)
-    figure.savefig(file, format=None if isinstance(file, Path) else "png")
+    write_png(figure, file)
     figure.clear()
+
+
+def write_png(figure: Any, file: Path | BinaryIO) -> None:
+    """Lay out a figure and draw it, once: `Figure.savefig` draws before that in order to lay out.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure of `new_figure`.
+    file : Path or binary file
+        Path, or file open for writing.
+    """
+    from matplotlib.backend_bases import FigureCanvasBase
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(file)
+    FigureCanvasBase(figure)  # in place of the canvas that holds what was drawn
 
 
 def png_of(figure: Any) -> bytes:

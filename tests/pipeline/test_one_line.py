@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 import rtradar as rt
 from rtradar.exchange import read_cloud
 from rtradar.pipeline.view import load_run_view, view
+from rtradar.system import figure_style
 
 pytestmark = pytest.mark.drawn
 
@@ -32,13 +33,12 @@ def made(
     """The line, the folder of a run, and the figures drawn for it by the names of their files."""
     figures: dict[str, Figure] = {}
 
-    def save(figure: Figure, file: Path, **_: object) -> None:
-        figures[file.name] = pickle.loads(
-            pickle.dumps(figure)
-        )  # as it is now, for afterwards it is emptied
-        original(figure, file, **_)
+    def save(figure: Figure, file: Path) -> None:
+        # As it is now, for afterwards it is emptied.
+        figures[file.name] = pickle.loads(pickle.dumps(figure))
+        original(figure, file)
 
-    out, original = tmp_path_factory.mktemp("made"), Figure.savefig
+    out, original = tmp_path_factory.mktemp("made"), figure_style.write_png
     radar = rt.Radar(
         chirp_duration_s=250e-6,
         samples_per_chirp=128,
@@ -46,7 +46,7 @@ def made(
         **LINES[request.param],
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, "savefig", save)
+        patch.setattr(figure_style, "write_png", save)
         rt.run(
             rt.synthetic_motion("walk", seed=0, duration_s=0.2), radar, out=out, fidelity="analytic"
         )

@@ -19,6 +19,7 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import COLOURS
+from rtradar.system import figure_style
 
 pytestmark = pytest.mark.drawn
 
@@ -132,7 +133,9 @@ def test_a_still_cuts_no_body_at_the_edge_of_its_axes(
     drawn: list[Figure] = []
     # As it was then, for afterwards it is emptied.
     monkeypatch.setattr(
-        Figure, "savefig", lambda figure, *_, **__: drawn.append(pickle.loads(pickle.dumps(figure)))
+        figure_style,
+        "write_png",
+        lambda figure, _: drawn.append(pickle.loads(pickle.dumps(figure))),
     )
     view(made, still=tmp_path / "a.png", time_s=0.1)
     views = [axes for axes in drawn[0].axes if axes.name == "3d"]

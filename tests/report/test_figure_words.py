@@ -45,6 +45,7 @@ from rtradar.report.pages.comparison import (
 )
 from rtradar.scene import Wall, material
 from rtradar.signal import synthesize
+from rtradar.system import figure_style
 from rtradar.system.figure_style import new_figure, save_figure
 
 pytestmark = pytest.mark.drawn
@@ -65,9 +66,9 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     figures: list[Figure] = []
     # As it was then, for afterwards it is emptied.
     monkeypatch.setattr(
-        Figure,
-        "savefig",
-        lambda figure, *_, **__: figures.append(pickle.loads(pickle.dumps(figure))),
+        figure_style,
+        "write_png",
+        lambda figure, _: figures.append(pickle.loads(pickle.dumps(figure))),
     )
     return figures
 

@@ -18,6 +18,9 @@ from rtradar.system.figure_style import DIVERGING
 _COLUMNS = 600
 """Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""
 
+_ROWS = 1024
+"""Time steps of a map that are read at once."""
+
 _NOISY = 0.02  # fraction of the detected ranges whose strongest angle may be one of noise
 
 
@@ -64,7 +67,7 @@ def thinned(
     Parameters
     ----------
     data : (time, ...) xarray.DataArray or h5py.Dataset
-        Map, of which one step at a time is read.
+        Map, of which a part at a time is read.
     times : (time,) float64
         Times of the map [s].
 
@@ -76,8 +79,18 @@ def thinned(
         Mean time of each step [s].
     """
     every = max(1, math.ceil(len(data) / _COLUMNS))
-    if every == 1:  # in one go, for each access to a file takes its time
+    if every == 1:
         return np.asarray(data), times
-    steps = [slice(first, first + every) for first in range(0, len(data), every)]
-    power = np.stack([np.asarray(data[step]).mean(axis=0) for step in steps])
-    return power, np.array([times[step].mean() for step in steps])
+    at_once = every * max(1, _ROWS // every)  # each access to a file takes its time
+    power = np.concatenate(
+        [
+            _means(np.asarray(data[first : first + at_once]), every)
+            for first in range(0, len(data), at_once)
+        ]
+    )
+    return power, _means(times, every)
+
+
+def _means(values: NDArray[Any], every: int) -> NDArray[Any]:
+    """Means of so many steps each, the last of what is left."""
+    return np.stack([values[k : k + every].mean(axis=0) for k in range(0, len(values), every)])
