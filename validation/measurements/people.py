@@ -216,37 +216,6 @@ def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
         told(f"{title}, and the forest", answers_of(recorded, both_say, truth))
 
 
-def networks(actors: Collection, recorded: Collection, parts: int = 5) -> None:
-    """Leave a fifth of the people out in turn, for networks over clouds and over spectrograms.
-
-    Their answers are averaged with each other's, and with those of `both`.
-    """
-    (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
-    groups, features = subjects_of(recorded) % parts, described(recorded)
-    found = {"both": left_out(features, truth, groups, both, (described(actors), learnt))}
-    for recipe in (SMALL, SPECTROGRAM):
-        more, own = (stacked_for(clouds, recipe) for clouds in (actors, recorded))
-        least = min(more.shape[1], own.shape[1])  # points are in random order
-        more, own = more[:, :least], own[:, :least]
-        found[recipe.name] = np.zeros((len(truth), len(names)))
-        for part in range(parts):
-            learn, ask = np.flatnonzero(groups != part), np.flatnonzero(groups == part)
-            some = np.tile(learn, RECORDED_OVER_ACTORS)
-            taught = Examples(
-                torch.cat([own[some], more]),
-                torch.from_numpy(np.append(truth[some], learnt)),
-                names,
-            )
-            asked = Examples(own[ask], torch.from_numpy(truth[ask]), names)
-            network, _ = train_network(taught, asked, recipe)
-            found[recipe.name][ask] = np.exp(predict(network, asked, recipe))
-    clouds, spectrograms = found["small"], found["spectrogram"]
-    found["clouds and spectrograms, networks"] = (clouds + spectrograms) / 2
-    found["both, and spectrograms"] = (found["both"] + spectrograms) / 2
-    for title, chances in found.items():
-        told(f"a fifth of the people left out, {title}", answers_of(recorded, chances, truth))
-
-
 def by_source(title: str, answers: Answers, names: tuple[str, ...]) -> None:
     """Print what is known of all recordings, of those of each source, and what is mistaken."""
     told(title, answers)
@@ -393,7 +362,7 @@ def main() -> int:
     parser.add_argument(
         "--measure",
         metavar="NAME,...",
-        help="some of axes, shipped, channels, learnt, people, networks, curve, others",
+        help="some of axes, shipped, channels, learnt, people, curve, others",
     )
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
@@ -413,7 +382,6 @@ def main() -> int:
         "channels": lambda: shipped(recordings(out, "_all_channels"), "96 channels"),
         "learnt": lambda: to_recorded(actors, recorded, options.seeds),
         "people": lambda: people_left_out(actors, recorded),
-        "networks": lambda: networks(actors, recorded),
         "curve": lambda: learning_curve(actors, recorded),
         "others": lambda: others(out),
     }
