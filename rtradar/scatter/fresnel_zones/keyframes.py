@@ -34,11 +34,14 @@ _KEPT_KEYFRAMES = 1024
 """Keyframes remembered, 10 s of them in some 40 MB, so that the pass that measures power and the
 pass that makes the signal trace once; longer recordings trace again from there on."""
 
+_KEPT_INTERVALS = 512
+"""Intervals remembered, 5 s of them in some 45 MB: the view asks again when the signal is made."""
+
 _AT_ONCE = 16
 """Intervals whose rays are traced together."""
 
 _PASSING = 8 * _AT_ONCE
-"""Keyframes held at a time beyond those, and intervals: each interval needs six keyframes."""
+"""Keyframes, and intervals, held at a time beyond those: each interval needs six keyframes."""
 
 _FINE, _FINE_FREQUENCY_HZ = 8, 14e9
 """Keyframes to 10 ms where the fraction bends, at that frequency; Fresnel zones are as narrow as
@@ -76,7 +79,7 @@ class ZoneFractions:
         self._keyframes: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(
             _KEPT_KEYFRAMES, _PASSING
         )
-        self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _PASSING)
+        self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(_KEPT_INTERVALS, _PASSING)
 
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
