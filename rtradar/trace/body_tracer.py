@@ -7,6 +7,7 @@ float64 in `validation/other_methods/occlusion.py`.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -23,6 +24,8 @@ from rtradar.trace.rays import any_met
 _LINES_A_THREAD = 1 << 14
 """For fewer, waking threads costs more than the work."""
 
+_LOADING = threading.Lock()
+
 
 class UnitSphere:
     """The unit sphere in a Mitsuba scene of its own, made for the first rays."""
@@ -33,9 +36,10 @@ class UnitSphere:
 
     def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which rays (7, ray) meet it: start, unit direction and length in its axes."""
-        if self._scene is None and rays.size:
-            self._mi = self._mi() if callable(self._mi) else self._mi
-            self._scene = self._mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
+        with _LOADING:
+            if self._scene is None and rays.size:
+                self._mi = self._mi() if callable(self._mi) else self._mi
+                self._scene = self._mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
         return any_met(self._mi, self._scene, rays)
 
 

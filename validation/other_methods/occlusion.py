@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -423,6 +424,7 @@ class Both:
 
     def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
         self._tracer, self._reference = tracer, reference
+        self._counting = Lock()  # zones are looked at in several threads
         self.lines, self.different = 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
@@ -442,9 +444,10 @@ class Both:
         # Lines to all corners of cells; those that look for an edge come ever nearer to an outline.
         corners = 1 + MERIDIANS * (len(bounds_of(SHADOW_RAYS)) - 1)
         if not (np.bincount(group) % corners).any():
-            self.lines += len(seen)
             expected = self._reference.clear(origins, targets, group, *given)
-            self.different += int((seen != expected).sum())
+            with self._counting:
+                self.lines += len(seen)
+                self.different += int((seen != expected).sum())
         return seen
 
 

@@ -92,17 +92,19 @@ def zone_fractions(
     bounds = bounds_of(shadow_rays)
     out = np.ones((len(zones.part), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
     step = max(1, _AT_ONCE * SHADOW_RAYS // (shadow_rays * zones.antennas.shape[1]))
-    for begin in range(0, len(out), step):
+
+    def fill(begin: int) -> None:
         own = slice(begin, begin + step)
         some = Zones._make(np.ascontiguousarray(field[own]) for field in zones)
         maps = _maps(some, poses)
         edges = _edges(tracer, some, poses, maps, bounds)
         cut = np.flatnonzero(edges.blocked.any(axis=(1, 2, 3)) & maps.exists)
-        if not len(cut):
-            continue
-        maps, edges = ZoneMaps._make(a[cut] for a in maps), Edges._make(a[cut] for a in edges)
-        given = (some.points[cut], some.antennas[cut], pairs, wavenumber[own][cut])
-        out[begin + cut] = _sums(maps, edges, bounds, *given)
+        if len(cut):
+            maps, edges = ZoneMaps._make(a[cut] for a in maps), Edges._make(a[cut] for a in edges)
+            given = (some.points[cut], some.antennas[cut], pairs, wavenumber[own][cut])
+            out[begin + cut] = _sums(maps, edges, bounds, *given)
+
+    thread_map(fill, range(0, len(out), step))
     return out
 
 
