@@ -116,7 +116,7 @@ def _zone_sums(k: Any) -> Calls:
     fractions = np.clip(rng.uniform(-0.5, 1.5, (3, k.MERIDIANS, k.CELLS)), 0, 1)
     wavenumber, out = np.array([[_WAVENUMBER]]), np.empty((1, 1, 2), dtype=np.complex128)
     rest = given[5], antennas[None], pairs, wavenumber, fractions[None]
-    call = filled(k.zone_sums, 0, 1, maps, *rest, out=(out,))
+    call = filled(k.zone_sums, maps, *rest, out=(out,))
     return call, lambda: k.zone_sums_reference(maps, 0, antennas, pairs, _WAVENUMBER, fractions)
 
 

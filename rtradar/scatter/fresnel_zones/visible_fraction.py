@@ -44,9 +44,6 @@ _PIECES = 1 << BISECTIONS
 _AT_ONCE = 216
 """Pairs of a zone and an antenna whose rays are traced together, `SHADOW_RAYS` to each zone."""
 
-_ZONES_A_THREAD = 8
-"""For fewer, waking threads costs more than the work."""
-
 SHADOW_RAYS, LEAST_SHADOW_RAYS, MOST_SHADOW_RAYS = 400, 8, 4096
 """Points on each part to which rays are traced from each antenna, before edges are looked for."""
 
@@ -230,26 +227,15 @@ def _expected(
 ) -> NDArray[np.int64]:
     part, pose, poses = whose
     out = np.empty(len(sides[0]), dtype=np.int64)
-    body = tuple(np.ascontiguousarray(a) for a in (poses.centres, poses.frames, poses.semi_axes))
-
-    def fill(begin: int) -> None:
-        some = [np.ascontiguousarray(a[begin : begin + 1024]) for a in sides]
-        expected_edges(maps, *some, part, pose, *body, BISECTIONS, out[begin : begin + 1024])
-
-    thread_map(fill, range(0, len(out), 1024))
+    some = [*sides, part, pose, poses.centres, poses.frames, poses.semi_axes]
+    expected_edges(maps, *(np.ascontiguousarray(a) for a in some), BISECTIONS, out)
     return out
 
 
 def _points(maps: ZoneMaps, zone: NDArray[np.int64], places: Array) -> Array:
     """Points (n, 3) on the ellipsoids [m] at places (n, 2) in the plane of rho."""
     out = np.empty((len(zone), 3))
-    x, y = np.ascontiguousarray(places.T)
-
-    def fill(begin: int) -> None:
-        own = slice(begin, begin + 4096)
-        zone_points(maps, zone[own], x[own], y[own], out[own])
-
-    thread_map(fill, range(0, len(zone), 4096))
+    zone_points(maps, zone, *np.ascontiguousarray(places.T), out)
     return out
 
 
@@ -264,14 +250,7 @@ def _sums(
 ) -> NDArray[np.complex128]:
     out = np.empty((len(points), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
     fractions = np.empty((*edges.blocked.shape[:3], CELLS))
+    open_fractions(maps, edges, bounds, fractions)
     wavenumber = np.ascontiguousarray(wavenumber)
-
-    def add(begin: int) -> None:
-        end = min(begin + _ZONES_A_THREAD, len(points))
-        own = slice(begin, end)
-        some = ZoneMaps._make(a[own] for a in maps), Edges._make(a[own] for a in edges)
-        open_fractions(*some, bounds, fractions[own])
-        zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, out)
-
-    thread_map(add, range(0, len(points), _ZONES_A_THREAD))
+    zone_sums(maps, points, antennas, pairs, wavenumber, fractions, out)
     return out

@@ -292,8 +292,8 @@ def _spherical_wave(turns_per_metre, near, length, facing, real, imaginary):
 
 
 @compiled()
-def zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, out):
-    """Fill in V of the zones from ``begin`` to ``end``, ``out (zone, frequency, pair)``.
+def zone_sums(maps, points, antennas, pairs, wavenumber, fractions, out):
+    """Fill in V of zones, ``out (zone, frequency, pair)``.
 
     ``points (zone, 3)``, ``antennas (zone, antenna, 3)`` [m], ``pairs (pair, 2)``, ``wavenumber
     (zone, frequency)`` [rad/m], ``fractions`` of `open_fractions`.
@@ -305,7 +305,7 @@ def zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, 
     real = np.empty((frequencies, n_antennas, CELLS))
     imaginary = np.empty((frequencies, n_antennas, CELLS))
     sums = np.empty((frequencies, n_pairs, 5))
-    for zone in range(begin, end):
+    for zone in range(len(points)):
         pole, along = maps.pole[zone], maps.along[zone]
         # Area of a cell, without what changes along a meridian.
         y0, y1 = along[0], along[1]
