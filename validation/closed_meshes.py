@@ -16,6 +16,7 @@ import trimesh
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 _FINE = 2001
 
@@ -150,3 +151,9 @@ def spheroid(half_length_m: float, radius_m: float) -> EllipticBody:
         return np.asarray(radius_m * np.sqrt(np.maximum(1 - (x / half_length_m) ** 2, 0.0)))
 
     return EllipticBody(width, -half_length_m, half_length_m, 1.0)
+
+
+def limit(coarse: Complex, fine: Complex, squares: list[float]) -> Complex:
+    """Field for edges of no length, from two meshes and the squares of their edges."""
+    weight = squares[0] / (squares[0] - squares[1])
+    return weight * fine + (1 - weight) * coarse

@@ -31,7 +31,7 @@ from rtradar.validate.rows import Row, main
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
-from closed_meshes import geodesic_sphere, spheroid
+from closed_meshes import geodesic_sphere, limit, spheroid
 from helpers import field_db
 
 Array = NDArray[np.float64]
@@ -91,12 +91,6 @@ def worst_db(field: Complex, reference: Array) -> float:
     """Worst difference within 20 dB of the largest field."""
     strong = reference > reference.max() * 10 ** (-NEAR_LARGEST_DB / 20)
     return float(np.abs(field_db(field / reference))[strong].max())
-
-
-def limit(coarse: Complex, fine: Complex, squares: list[float]) -> Complex:
-    """Field for edges of no length, from two meshes and the squares of their edges."""
-    weight = squares[0] / (squares[0] - squares[1])
-    return weight * fine + (1 - weight) * coarse
 
 
 def sphere_rows(ka: float, divisions: tuple[int, int], limit_db: float) -> Iterator[Row]:

@@ -1,4 +1,4 @@
-"""Every fidelity level against full wave: single parts of a body, and coaxial pairs of spheres.
+"""Every fidelity level against full wave: single parts of a body, and pairs of spheres and limbs.
 
 The truth is `full-wave`, which ``full_wave.py`` holds against Mie's series and against multipoles;
 no level has a part in it. Parts of a synthetic walker are perfect conductors at the origin, seen by
@@ -6,6 +6,9 @@ one antenna at 4 m from along their axis to across it; frequencies are 12, 14 an
 are root mean squares over aspects and frequencies, of decibels and of the complex difference over
 the root mean square of the field. `reference` is here the same as `physical-optics`: nothing is
 interpolated. Figures are reported, not judged: optics is what it is.
+
+Limbs are a shank under a thigh, on one axis, by modes at 12 GHz, and a forearm across an upper arm
+by surfaces at 4.5 GHz, extrapolated from two meshes as in ``full_wave_surfaces.py``.
 
     python validation/other_methods/levels_against_full_wave.py [--quick] [--json FILE]
 """
@@ -21,14 +24,17 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 import rtradar as rt
+from rtradar.full_wave import ClosedMesh, ConductingSurface
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
+from closed_meshes import limit, spheroid
 from helpers import field_db, one_ellipsoid, rms
 
 Array = NDArray[np.float64]
@@ -40,6 +46,10 @@ LEVELS = ("analytic", "specular", "fresnel", "physical-optics", "reference", "ra
 ASPECTS_DEG = (10.0, 30.0, 50.0, 70.0, 90.0)
 PAIR_ASPECTS_DEG = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
 PARTS = ("thigh", "forearm", "foot", "head", "upper torso")
+TWICE = ("specular", "fresnel", "physical-optics")
+"""Levels that have reflections from part to part if asked; `rays` has three bounces here."""
+
+CROSSED_HZ, CROSSED_EDGES_M = 4.5e9, (7.2e-3, 6e-3)
 Polarization = Literal["v", "h"]
 
 
@@ -65,10 +75,15 @@ def field(
         )
 
 
-def parts() -> dict[str, rt.Ellipsoids]:
+def axes_of(name: str) -> Array:
+    """Semi-axes of a part of a walker [m], the last along the bone."""
     body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0))
     names = [name.removeprefix("left ") for name in body.part_names]
-    return {name: one_ellipsoid(body.semi_axes[names.index(name)]) for name in PARTS}
+    return np.asarray(body.semi_axes[names.index(name)])
+
+
+def parts() -> dict[str, rt.Ellipsoids]:
+    return {name: one_ellipsoid(axes_of(name)) for name in PARTS}
 
 
 def part_rows(quick: bool) -> Iterator[Row]:
@@ -118,8 +133,60 @@ def pair_rows(quick: bool) -> Iterator[Row]:
             yield reported(claim, "worst, 40 to 90 degrees", "dB", worst)
 
 
+def limb_rows(quick: bool) -> Iterator[Row]:
+    gap = 0.02
+    thigh, shank = axes_of("thigh"), axes_of("shank")
+    apart = thigh[2] + gap + shank[2]
+    coaxial = rt.Ellipsoids([[0, 0, 0], [0, 0, -apart]], [np.eye(3)] * 2, [thigh, shank])
+    at = antennas(PAIR_ASPECTS_DEG)
+    for polarization in ("v", "h") if not quick else ():
+        truth = field(coaxial, at, 12e9, "full-wave", polarization)
+        yield from of_levels(
+            f"shank under thigh, 12 GHz, {polarization.upper()}", coaxial, at, 12e9, truth
+        )
+    upper, fore = axes_of("upper arm"), axes_of("forearm")
+    for gap in (0.02, 0.10) if not quick else ():
+        # The forearm is before the upper arm, as seen from 90 degrees.
+        before = [upper[0] + gap + fore[0], 0.0, 0.0]
+        across = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+        crossed = rt.Ellipsoids([[0, 0, 0], before], [np.eye(3), across], [upper, fore])
+        surfaces = [
+            ConductingSurface(mesh_of(crossed, edge_m), CROSSED_HZ) for edge_m in CROSSED_EDGES_M
+        ]
+        squares = [1 / one.mesh.unknowns for one in surfaces]  # as that of an edge's length
+        for polarization in ("v", "h"):
+            coarse, fine = (one.scattering_length(at, at, polarization) for one in surfaces)
+            claim = f"forearm across upper arm, gap {100 * gap:g} cm, 4.5 GHz"
+            claim += f", {polarization.upper()}"
+            yield reported(claim, "rms of two meshes apart", "dB", rms(field_db(fine / coarse)))
+            truth = limit(coarse, fine, squares)
+            yield from of_levels(claim, crossed, at, CROSSED_HZ, truth)
+
+
+def mesh_of(limbs: rt.Ellipsoids, edge_m: float) -> ClosedMesh:
+    """One mesh of ellipsoids of revolution, with edges of about this length."""
+    meshes = []
+    for centre, frame, axes in zip(limbs.centres, limbs.frames, limbs.semi_axes, strict=True):
+        mesh = spheroid(axes[2], axes[0]).mesh(edge_m)
+        mesh.vertices = centre + mesh.vertices[:, [1, 2, 0]] @ frame.T
+        meshes.append(mesh)
+    whole = trimesh.util.concatenate(meshes)
+    return ClosedMesh(np.array(whole.vertices), np.array(whole.faces, dtype=np.int64))
+
+
+def of_levels(
+    claim: str, target: rt.Ellipsoids, at: Array, frequency: float, truth: Complex
+) -> Iterator[Row]:
+    polarization = "v" if claim.endswith("V") else "h"
+    levels = [(level, {}) for level in LEVELS] + [(level, {"bounces": 2}) for level in TWICE]
+    for level, options in levels:
+        found = field(target, at, frequency, level, polarization, **options)
+        name = f"{claim}, `{level}`" + (", two bounces" if options else "")
+        yield from compared(name, found, truth)
+
+
 def measure(quick: bool) -> list[Row]:
-    return [*part_rows(quick), *pair_rows(quick)]
+    return [*part_rows(quick), *pair_rows(quick), *limb_rows(quick)]
 
 
 if __name__ == "__main__":
