@@ -35,7 +35,9 @@ FREQUENCY_HZ, SPHERE_M, TIMES = 12e9, 0.05, 3
 SETTINGS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("analytic", {}),
     ("specular", {}),
+    ("specular", {"terms": 2}),
     ("specular", {"bounces": 2}),
+    ("specular", {"bounces": 2, "terms": 2}),
     ("fresnel", {}),
     ("fresnel", {"bounces": 2}),
     ("physical-optics", {}),
@@ -100,7 +102,7 @@ def measure() -> list[Outcome]:
     truths = [[case("full-wave") for case in cases] for cases in sets]
     found = []
     for level, options in SETTINGS:
-        name = level + (", two bounces" if options else "")
+        name = ", ".join([level, *(f"two {option}" for option in options)])
         of_sets = [
             measured(cases, truth, level, options)
             for cases, truth in zip(sets, truths, strict=True)
@@ -137,10 +139,10 @@ def draw(found: list[Outcome], path: Path) -> None:
         (panels[1], "Two parts", [one.pairs for one in found], [one.pairs_s for one in found]),
     ):
         for one, error, spent in zip(found, errors, seconds, strict=True):
-            level, twice = one.name.split(",")[0], "two" in one.name
+            level, *more = one.name.split(", ")
             colour = LIGHT.cycle[levels.index(level)]
             marker = {"color": colour, "markersize": 9, "alpha": 0.85}
-            shape = "s" if twice else "o"
+            shape = "os^D"[("two bounces" in more) + 2 * ("two terms" in more)]
             axes.semilogx(spent / seconds[0], error, shape, label=one.name, **marker)
         axes.set(xlabel="CPU time over that of analytic", ylim=(-1, 35), xlim=(0.5, 2e4))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body, Ellipsoids
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
@@ -16,6 +17,7 @@ from rtradar.scatter.double_reflections import (
     check_bounces,
     double_scattering,
 )
+from rtradar.scatter.specular_point.second_term import check_terms, with_second_term
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
 from rtradar.scatter.target import sum_of_echoes, target_geometry
@@ -30,11 +32,14 @@ class Specular(TwoBounceModel):
     ----------
     bounces : int
         1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`).
+    terms : int
+        1, or 2 for the second term of geometric optics as well
+        (`rtradar.scatter.specular_point.second_term`), at the middle of the sweep.
 
     Raises
     ------
     InputError
-        Where ``bounces`` is neither.
+        Where ``bounces`` or ``terms`` is neither.
     """
 
     fast_over_walls = True
@@ -49,9 +54,11 @@ class Specular(TwoBounceModel):
         polarization: Literal["v", "h"],
         variant: str = "auto",
         bounces: int = 1,
+        terms: int = 1,
     ) -> NDArray[np.complex128]:
         """Scattering length of one target."""
         check_bounces("specular", bounces)
+        check_terms("specular", terms)
         at = target_geometry(target, tx, rx)
         length, amplitude, points = solve_specular_points(
             at, polarization=polarization, points=True
@@ -59,7 +66,11 @@ class Specular(TwoBounceModel):
         tracer = BodyTracer(use(select(variant)), target.semi_axes)
         tracer.pose(target.centres, target.frames)
         visible = unobstructed(tracer, at.tx, at.rx, points)
-        field = sum_of_echoes(length, amplitude * visible, at, frequency)
+        left = visible.astype(np.complex128)
+        if terms == 2:
+            k = 2 * np.pi * frequency[:, None, None] / SPEED_OF_LIGHT_MPS
+            left *= with_second_term(at, points, polarization, k)
+        field = sum_of_echoes(length, amplitude * left, at, frequency)
         if bounces == 2:
             field += double_scattering(target, tx, rx, frequency, polarization, tracer)
         return field
@@ -72,8 +83,11 @@ class Specular(TwoBounceModel):
         variant: str = "auto",
         spreading: bool = True,
         bounces: int = 1,
+        terms: int = 1,
     ) -> None:
         check_bounces("specular", bounces)
+        check_terms("specular", terms)
+        self._terms = terms
         self._radar, self._body, self.spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
@@ -81,7 +95,8 @@ class Specular(TwoBounceModel):
         self.visibility = SpecularVisibility(radar, body, self.tracer)
         if bounces == 2:
             self._reflect_twice(radar, body, self.tracer, spreading=spreading)
-            # Each path over walls has reflections from part to part of its own.
+        if bounces == 2 or terms == 2:
+            # Each path over walls has these of its own.
             self.fast_over_walls = False
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -89,8 +104,20 @@ class Specular(TwoBounceModel):
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude = self.specular_echo(chirps, at)
         centre_hz = self._radar.centre_frequency_hz
-        single = one_echo_a_part(at.tx_index, length, amplitude, centre_hz)
+        if self._terms == 1:
+            single = one_echo_a_part(at.tx_index, length, amplitude, centre_hz)
+        else:
+            both = amplitude * self._both_terms(chirps, at, centre_hz).conj()
+            single = one_echo_a_part(at.tx_index, length, both, centre_hz)
         return self._with_doubles(single, chirps)
+
+    def _both_terms(
+        self, chirps: NDArray[np.int64], at: ChirpPoses, frequency_hz: float
+    ) -> NDArray[np.complex128]:
+        """Two terms of geometric optics over the first (chirp, rx, part)."""
+        start, k = self.visibility.at(chirps)[1], 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
+        points = solve_specular_points(at, start=start, points=True)[2]
+        return with_second_term(at, points, self._radar.polarization, np.array(k))
 
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None

@@ -1,0 +1,69 @@
+"""The second term of geometric optics in powers of 1/k, for conducting ellipsoids.
+
+The first term is that of a curved mirror. The second has two parts. One is of the shape: the area
+of an ellipsoid's section at the depth z below its specular point grows as z (1 - z / 2p), where p
+is the distance of the tangent plane from the centre. The other is of the currents, which are other
+where the surface bends more along the electric field than across it.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.kernels.elementary import smoothstep
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.scatter.common.polarization import antenna_field, unit
+from rtradar.scatter.common.poses import ChirpPoses
+
+Array = NDArray[np.float64]
+
+_FADES_DEG = (60.0, 90.0)
+"""Angles between Tx and Rx from which and to which the term fades. Conducting spheres of 4 and 6 cm
+at 12 to 16 GHz are nearer to full wave with it up to the first
+(`validation/other_methods/levels_against_full_wave.py`)."""
+
+
+def check_terms(fidelity: str, terms: int) -> None:
+    """Raise InputError unless one term of geometric optics is asked for, or two."""
+    if terms not in (1, 2):
+        raise InputError(
+            f"{fidelity}: terms = {terms!r}; it must be 1, for geometric optics, or 2 for the next "
+            "term in powers of 1/k as well"
+        )
+
+
+def with_second_term(
+    at: Geometry | ChirpPoses, points: Array, polarization: Literal["v", "h"], wavenumber: Array
+) -> NDArray[np.complex128]:
+    """Both terms over the first, for specular points (chirp, rx, part, 3), world [m].
+
+    The result (chirp, rx, part) is that of scattering lengths, for exp(+j omega t); ``wavenumber``
+    [rad/m] is one for all, or one that goes with these axes. Equation :eq:`second-term` of the
+    theory page. Where Tx and Rx are over 90 degrees apart, as a part sees them, it is 1.
+    """
+    ways = [unit(a - points) for a in (at.tx[:, None, None], at.rx[:, :, None])]
+    turned = np.swapaxes(at.frames, -1, -2)[:, None]
+
+    def in_axes(vectors: Array) -> Array:
+        return np.asarray((turned @ vectors[..., None])[..., 0])
+
+    inverse_squares = 1 / at.semi_axes**2
+    gradient = in_axes(points - at.centres[:, None]) * inverse_squares
+    size = np.linalg.norm(gradient, axis=-1)  # over the distance of the tangent plane
+    normal = gradient / size[..., None]
+    field = in_axes(antenna_field(ways[0], polarization))
+    along = unit(field - np.sum(field * normal, axis=-1, keepdims=True) * normal)
+    bends = [
+        np.sum(direction**2 * inverse_squares, axis=-1) / size
+        for direction in (along, np.cross(normal, along))
+    ]
+    cosine = np.sum(in_axes(ways[0] + ways[1]) * normal, axis=-1) / 2
+    shape = size / np.maximum(cosine, 1e-12)
+    apart = np.degrees(2 * np.arccos(np.clip(cosine, 0.0, 1.0)))
+    first, last = _FADES_DEG
+    left = 1 - smoothstep(np.clip((apart - first) / (last - first), 0.0, 1.0))
+    return np.asarray(1 + 1j * left * (shape + bends[0] - bends[1]) / (2 * wavenumber))
