@@ -35,7 +35,7 @@ def _add_paper(paper: OneLineParser) -> None:
     amount.add_argument(
         "--full",
         action="store_true",
-        help="train for table 4 anew, for about 16 hours, in place of the stored result",
+        help="train for table 4 anew, for about 18 hours, in place of the stored result",
     )
     paper.option(
         "--mocap",

@@ -68,7 +68,7 @@ def learning_figures(sources: Sources) -> dict[str, Any]:
         "lean": "; ".join(f"{size}: {mean:.1f}" for size, mean in result["lean"].items()),
         "median": float(np.median(chosen)),
         "quartiles": " and ".join(f"{value:.1f}" for value in np.quantile(chosen, (0.25, 0.75))),
-        "spatial": _spatial(result["spatial"]),
+        "spatial": _spatial(result["spatial"], full=sources.full),
     }
     trial, long = result["first_trial"], result["all_epochs"]
     found |= {
@@ -88,13 +88,13 @@ def _shown(one: Mapping[str, Any]) -> str:
     return f"{one['mean']:.1f} ± {one['spread']:.1f}"
 
 
-def _spatial(one: Mapping[str, Any]) -> str:
+def _spatial(one: Mapping[str, Any], *, full: bool) -> str:
     """Say what is known of spatial clouds."""
+    origin = "this run" if full else f"{one['script']}, commit {one['commit']} of {one['date']}"
     return (
         f"PointNet with the paper's settings and {one['points']} points of {one['clouds']} clouds: "
         f"{one['spatial']:.1f} % right on spatial clouds and {one['rdt']:.1f} % on the RDT clouds "
-        f"of the same captures, in {one['answers']} answers each ({one['script']}, commit "
-        f"{one['commit']} of {one['date']})"
+        f"of the same captures, in {one['answers']} answers each ({origin})"
     )
 
 

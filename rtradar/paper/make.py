@@ -60,7 +60,7 @@ def make_paper(
     quick : bool
         Whether table 3 takes one frame of one activity, and the run at 77 GHz 1 s.
     full : bool
-        Whether the trainings are done anew, in about 16 hours, and not taken from a stored result.
+        Whether the trainings are done anew, in about 18 hours, and not taken from a stored result.
     mocap : path, optional
         Folder of recordings of HDM05; without it synthetic actors do the activities.
     overwrite : bool

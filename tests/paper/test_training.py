@@ -16,7 +16,14 @@ from rtradar.paper.sources import Sources
 pytest.importorskip("dask")
 
 SIZES = ("500", "1000")
-RADAR = Path(__file__).parents[2] / "validation/few_channels.toml"
+RADAR = """
+name = "two by two"
+tx_y = 1
+tx_z = 1
+rx_y = 2
+rx_z = 2
+idle_s = 312.5e-6
+"""
 SPEC = """
 seed = 0
 [windows]
@@ -36,7 +43,7 @@ def test_all_trainings_are_done_once_and_fill_the_page(
     (tmp_path / "paper_400.toml").write_text(
         SPEC + "".join(f'[[synthetic]]\nlabel = "{one}"\ncount = 4\n' for one in ACTIVITIES)
     )
-    (tmp_path / "radar.toml").write_bytes(RADAR.read_bytes())
+    (tmp_path / "radar.toml").write_text(RADAR)
     monkeypatch.setattr(training, "validation_folder", lambda: tmp_path)
     monkeypatch.setattr(training, "train_study", partial(study.train_study, folds=2))
     # The rate is halved after every epoch, so that the trainings of the table end after two.
@@ -55,6 +62,7 @@ def test_all_trainings_are_done_once_and_fill_the_page(
     assert found["first_trial_epochs"] == 2
     assert 0 <= found["all_epochs_test_last"] <= 100
     assert found["best_clouds"] == 8  # one of two folds of 16
+    assert "in 16 answers each (this run)" in found["spatial"]
     # A second command finds all trainings done.
     monkeypatch.setattr(study.training, "train_network", None)
     assert learning_figures(sources) == found
