@@ -13,7 +13,7 @@ import numpy as np
 
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.facet_shadows import into_ball
-from rtradar.kernels.scatter.near_rays import NEAR, near_lines_reference
+from rtradar.kernels.scatter.near_rays import NEAR, longest_axes, near_lines_reference
 
 
 @inlined(fastmath=True)
@@ -140,10 +140,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     """
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start, local = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
-    longest = np.zeros(every)
-    for part in range(every):
-        for i in range(3):
-            longest[part] = max(longest[part], semi_axes[part, i])
+    longest = longest_axes(semi_axes)
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     nearest, near = np.empty(n_vertices), np.empty(n_vertices, dtype=np.int64)

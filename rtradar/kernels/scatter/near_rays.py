@@ -62,6 +62,28 @@ def _near_parts(origins, targets, group, own, pose, centres, longest):
     return near
 
 
+@inlined()
+def unit_sphere_maps(frames, semi_axes):
+    """Maps (pose, part, 3, 3) from world axes to those in which a part is the unit sphere."""
+    maps = np.empty(frames.shape)
+    for pose in range(len(frames)):
+        for part in range(len(semi_axes)):
+            for i in range(3):
+                for j in range(3):
+                    maps[pose, part, i, j] = frames[pose, part, j, i] / semi_axes[part, i]
+    return maps
+
+
+@inlined()
+def longest_axes(semi_axes):
+    """Return the longest semi-axis of each part (part,) [m]."""
+    longest = np.zeros(len(semi_axes))
+    for part in range(len(semi_axes)):
+        for i in range(3):
+            longest[part] = max(longest[part], semi_axes[part, i])
+    return longest
+
+
 @compiled()
 def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     """Return one ray for each line of sight and each part that this line comes near.
@@ -75,10 +97,7 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     radii before the point nearest to the centre of the unit sphere; the unit direction; the length.
     """
     parts = len(semi_axes)
-    longest = np.zeros(parts)
-    for part in range(parts):
-        for i in range(3):
-            longest[part] = max(longest[part], semi_axes[part, i])
+    longest = longest_axes(semi_axes)
     # First pass over the bounding balls alone, which says how much room the rays take.
     near = _near_parts(origins, targets, group, own, pose, centres, longest)
     near_count, near_part = np.zeros(len(own), dtype=np.int64), np.empty(near.shape, dtype=np.int64)
@@ -90,13 +109,7 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     most = 0
     for line in range(len(group)):
         most += near_count[group[line]]
-    # World axes to those in which a part is the unit sphere, row by row.
-    maps = np.empty(frames.shape)
-    for p in range(len(frames)):
-        for part in range(parts):
-            for i in range(3):
-                for j in range(3):
-                    maps[p, part, i, j] = frames[p, part, j, i] / semi_axes[part, i]
+    maps = unit_sphere_maps(frames, semi_axes)
     rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
     for line in range(len(group)):
         g = group[line]

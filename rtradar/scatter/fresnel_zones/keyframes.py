@@ -35,7 +35,7 @@ _KEPT_KEYFRAMES = 1024
 pass that makes the signal trace once; longer recordings trace again from there on."""
 
 _KEPT_INTERVALS = 512
-"""Intervals remembered, 5 s of them in some 45 MB: the view asks again when the signal is made."""
+"""Intervals remembered, 5 s of them: the view asks again when the signal is made."""
 
 _AT_ONCE = 16
 """Intervals whose rays are traced together."""

@@ -26,7 +26,6 @@ from rtradar.scatter.fresnel_zones.visible_fraction import (
     bounds_of,
     zone_fractions,
 )
-from rtradar.scatter.specular_point.second_term import check_terms, with_second_term
 from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backends.backend import select, use
@@ -54,15 +53,13 @@ def fresnel_scattering(
     variant: str = "auto",
     shadow_rays: int = SHADOW_RAYS,
     bounces: int = 1,
-    terms: int = 1,
 ) -> NDArray[np.complex128]:
     """Co-polar scattering length (n,) of ellipsoids that occlude each other, pair by pair.
 
-    Parameters, returns and errors are those of `scattering_length`; ``shadow_rays``,
-    ``bounces`` and ``terms`` are those of `Fresnel`. Equation :eq:`fresnel` of the theory page.
+    Parameters, returns and errors are those of `scattering_length`; ``shadow_rays`` and ``bounces``
+    are those of `Fresnel`. Equation :eq:`fresnel` of the theory page.
     """
     check_bounces("fresnel", bounces)
-    check_terms("fresnel", terms)
     pairs, parts = len(tx), len(target.semi_axes)
     at = target_geometry(target, tx, rx)
     length, amplitude, points = solve_specular_points(at, polarization=polarization, points=True)
@@ -76,8 +73,6 @@ def fresnel_scattering(
     poses = Poses(target.centres[None], target.frames[None], target.semi_axes)
     fractions = zone_fractions(tracer, zones, poses, np.array([[0, 1]]), k[:, None], shadow_rays)
     left = fractions.reshape(pairs, 1, parts)
-    if terms == 2:
-        left = left * with_second_term(at, points, polarization, wavenumber[:, None, None])
     field = sum_of_echoes(length, amplitude * left, at, frequency)
     if bounces == 2:
         field += double_scattering(target, tx, rx, frequency, polarization, tracer)
@@ -96,9 +91,6 @@ class Fresnel(TwoBounceModel):
     bounces : int
         1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`);
         of these a path is visible or not, without its zone.
-    terms : int
-        1, or 2 for the second term of geometric optics as well
-        (`rtradar.scatter.specular_point.second_term`).
 
     Raises
     ------
@@ -118,12 +110,9 @@ class Fresnel(TwoBounceModel):
         spreading: bool = True,
         shadow_rays: int = SHADOW_RAYS,
         bounces: int = 1,
-        terms: int = 1,
     ) -> None:
         bounds_of(shadow_rays)  # refuses what is out of range
         check_bounces("fresnel", bounces)
-        check_terms("fresnel", terms)
-        self._terms = terms
         self._radar, self._body, self._spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
@@ -140,14 +129,9 @@ class Fresnel(TwoBounceModel):
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         start, fractions = self._starts.at(chirps), self.fractions.at(chirps)
-        two = self._terms == 2
-        polarization = self._radar.polarization
-        length, amplitude, points = solve_specular_points(
-            at, start=start, polarization=polarization, spreading=self._spreading, points=two
+        length, amplitude, _ = solve_specular_points(
+            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
-        if two:
-            k = 2 * np.pi * self._frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
-            fractions = fractions * with_second_term(at, points, polarization, k)
         # The amplitude of an echo is the conjugate of the scattering length.
         left = amplitude * fractions.conj()
         single = one_echo_a_part(at.tx_index, length, left, self._frequency)

@@ -58,7 +58,7 @@ class Specular(TwoBounceModel):
     ) -> NDArray[np.complex128]:
         """Scattering length of one target."""
         check_bounces("specular", bounces)
-        check_terms("specular", terms)
+        check_terms(terms)
         at = target_geometry(target, tx, rx)
         length, amplitude, points = solve_specular_points(
             at, polarization=polarization, points=True
@@ -86,7 +86,7 @@ class Specular(TwoBounceModel):
         terms: int = 1,
     ) -> None:
         check_bounces("specular", bounces)
-        check_terms("specular", terms)
+        check_terms(terms)
         self._terms = terms
         self._radar, self._body, self.spreading = radar, body, spreading
         backend = select(variant)
@@ -102,32 +102,37 @@ class Specular(TwoBounceModel):
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        length, amplitude = self.specular_echo(chirps, at)
-        centre_hz = self._radar.centre_frequency_hz
-        if self._terms == 1:
-            single = one_echo_a_part(at.tx_index, length, amplitude, centre_hz)
-        else:
-            both = amplitude * self._both_terms(chirps, at, centre_hz).conj()
-            single = one_echo_a_part(at.tx_index, length, both, centre_hz)
+        length, amplitude, points = self._solved(chirps, at, points=self._terms == 2)
+        centre_hz, echo = self._radar.centre_frequency_hz, amplitude.astype(np.complex128)
+        if self._terms == 2:
+            k = np.array(2 * np.pi * centre_hz / SPEED_OF_LIGHT_MPS)
+            # The amplitude of an echo is the conjugate of the scattering length.
+            echo *= with_second_term(at, points, self._radar.polarization, k).conj()
+        single = one_echo_a_part(at.tx_index, length, echo, centre_hz)
         return self._with_doubles(single, chirps)
-
-    def _both_terms(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, frequency_hz: float
-    ) -> NDArray[np.complex128]:
-        """Two terms of geometric optics over the first (chirp, rx, part)."""
-        start, k = self.visibility.at(chirps)[1], 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
-        points = solve_specular_points(at, start=start, points=True)[2]
-        return with_second_term(at, points, self._radar.polarization, np.array(k))
 
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes of a conductor; see `HasSpecularPoints`."""
+        length, amplitude, _ = self._solved(chirps, at, start)
+        return length, amplitude
+
+    def _solved(
+        self,
+        chirps: NDArray[np.int64],
+        at: ChirpPoses,
+        start: NDArray[np.float64] | None = None,
+        *,
+        points: bool = False,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Lengths, amplitudes of what is visible, and specular points if they are wanted."""
         weight, known = self.visibility.at(chirps)
-        length, amplitude, _ = solve_specular_points(
+        length, amplitude, found = solve_specular_points(
             at,
             start=known if start is None else start,
             polarization=self._radar.polarization,
             spreading=self.spreading,
+            points=points,
         )
-        return length, amplitude * weight
+        return length, amplitude * weight, found

@@ -27,11 +27,11 @@ at 12 to 16 GHz are nearer to full wave with it up to the first
 (`validation/other_methods/levels_against_full_wave.py`)."""
 
 
-def check_terms(fidelity: str, terms: int) -> None:
+def check_terms(terms: int) -> None:
     """Raise InputError unless one term of geometric optics is asked for, or two."""
     if terms not in (1, 2):
         raise InputError(
-            f"{fidelity}: terms = {terms!r}; it must be 1, for geometric optics, or 2 for the next "
+            f"specular: terms = {terms!r}; it must be 1, for geometric optics, or 2 for the next "
             "term in powers of 1/k as well"
         )
 
@@ -42,7 +42,7 @@ def with_second_term(
     """Both terms over the first, for specular points (chirp, rx, part, 3), world [m].
 
     The result (chirp, rx, part) is that of scattering lengths, for exp(+j omega t); ``wavenumber``
-    [rad/m] is one for all, or one that goes with these axes. Equation :eq:`second-term` of the
+    [rad/m] is one for all, or (chirp, 1, 1). Equation :eq:`second-term` of the
     theory page. Where Tx and Rx are over 90 degrees apart, as a part sees them, it is 1.
     """
     ways = [unit(a - points) for a in (at.tx[:, None, None], at.rx[:, :, None])]
@@ -53,12 +53,12 @@ def with_second_term(
 
     inverse_squares = 1 / at.semi_axes**2
     gradient = in_axes(points - at.centres[:, None]) * inverse_squares
-    size = np.linalg.norm(gradient, axis=-1)  # over the distance of the tangent plane
-    normal = gradient / size[..., None]
+    # One over the distance of the tangent plane; at the centre, where there is no echo, it is 0.
+    size, normal = np.linalg.norm(gradient, axis=-1), unit(gradient)
     field = in_axes(antenna_field(ways[0], polarization))
     along = unit(field - np.sum(field * normal, axis=-1, keepdims=True) * normal)
     bends = [
-        np.sum(direction**2 * inverse_squares, axis=-1) / size
+        np.sum(direction**2 * inverse_squares, axis=-1) / np.maximum(size, 1e-12)
         for direction in (along, np.cross(normal, along))
     ]
     cosine = np.sum(in_axes(ways[0] + ways[1]) * normal, axis=-1) / 2

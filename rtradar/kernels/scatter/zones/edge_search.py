@@ -11,6 +11,7 @@ import numpy as np
 
 from rtradar.kernels.elementary import apply, dot, subtract
 from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.near_rays import longest_axes, unit_sphere_maps
 from rtradar.kernels.scatter.zones.fresnel_zones import zone_point, zone_points_reference
 
 
@@ -54,26 +55,21 @@ def expected_edges(
     are on the part ``own (zone,)``, which does not occlude itself, in the pose ``pose (zone,)`` of
     a body: ``centres (pose, part, 3)``, ``frames (pose, part, 3, 3)``, ``semi_axes (part, 3)`` [m].
     """
-    parts = len(semi_axes)
-    longest = np.empty(parts)
-    for part in range(parts):
-        longest[part] = max(semi_axes[part, 0], max(semi_axes[part, 1], semi_axes[part, 2]))
-    maps_of = np.empty(frames.shape)  # world axes to those in which a part is the unit sphere
-    for p in range(len(frames)):
-        for part in range(parts):
-            for i in range(3):
-                for j in range(3):
-                    maps_of[p, part, i, j] = frames[p, part, j, i] / semi_axes[part, i]
+    parts, longest = len(semi_axes), longest_axes(semi_axes)
+    to_spheres = unit_sphere_maps(frames, semi_axes)
     u, point, end, line, gap = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    a, b, near = np.empty(3), np.empty(3), np.empty(parts, dtype=np.int64)
+    eyes, way_there, near = np.empty((parts, 3)), np.empty(3), np.empty(parts, dtype=np.int64)
     for side in range(len(zone)):
         z, origin = zone[side], origins[side]
         x, y, dx, dy = start[side, 0], start[side, 1], way[side, 0], way[side, 1]
-        body, there = centres[pose[z]], maps_of[pose[z]]
+        body, there = centres[pose[z]], to_spheres[pose[z]]
         zone_point(maps, z, x, y, u, point)
         zone_point(maps, z, x + dx, y + dy, u, end)
         subtract(end, point, gap)
         count = _candidates(origin, point, math.sqrt(dot(gap, gap)), own[z], body, longest, near)
+        for n in range(count):
+            subtract(origin, body[near[n]], gap)
+            apply(there[near[n]], gap, eyes[n])
         low, step = 0, 1 << bisections
         for _ in range(bisections):
             step >>= 1
@@ -82,10 +78,8 @@ def expected_edges(
             subtract(point, origin, line)
             blocked = False
             for n in range(count):
-                subtract(origin, body[near[n]], gap)
-                apply(there[near[n]], gap, a)
-                apply(there[near[n]], line, b)
-                if _meets_sphere(a, b):
+                apply(there[near[n]], line, way_there)
+                if _meets_sphere(eyes[n], way_there):
                     blocked = True
                     break
             if not blocked:
