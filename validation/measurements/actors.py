@@ -115,6 +115,11 @@ def largest_speed(node: str) -> Callable[[Window], float]:
     return lambda window: max(both(node, lambda places: speed(places).max())(window))
 
 
+def mean_radial_speed(node: str) -> Callable[[Window], float]:
+    radial = both(node, lambda places: np.abs(velocity(places)[:, 0]).mean())
+    return lambda window: float(np.mean(radial(window)))
+
+
 MEASURES: Mapping[str, tuple[str, Callable[[Window], float]]] = {
     "largest speed of an ankle": ("m/s", largest_speed("ankle")),
     "largest speed of a hand": ("m/s", largest_speed("hand")),
@@ -137,6 +142,8 @@ MEASURES: Mapping[str, tuple[str, Callable[[Window], float]]] = {
     ),
     "steps unlike each other": ("m", lambda w: abs(float(ahead(w).max() + ahead(w).min()))),
     "largest bend of a knee": ("deg", lambda w: max(knee(w, side).max() for side in "lr")),
+    "mean radial speed of the knees": ("m/s", mean_radial_speed("knee")),
+    "mean radial speed of the ankles": ("m/s", mean_radial_speed("ankle")),
     "change of the distance of the ankles": ("m", lambda w: float(np.ptp(apart(w)))),
     "wrist up and down": (
         "m",
@@ -181,6 +188,8 @@ LINES: Mapping[str, Mapping[str, Range | None]] = {
         "largest radial speed of a hand": (3.07, 2.74, 3.3),
         "root up and down": (0.212, 0.194, 0.228),
         "change of the distance of the ankles": (0.38, 0.336, 0.42),
+        "mean radial speed of the knees": None,
+        "mean radial speed of the ankles": None,
         "largest tilt of the trunk": (4.66, 4.5, 4.88),
         "share at rest": (0.0833, 0.0625, 0.583),
     },

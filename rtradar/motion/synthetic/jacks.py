@@ -6,7 +6,7 @@ Each flight is a parabola, each contact a quintic between flights.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -18,10 +18,13 @@ from rtradar.motion.synthetic.figure import (
     ANKLE,
     HIP,
     HIP_Y,
+    LEFT,
     ROOT,
     SHANK,
     SIDES,
     THIGH,
+    TOE_HEIGHT,
+    TOE_X,
     Arm,
     Array,
     Pose,
@@ -37,8 +40,8 @@ from rtradar.motion.synthetic.figure import (
 
 GRAVITY_MPS2 = 9.81
 
-ROLL = 0.38
-"""The heels lift and come down in this part of a contact, before take-off and after landing."""
+DEEPEST = 0.2
+"""How far the root comes down between hops at most, where they are far apart, in heights."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,12 +63,30 @@ class _Manner:
     close: float
     """Feet relative to the hip joints, where they are together."""
     toes_out: float
+    knees_out: float
+    """How far the knees point outward; toes do where the feet are apart."""
+    stretched: float
+    """How long the legs are at take-off and landing, relative to straight ones."""
+    scatter: float
+    """Deviation of the places where the feet land, forward."""
     astride: float
     """How far one foot lands before the other where they are apart."""
     heels: float
-    lift: float
+    """Pitch of the feet at take-off and landing."""
+    point: float
+    """Height of the heels over the toes in the middle of a flight, relative to take-off."""
+    follow: float
+    """Speed of the ankles at take-off and landing, relative to the hips."""
+    trail: float
+    """How far the feet fall behind while they are off the floor."""
+    sway: float
+    """How far the hips go forward with each hop."""
+    rock: float
+    """The same with every second hop, while the feet are apart."""
     highest: float
     lowest: float
+    vary: float
+    """Deviation of what the arms reach in single hops."""
     late_s: float
     """How much longer the arms move than in one hop; so they rest at no end of their way."""
     behind: float
@@ -79,6 +100,8 @@ class _Manner:
     crouch: float
     """Further lean where the root is a tenth of the height lower than in standing."""
     turn: float
+    nod: float
+    """How far the trunk leans back and forth, whatever the hops."""
     shrug: float
     swing: float = 0.0
     """How far both arms swing forward with each hop."""
@@ -87,29 +110,38 @@ class _Manner:
 
 
 _RANGES = {
-    "hop_s": (0.5, 0.64),
-    "flight_s": (0.14, 0.23),
+    "hop_s": (0.47, 0.62),
+    "flight_s": (0.16, 0.26),
     "jacks": (6.0, 20.0),
-    "rest_s": (0.1, 0.4),
+    "rest_s": (0.05, 0.3),
     "uneven": (0.006, 0.02),
     "lopsided": (-1.0, 1.0),
-    "wide": (0.09, 0.23),
+    "wide": (0.07, 0.215),
     "close": (0.75, 1.3),
     "toes_out": (4.0, 20.0),
-    "astride": (-0.07, 0.07),
-    "heels": (20.0, 32.0),
-    "lift": (0.007, 0.016),
-    "highest": (112.0, 150.0),
-    "lowest": (8.0, 20.0),
-    "late_s": (0.05, 0.16),
+    "knees_out": (8.0, 40.0),
+    "stretched": (0.974, 0.99),
+    "scatter": (0.002, 0.012),
+    "astride": (-0.06, 0.06),
+    "heels": (17.0, 31.0),
+    "point": (0.9, 1.12),
+    "follow": (0.85, 1.0),
+    "trail": (-0.004, 0.006),
+    "sway": (-0.004, 0.012),
+    "rock": (-0.014, 0.014),
+    "highest": (122.0, 168.0),
+    "lowest": (4.0, 17.0),
+    "vary": (1.0, 5.0),
+    "late_s": (0.1, 0.26),
     "behind": (-0.4, 0.5),
-    "elbow": (6.0, 30.0),
-    "elbow_swing": (0.0, 36.0),
-    "overhead": (0.0, 60.0),
-    "forward": (0.0, 14.0),
-    "lean": (1.0, 9.5),
-    "crouch": (1.0, 9.0),
+    "elbow": (4.0, 28.0),
+    "elbow_swing": (-4.0, 34.0),
+    "overhead": (0.0, 80.0),
+    "forward": (-5.0, 20.0),
+    "lean": (1.0, 13.0),
+    "crouch": (0.0, 6.0),
     "turn": (2.0, 10.0),
+    "nod": (0.5, 4.0),
     "shrug": (12.0, 26.0),
 }
 """Ranges of jumping jacks."""
@@ -123,14 +155,24 @@ _JUMPS = _RANGES | {
     "lopsided": (0.0, 0.0),
     "close": (0.8, 1.9),
     "toes_out": (0.0, 0.0),
+    "knees_out": (0.0, 0.0),
+    "stretched": (0.97, 0.97),
+    "scatter": (0.0, 0.0),
     "astride": (0.0, 0.0),
+    "vary": (0.0, 0.0),
     "late_s": (0.04, 0.16),
     "behind": (0.0, 0.0),
-    "lift": (0.008, 0.02),
+    "heels": (18.0, 26.0),
+    "point": (0.9, 1.1),
+    "follow": (0.95, 1.05),
+    "trail": (0.0, 0.0),
+    "sway": (0.015, 0.015),
+    "rock": (0.0, 0.0),
     "elbow": (15.0, 60.0),
     "forward": (0.0, 10.0),
     "lean": (0.0, 6.0),
     "crouch": (2.0, 14.0),
+    "nod": (0.0, 0.0),
     "swing": (5.0, 50.0),
     "back": (0.0, 20.0),
 }
@@ -143,6 +185,13 @@ class _Flight(NamedTuple):
     begin: float
     end: float
     apart: bool
+    unlike: float
+    """How it differs from other hops, with a deviation of 1, 2 at most."""
+
+    @property
+    def span(self) -> float:
+        """How long it lasts [s]."""
+        return self.end - self.begin
 
 
 def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> list[list[_Flight]]:
@@ -157,12 +206,13 @@ def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> 
     uneven = np.random.default_rng(subject.manner)
     sets: list[list[_Flight]] = []
     while begin < until_s:
-        late = hop * manner.uneven * np.clip(uneven.standard_normal(number), -2.0, 2.0)
+        unlike, early = np.clip(uneven.standard_normal((2, number)), -2.0, 2.0)
+        late = hop * manner.uneven * early
         late[1::2] += longer * hop
         begins = begin + 0.8 * hop + hop * np.arange(number) + late
         sets.append(
             [
-                _Flight(float(at), float(at) + flight, apart and k % 2 == 0)
+                _Flight(float(at), float(at) + flight, apart and k % 2 == 0, float(unlike[k]))
                 for k, at in enumerate(begins)
             ]
         )
@@ -170,31 +220,128 @@ def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> 
     return sets
 
 
+def _longest_contact(speed: float, height: float) -> float:
+    """How long somebody may be on the floor [s] between a landing and a take-off at a speed.
+
+    In the middle of such a curve the root is lower by 5/16 v T + g T^2/32. Who is on the floor for
+    longer would go deeper than people do, and stands in between.
+    """
+    slope, curve = 5 / 16 * speed, GRAVITY_MPS2 / 32
+    return (math.sqrt(slope**2 + 4 * curve * DEEPEST * height) - slope) / (2 * curve)
+
+
+def _contacts(
+    hops: list[_Flight], longest_s: float
+) -> Iterator[tuple[tuple[float, float], _Flight | None, _Flight | None]]:
+    """Yield each contact of a set, with the flights before and after it; long ones in two parts."""
+    before: _Flight | None = None
+    for hop in hops:
+        if before and hop.begin - before.end <= longest_s:
+            yield (before.end, hop.begin), before, hop
+        else:
+            part = longest_s
+            if before:
+                part = min(part, (hop.begin - before.end) / 2)
+                yield (before.end, before.end + part), before, None
+            yield (hop.begin - part, hop.begin), None, hop
+        before = hop
+    yield (hops[-1].end, hops[-1].end + longest_s), hops[-1], None
+
+
+def _thrown(hop: _Flight, levels: tuple[float, ...]) -> tuple[float, float, float]:
+    """Height of the root at take-off and landing, and its speed upward at take-off."""
+    before, after = levels[int(not hop.apart)], levels[int(hop.apart)]
+    return before, after, (after - before) / hop.span + GRAVITY_MPS2 * hop.span / 2
+
+
+_Knot = tuple[float, tuple[float, float, float]]
+"""A time, and height, speed and acceleration then."""
+
+_REST = 0.0, 0.0, 0.0
+
+
+def _through(t: Array, knots: list[_Knot]) -> Array:
+    """Curve (n,) through these knots, 0 before the first and after the last."""
+    found = np.zeros(len(t))
+    for (begin, one), (end, other) in pairwise(knots):
+        some = (t >= begin) & (t < end)
+        found[some] = hermite(t[some], (begin, end), one, other)
+    return found
+
+
 def _height(
     t: Array,
     sets: list[list[_Flight]],
-    prepare_s: float,
-    standing: float,
+    longest_s: float,
     levels: tuple[float, ...],
+    standing: float,
 ) -> Array:
-    """Height of the root (n,): standing, thrown, free, caught; levels are those of landings."""
+    """Height of the root (n,): standing, thrown, free, caught; levels are those of landings.
+
+    A curve between knots is a parabola in flight, for the accelerations at both ends are the same.
+    """
     z = np.full(len(t), standing)
     for hops in sets:
-        state, contact, level = (standing, 0.0, 0.0), hops[0].begin - prepare_s, levels[0]
-        for hop in hops:
-            span = hop.end - hop.begin
-            arrive = levels[int(hop.apart)]
-            up = (arrive - level) / span + GRAVITY_MPS2 * span / 2
-            push = (t >= contact) & (t < hop.begin)
-            z[push] = hermite(t[push], (contact, hop.begin), state, (level, up, -GRAVITY_MPS2))
-            fly = (t >= hop.begin) & (t < hop.end)
-            since = t[fly] - hop.begin
-            z[fly] = level + up * since - GRAVITY_MPS2 * since**2 / 2
-            state = arrive, up - GRAVITY_MPS2 * span, -GRAVITY_MPS2
-            contact, level = hop.end, arrive
-        last = (t >= contact) & (t < contact + prepare_s)
-        z[last] = hermite(t[last], (contact, contact + prepare_s), state, (standing, 0.0, 0.0))
+        knots: list[_Knot] = []
+        for (begin, end), before, after in _contacts(hops, longest_s):
+            low, high = (begin, _REST), (end, _REST)
+            if before:
+                _, level, up = _thrown(before, levels)
+                down = up - GRAVITY_MPS2 * before.span
+                low = begin, (level - standing, down, -GRAVITY_MPS2)
+            if after:
+                level, _, up = _thrown(after, levels)
+                high = end, (level - standing, up, -GRAVITY_MPS2)
+            knots += [low, high]
+        z += _through(t, knots)
     return z
+
+
+def _rise(
+    t: Array,
+    sets: list[list[_Flight]],
+    longest_s: float,
+    levels: tuple[float, ...],
+    manner: _Manner,
+    drop: float,
+) -> tuple[Array, Array]:
+    """How much higher the ankles are than in standing, and of that, over the toes (n,) each [m].
+
+    Relative to the hips they move slowly while the legs are stretched: in flight, at take-off and
+    at landing, where they are higher by ``drop``. So the knees bend on the floor only, where the
+    heels come down for a while, if there is time.
+    """
+    ankles, heels = np.zeros(len(t)), np.zeros(len(t))
+    for hops in sets:
+        knots: list[_Knot] = []
+        for (begin, end), before, after in _contacts(hops, longest_s):
+            span, down, up = end - begin, 0.0, 0.0
+            least = 2 * drop / (longest_s if before and after else span)
+            if before:
+                landing = GRAVITY_MPS2 * before.span - _thrown(before, levels)[2]
+                down = max(manner.follow * landing, least)
+            if after:
+                up = max(manner.follow * _thrown(after, levels)[2], least)
+            stays = not (down and up) or 2 * drop * (1 / down + 1 / up) < span
+            if not stays:  # the largest speeds at which the heels do not go below the floor
+                down, up = (min(speed, 3.2 * drop / span) for speed in (down, up))
+            if before:
+                knots.append((begin, (drop, -down, 0.0)))
+            if before and stays:
+                knots.append((begin + 2 * drop / down, _REST))
+            if after and stays:
+                knots.append((end - 2 * drop / up, _REST))
+            if after:
+                knots.append((end, (drop, up, 0.0)))
+        ankles += _through(t, knots)
+        tops: dict[float, tuple[float, float, float]] = {}  # between them the feet stay as they are
+        for (begin, (_, up, _)), (end, (_, down, _)) in pairwise(knots):
+            if up > 0:  # a flight
+                middle, top = (begin + end) / 2, (manner.point * drop, 0.0, 0.0)
+                tops |= {min(begin + 2 * drop / up, middle): top}
+                tops |= {max(end + 2 * drop / down, middle): top}
+        heels += _through(t, sorted([*knots, *tops.items()]))
+    return ankles, heels
 
 
 def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
@@ -219,25 +366,32 @@ def _shortest_contact(all_sets: list[list[_Flight]]) -> float:
     return min(after.begin - hop.end for hops in all_sets for hop, after in pairwise(hops))
 
 
-def _level(height: float, heel: Array, track: float) -> float:
+def _level(height: float, stretched: float, heel: Array, track: float) -> float:
     """Height of the root at take-off and landing [m], with a foot so far aside of the middle [m].
 
     ``heel`` (3,) is how far the ankle is moved by the raised heel [m].
     """
-    leg = 0.97 * (THIGH + SHANK) * height
+    leg = stretched * (THIGH + SHANK) * height
     below = math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
     return float((ANKLE + ROOT - HIP) * height + heel[2] + below)
 
 
-def _turning(subject: Subject, manner: _Manner, t: Array) -> Array:
-    """Yaw (n,) of the hips [rad]: nobody faces exactly the same way all the time."""
+def _pitch(rise: Array) -> Array:
+    """Pitch of a foot (n,) [rad] whose ankle rises so far over its toes, in heights: `rolled`."""
+    below = ANKLE - TOE_HEIGHT
+    return np.arcsin((rise + below) / math.hypot(TOE_X, below)) - math.atan2(below, TOE_X)
+
+
+def _wavering(subject: Subject, manner: _Manner, t: Array, what: str) -> Array:
+    """Slow swings (n,) from -1 to 1 of ``what``: nobody does the same all the time."""
+    rates = {f"{what} of a jack": 0.5, f"slow {what}": 0.31}
     swings = [
         np.sin(
             2 * np.pi * (rate * subject.tempo * t / manner.hop_s + subject.drawn(name, 0.0, 1.0))
         )
-        for rate, name in ((0.5, "turn of a jack"), (0.31, "slow turn"))
+        for name, rate in rates.items()
     ]
-    return np.asarray(0.5 * math.radians(manner.turn) * (swings[0] + swings[1]))
+    return np.asarray(0.5 * (swings[0] + swings[1]))
 
 
 def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
@@ -248,42 +402,42 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
     sets = [one for one in all_sets if one[0].begin - hop_s < t[-1] and one[-1].end + hop_s > t[0]]
     hops = [hop for hops in sets for hop in hops]
 
-    def between(values: tuple[float, float], lead: float, lag: float) -> Array:
-        """Move from the first value (feet together) to the second (apart) and back in flights."""
+    def between(values: list[float], lead: float, lag: float) -> Array:
+        """Move from the value before the first flight to those after each of them."""
         if not hops:
             return np.full(len(t), values[0])
         times = [time for hop in hops for time in (hop.begin - lead, hop.end + lag)]
-        reached = np.repeat([values[int(hop.apart)] for hop in hops], 2)
-        return keyed(t, times, [values[0], *reached[:-1]])
+        return keyed(t, times, np.repeat(values, 2)[1:-1])
 
-    span = all_sets[0][0].end - all_sets[0][0].begin
+    landed = between([0.0, *(height * manner.scatter * hop.unlike for hop in hops)], 0.0, 0.0)
+    span = all_sets[0][0].span
     contact = _shortest_contact(all_sets)
     # The feet move sideways while they are well off the floor.
-    apart = between((0.0, 1.0), -0.05 * span, -0.05 * span)
-    # Heels lift before take-off and come down after landing, so that the legs need not be straight
-    # there.
-    roll_s, heels = ROLL * contact, math.radians(manner.heels)
-    lift, roll, swung = np.zeros(len(t)), np.zeros(len(t)), np.zeros(len(t))
+    apart = between([0.0, *(float(hop.apart) for hop in hops)], -0.05 * span, -0.05 * span)
+    swung, airborne = np.zeros(len(t)), np.zeros(len(t))
     for hop in hops:
         swung += manner.swing * bump((t - hop.begin + 0.3 * contact) / (span + 0.7 * contact))
         swung -= manner.back * bump((t - hop.begin + 0.8 * contact) / (0.7 * contact))
-        lift += bump((t - hop.begin) / (hop.end - hop.begin))
-        roll += bump((t - hop.begin + roll_s) / (hop.end - hop.begin + 2 * roll_s))
-    pitch = heels * roll
-    ankle = rolled(pitch, height)
-    ankle[:, 2] += height * (ANKLE + manner.lift * lift)
+        airborne += bump((t - hop.begin) / hop.span)
 
     close, wide = manner.close * HIP_Y * height, (HIP_Y + manner.wide * amplitude) * height
-    heel = rolled(heels * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
-    low, high = (_level(height, heel, track) for track in (wide, close))
-    z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))
-    lowest, highest = (
-        math.radians(manner.lowest),
-        math.radians(manner.highest) * amplitude**0.5,
+    raised_heel = rolled(np.radians([manner.heels]), height)[0]
+    low, high = (_level(height, manner.stretched, raised_heel, track) for track in (wide, close))
+    longest_s = min(0.75 * hop_s, _longest_contact(GRAVITY_MPS2 * span / 2, height))
+    curves = t, sets, longest_s, (high, low)
+    z = _height(*curves, height * (ROOT - 0.008))
+    rise, heels = _rise(*curves, manner, raised_heel[2])
+    roll = heels / raised_heel[2]
+    pitch = _pitch(heels / height)
+    ankle = rolled(pitch, height) + xyz(
+        -manner.trail * height * airborne, 0.0, ANKLE * height + rise - heels
     )
+    lowest, highest = math.radians(manner.lowest), math.radians(manner.highest) * amplitude**0.5
+    vary = math.radians(manner.vary)
+    reached = [lowest, *((lowest, highest)[hop.apart] + vary * hop.unlike for hop in hops)]
     # Two moves of the arms that overlap are one that lasts longer.
     raised = sum(
-        0.5 * between((lowest, highest), 0.48 * contact - late, 0.45 * contact + late)
+        0.5 * between(reached, 0.48 * contact - late, 0.45 * contact + late)
         for late in (
             manner.behind * contact - manner.late_s / 2,
             manner.behind * contact + manner.late_s / 2,
@@ -291,18 +445,20 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
     )
     moving = np.sin(np.pi * (raised - lowest) / (highest - lowest)) ** 2
     lean = np.radians(manner.lean + manner.crouch * (height * ROOT - z) / (0.1 * height))
-    turn = _turning(subject, manner, t)
+    lean += math.radians(manner.nod) * _wavering(subject, manner, t, "nod")
+    turn = math.radians(manner.turn) * _wavering(subject, manner, t, "turn")
     thorax = about(z=-turn, x=0.4 * turn, y=lean)
-    ankles, feet, arms = {}, {}, {}
+    ankles, feet, arms, left = {}, {}, {}, {}
     for side, sign in SIDES.items():
         outward = about(z=sign * math.radians(manner.toes_out) * apart)
         across = sign * (close + (wide - close) * apart)
-        before = sign * manner.astride * height * apart
+        before = sign * manner.astride * height * apart + landed
+        left[side] = about(z=sign * math.radians(manner.knees_out)).apply(LEFT)
         ankles[side] = outward.apply(ankle) + xyz(before, across, 0.0)
         feet[side] = outward * about(y=pitch)
         upper = thorax * about(
             x=sign * subject.uneven[side] * raised,
-            y=lean - np.radians(manner.forward + swung),
+            y=-np.radians(manner.forward + swung),
         )
         fore = upper * about(
             x=sign * math.radians(manner.overhead) * (raised - lowest) / (highest - lowest),
@@ -310,12 +466,13 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         )
         arms[side] = Arm(upper, fore, fore)
     return Pose(
-        root=xyz(0.015 * height * roll, 0.0, z),
+        root=xyz(height * (manner.sway * roll + manner.rock * apart) + landed, 0.0, z),
         pelvis=about(z=turn, y=0.5 * lean),
         thorax=thorax,
         head=about(y=0.5 * lean),
         ankles=ankles,
         feet=feet,
         arms=arms,
+        left=left,
         shrug=math.radians(manner.shrug) * apart,
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,10 +58,18 @@ KINDS: Mapping[str, Kind] = {
 """All kinds of punches; a lunge punch starts at the hip, to which the other hand goes."""
 
 STYLES = tuple(KINDS)
-BOXING_STYLES = ("outfighter", "infighter")
+BOXING_STYLES = ("outfighter", "infighter", "steady")
+"""People who have not learnt to box punch steadily with both hands in turn, and stay in place."""
 
-_FAVOURITES = {"": (0.7, 0.8, 0.6, 0.4, 0.5), "outfighter": (4, 3, 0.6, 0.3, 0), "infighter": (
-    0.8, 1.2, 4, 3, 0)}  # fmt: skip
+_BOXERS = (0.25, 0.25, 0.5)
+"""Probabilities of the styles."""
+
+_FAVOURITES = {
+    "": (0.7, 0.8, 0.6, 0.4, 0.5),
+    "outfighter": (4, 3, 0.6, 0.3, 0),
+    "infighter": (0.8, 1.2, 4, 3, 0),
+    "steady": (3, 3, 0.4, 0.3, 0),
+}
 """Concentrations from which the shares of the kinds are drawn, by style."""
 
 
@@ -89,18 +97,21 @@ class Habits:
     helping: float
     pace: float
     rest_s: float
+    in_turn: bool
+    """Whether left and right always punch in turn."""
 
     @classmethod
     def of(cls, subject: Subject, *, boxing: bool) -> Habits:
         """Draw the habits of a subject."""
-        drawn = subject.drawn
-        if subject.style in KINDS:
-            shares = np.array([float(kind == subject.style) for kind in KINDS])
+        drawn, style = subject.drawn, subject.style
+        if style in KINDS:
+            shares = np.array([float(kind == style) for kind in KINDS])
         else:
             rng = np.random.default_rng([subject.manner, 2])
-            style = subject.style or (BOXING_STYLES[int(rng.integers(2))] if boxing else "")
+            if boxing and not style:
+                style = BOXING_STYLES[int(rng.choice(len(BOXING_STYLES), p=_BOXERS))]
             shares = rng.dirichlet(np.array(_FAVOURITES[style]) + 1e-3)
-        return cls(
+        habits = cls(
             shares=tuple(shares.tolist()),
             most=int(drawn("most", 1.0, 3.99)) + boxing,
             stepping=0.9 if boxing else drawn("stepping", 0.0, 1.0) ** 2,
@@ -113,6 +124,20 @@ class Habits:
             helping=drawn("helping", 0.3, 1.2),
             pace=drawn("pace", 0.36, 0.88) * subject.tempo,
             rest_s=drawn("rest", 0.1, 0.75),
+            in_turn=False,
+        )
+        if style != "steady":
+            return habits
+        return replace(
+            habits,
+            most=int(drawn("many", 9.0, 41.0)),
+            stepping=0.0,
+            weaving=0.0,
+            turn=drawn("slight turn", 0.2, 0.9),
+            lean=drawn("slight lean", 0.0, 0.5),
+            bow=0.0,
+            pace=drawn("slow", 0.34, 0.62) * subject.tempo,
+            in_turn=True,
         )
 
 
@@ -162,7 +187,9 @@ def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> Poses
         hand = subject.side if rng.random() < 0.55 else subject.other
         for _ in range(int(rng.integers(1, habits.most + 1))):
             kind = KINDS[STYLES[int(rng.choice(len(KINDS), p=habits.shares))]]
-            if kind.lead is not None:
+            if kind.lead is not None and habits.in_turn:
+                kind = KINDS["jab" if hand == fighter.lead else "cross"]
+            elif kind.lead is not None:
                 hand = fighter.lead if kind.lead else fighter.rear
             t = _plan(fighter, habits, kind, hand, t, rng)
             hand = "r" if hand == "l" else "l"

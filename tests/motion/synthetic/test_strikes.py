@@ -91,6 +91,22 @@ def test_the_side_is_behind_in_punches(side: str) -> None:
     assert (left > right) == (side == "left")
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_steady_boxers_punch_in_turn_and_stay_in_place(seed: int) -> None:
+    motion = actor("boxing", "steady", seed)
+    ahead = [
+        motion.positions[:, NODE(f"{side}_shoulder"), 0]
+        - motion.positions[:, NODE(f"{side}_wrist"), 0]  # forward is -x
+        for side in "lr"
+    ]
+    difference = ahead[0] - ahead[1]
+    leads = np.sign(difference[np.abs(difference) > 0.1])
+    turns = np.count_nonzero(np.diff(leads))
+    assert turns >= 5, "in 5 s"
+    for side in "lr":
+        assert np.ptp(motion.positions[:, NODE(f"{side}_toe"), :2], axis=0).max() < 0.02
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("activity", "style"), STRIKES)
 def test_a_body_can_do_it(activity: str, style: str, seed: int) -> None:

@@ -183,7 +183,32 @@ def test_jumping_jack_flies_freely(seed: int) -> None:
     assert np.corrcoef(width, hands)[0, 1] > 0.7
     # Nobody stands still first.
     assert speeds(motion, "l_hand")[:60].max() > 1
-    assert 3.5 < speeds(motion, "l_hand").max() < 7.5
+    assert 3.5 < speeds(motion, "l_hand").max() < 8.5  # of recorded ones 4.1 to 8.3
+
+
+def test_knees_of_jumping_jacks_bend_more_slowly_in_flight_than_on_the_floor() -> None:
+    found = []
+    for seed in range(12):
+        motion = synthetic_motion("jumping_jack", seed, duration_s=4.0)
+        places = [motion.positions[:, NODE(f"l_{name}")] for name in ("hip", "knee", "ankle")]
+        thigh, shank = (
+            bone / np.linalg.norm(bone, axis=1, keepdims=True) for bone in np.diff(places, axis=0)
+        )
+        bend_deg = np.degrees(np.arccos(np.sum(thigh * shank, axis=1)))
+        speed = np.abs(np.gradient(bend_deg, 1 / motion.rate_hz))
+        toes = motion.positions[:, [NODE("l_toe"), NODE("r_toe")], 2].min(axis=1)
+        flying = toes > TOE_HEIGHT * 1.75 + 2e-3
+        found.append((speed[flying].mean(), speed[~flying].mean()))
+    in_flight, on_the_floor = np.mean(found, axis=0)
+    assert in_flight < 0.95 * on_the_floor
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_slow_jumpers_stand_between_jumps(seed: int) -> None:
+    """Who has much time does not go deeper for that, as one curve over all of it would."""
+    motion = synthetic_motion("jump", seed, duration_s=6.0, tempo=0.5)
+    root, height = motion.positions[:, 0, 2] / 1.75, np.median(motion.positions[:, 0, 2]) / 1.75
+    assert root.min() > height - 0.26
 
 
 @pytest.mark.parametrize("seed", range(3))
