@@ -84,7 +84,8 @@ def stack_clouds(clouds: Collection, *, seed: int = 0, edge_s: float = 0.0) -> T
     Raises
     ------
     InputError
-        If there are no clouds, or none has points.
+        If there are no clouds, or none has points, or one has coordinates that are NaN, as those
+        are that its radar cannot measure.
     """
     each = [np.asarray(clouds.points(index), dtype=np.float64) for index in range(len(clouds))]
     if edge_s:
@@ -106,6 +107,12 @@ def stack_clouds(clouds: Collection, *, seed: int = 0, edge_s: float = 0.0) -> T
             again = random.integers(len(points), size=n_points - len(points))
             centred = points - [points[:, 0].mean(), 0, 0]
             stacked[index] = centred[np.concatenate([order, again])]
+    unknown = np.flatnonzero(np.isnan(stacked).any(axis=(1, 2)))
+    if len(unknown):
+        raise InputError(
+            f"{len(unknown)} of {len(each)} clouds have coordinates that are NaN, which "
+            "their radar does not measure; a network needs all three"
+        )
     return torch.from_numpy(stacked)
 
 

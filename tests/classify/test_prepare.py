@@ -63,6 +63,14 @@ def test_clouds_without_points_are_refused(made_up: Callable[..., Any]) -> None:
         stack_clouds(made_up(per_class=1, n_points=0))
 
 
+def test_clouds_without_a_coordinate_are_refused(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=1, n_points=4)
+    flat = clouds.points(1) * [1.0, 1.0, np.nan]  # as a radar without elevation leaves them
+    clouds.points = [clouds.points(0), flat, clouds.points(2)].__getitem__
+    with pytest.raises(InputError, match="1 of 3 clouds have coordinates that are NaN"):
+        stack_clouds(clouds)
+
+
 def test_points_are_drawn_once_or_anew(points: torch.Tensor) -> None:
     assert torch.equal(sampled(points, 50, resample=False), points[:, :50])
     first, second = sampled(points, 50, resample=True), sampled(points, 50, resample=True)

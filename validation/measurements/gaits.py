@@ -1,6 +1,9 @@
 """Six gaits of recorded people by four fidelity levels: does ray tracing matter where it is hard?
 
-    RTRADAR_JOINTS=folder python validation/measurements/gaits.py OUT [--quick] [--no-build]
+    RTRADAR_JOINTS=folder python validation/measurements/gaits.py OUT [--conditions] [--quick]
+
+With ``--conditions`` the level is the same and the room, the radar or the noise differs; what
+stands still is removed from all.
 
 Recorded walkers of `RTRADAR_JOINTS` walk as they are used to and as people with five complaints do.
 Each stretch is simulated by each level from the same instant, with the same noise, for the radar of
@@ -21,6 +24,7 @@ import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,34 +38,58 @@ from rtradar.classify.study import classes_of
 from rtradar.clouds.collection import Collection
 
 DATA_SETS = Path(__file__).resolve().parents[1]
-LEVELS = ("analytic-paper", "analytic", "specular", "fresnel")
+
+
+class Condition(NamedTuple):
+    """By which level, where, by which radar and with how much noise stretches are simulated."""
+
+    level: str
+    scene: str = "free-space"
+    radar: str = "few_channels.toml"
+    snr_db: float = 20.0
+    clutter_removal: str = "none"
+
+
+LEVELS = {
+    level: Condition(level) for level in ("analytic-paper", "analytic", "specular", "fresnel")
+}
+SAME = Condition("specular", clutter_removal="mean")
+CONDITIONS = {
+    "living-room": SAME._replace(scene="living-room"),
+    "iwr6843": SAME._replace(radar="iwr6843"),
+    "10-db": SAME._replace(snr_db=10.0),
+    "free-space": SAME,
+}
+"""By name of the data set; the last one is compared with the others."""
+
 STRETCHES = 3
 """Recordings of each person and gait that are used; they are spread over those that there are."""
 
 HEAD = """
 seed = 0
 folder = "${{RTRADAR_JOINTS}}"
+clutter_removal = "{clutter_removal}"
 [windows]
 duration_s = 1.6
 place = "random"
 [each]
-radar = ["few_channels.toml"]
-scene = ["free-space"]
+radar = ["{radar}"]
+scene = ["{scene}"]
 fidelity = ["{level}"]
 [drawn]
-snr_db = [20.0, 20.0]
+snr_db = [{snr_db}, {snr_db}]
 """
 
 
-def specification(folder: Path, level: str, stretches: int) -> str:
-    """Data set of all gaits by one level."""
+def specification(folder: Path, condition: Condition, stretches: int) -> str:
+    """Data set of all gaits in one condition."""
     rows = [
         row
         for row in csv.DictReader((folder / "MANIFEST.csv").open())
         if row["dataset"] == "gait" and long_enough(folder / row["file"])
     ]
     counts = Counter((row["person"], row["activity"]) for row in rows)
-    text, seen = HEAD.format(level=level), Counter[tuple[str, str]]()
+    text, seen = HEAD.format(**condition._asdict()), Counter[tuple[str, str]]()
     for row in rows:
         key = row["person"], row["activity"]
         step = max(counts[key] // stretches, 1)
@@ -74,15 +102,15 @@ def specification(folder: Path, level: str, stretches: int) -> str:
     return text
 
 
-def build(out: Path, stretches: int, levels: tuple[str, ...]) -> None:
+def build(out: Path, stretches: int, conditions: dict[str, Condition]) -> None:
     """Build the data sets that are not complete."""
     out.mkdir(parents=True, exist_ok=True)
     few = "few_channels.toml"
     (out / few).write_bytes((DATA_SETS / few).read_bytes())
-    for level in levels:
-        spec = out / f"{level}.toml"
-        spec.write_text(specification(Path(os.environ["RTRADAR_JOINTS"]), level, stretches))
-        words = ["dataset", "build", str(spec), "--out", str(out / level), "--workers", "1"]
+    for name, condition in conditions.items():
+        spec = out / f"{name}.toml"
+        spec.write_text(specification(Path(os.environ["RTRADAR_JOINTS"]), condition, stretches))
+        words = ["dataset", "build", str(spec), "--out", str(out / name), "--workers", "1"]
         subprocess.run([sys.executable, "-m", "rtradar", *words], check=True)
 
 
@@ -158,10 +186,14 @@ def report(found: dict[tuple[str, str], Answers], names: tuple[str, ...]) -> Non
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=Path, metavar="OUT", help="folder of data sets")
-    parser.add_argument("--quick", action="store_true", help="one stretch each, by formulas alone")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--quick", action="store_true", help="one stretch each, by formulas alone")
+    which.add_argument("--conditions", action="store_true", help="rooms, radars and noise")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     options = parser.parse_args()
-    levels = LEVELS[:2] if options.quick else LEVELS
+    levels = CONDITIONS if options.conditions else LEVELS
+    if options.quick:
+        levels = {name: levels[name] for name in ("analytic-paper", "analytic")}
     if not options.no_build:
         build(options.out, 1 if options.quick else STRETCHES, levels)
     sets = {level: Collection(options.out / level) for level in levels}

@@ -267,6 +267,46 @@ def people_left_out(actors: Collection, recorded: Collection) -> None:
         )
 
 
+def people_left_out_of_networks(actors: Collection, recorded: Collection) -> None:
+    """Leave out a tenth of the people at a time; a network learns from spectrograms of the rest.
+
+    Beside it `both` learns from the descriptions of the same people, and their answers are
+    averaged.
+    """
+    _, learnt = classes_of(actors)
+    names, truth = classes_of(recorded)
+    groups = subjects_of(recorded) % 10
+    sets = [
+        Examples(stacked_for(one, SPECTROGRAM), torch.from_numpy(those), names)
+        for one, those in ((actors, learnt), (recorded, truth))
+    ]
+    features, more = described(recorded), (described(actors), learnt)
+    for beside in (False, True):
+        by_network = np.zeros((len(truth), len(names)))
+        for group in np.unique(groups):
+            learn, asked = np.flatnonzero(groups != group), np.flatnonzero(groups == group)
+            known = sets[1][learn.repeat(RECORDED_OVER_ACTORS if beside else 1)]
+            if beside:
+                known = Examples(
+                    torch.cat([known.points, sets[0].points]),
+                    torch.cat([known.classes, sets[0].classes]),
+                    names,
+                )
+            network, _ = train_network(known, sets[1][asked], SPECTROGRAM, seed=0)
+            by_network[asked] = np.exp(predict(network, sets[1][asked], SPECTROGRAM))
+        described_by = left_out(features, truth, groups, both, more if beside else None)
+        title = ", actors beside" if beside else ""
+        for said, chances in (
+            ("network 'spectrogram'", by_network),
+            ("both, descriptions", described_by),
+            ("mean of them", (by_network + described_by) / 2),
+        ):
+            told(
+                f"a tenth of the people left out, {said}{title}",
+                answers_of(recorded, chances, truth),
+            )
+
+
 def chosen_on_others(each: dict[str, Answers]) -> Answers:
     """For each person, take the answers of the model that knows most recordings of the others.
 
@@ -362,7 +402,7 @@ def main() -> int:
     parser.add_argument(
         "--measure",
         metavar="NAME,...",
-        help="some of axes, shipped, channels, learnt, people, curve, others",
+        help="some of axes, shipped, channels, learnt, people, curve, networks, others",
     )
     parser.add_argument(
         "--recordings", type=int, default=1000, help="most joint files of a person and activity"
@@ -383,6 +423,7 @@ def main() -> int:
         "learnt": lambda: to_recorded(actors, recorded, options.seeds),
         "people": lambda: people_left_out(actors, recorded),
         "curve": lambda: learning_curve(actors, recorded),
+        "networks": lambda: people_left_out_of_networks(actors, recorded),
         "others": lambda: others(out),
     }
     for name in options.measure.split(",") if options.measure else parts:
