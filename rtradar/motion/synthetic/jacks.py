@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,9 @@ from rtradar.motion.synthetic.figure import (
     rolled,
     xyz,
 )
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 GRAVITY_MPS2 = 9.81
 
@@ -394,6 +397,30 @@ def _wavering(subject: Subject, manner: _Manner, t: Array, what: str) -> Array:
     return np.asarray(0.5 * (swings[0] + swings[1]))
 
 
+def _arms(
+    subject: Subject,
+    manner: _Manner,
+    thorax: Rotation,
+    raised: Array,
+    ends: tuple[float, float],
+    swung: Array,
+) -> dict[str, Arm]:
+    """Arms raised aside by an angle [rad], between those at both ends, and swung forward [deg]."""
+    arms, beyond, way = {}, raised - ends[0], ends[1] - ends[0]
+    moving = np.sin(np.pi * beyond / way) ** 2
+    for side, sign in SIDES.items():
+        upper = thorax * about(
+            x=sign * subject.uneven[side] * raised,
+            y=-np.radians(manner.forward + swung),
+        )
+        fore = upper * about(
+            x=sign * math.radians(manner.overhead) * beyond / way,
+            y=-np.radians(manner.elbow + manner.elbow_swing * moving),
+        )
+        arms[side] = Arm(upper, fore, fore)
+    return arms
+
+
 def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
     hop_s = manner.hop_s / subject.tempo
@@ -436,19 +463,14 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
     vary = math.radians(manner.vary)
     reached = [lowest, *((lowest, highest)[hop.apart] + vary * hop.unlike for hop in hops)]
     # Two moves of the arms that overlap are one that lasts longer.
-    raised = sum(
-        0.5 * between(reached, 0.48 * contact - late, 0.45 * contact + late)
-        for late in (
-            manner.behind * contact - manner.late_s / 2,
-            manner.behind * contact + manner.late_s / 2,
-        )
-    )
-    moving = np.sin(np.pi * (raised - lowest) / (highest - lowest)) ** 2
+    lates = (manner.behind * contact + half for half in (-manner.late_s / 2, manner.late_s / 2))
+    early, late = (between(reached, 0.48 * contact - own, 0.45 * contact + own) for own in lates)
+    raised = 0.5 * early + 0.5 * late
     lean = np.radians(manner.lean + manner.crouch * (height * ROOT - z) / (0.1 * height))
     lean += math.radians(manner.nod) * _wavering(subject, manner, t, "nod")
     turn = math.radians(manner.turn) * _wavering(subject, manner, t, "turn")
     thorax = about(z=-turn, x=0.4 * turn, y=lean)
-    ankles, feet, arms, left = {}, {}, {}, {}
+    ankles, feet, left = {}, {}, {}
     for side, sign in SIDES.items():
         outward = about(z=sign * math.radians(manner.toes_out) * apart)
         across = sign * (close + (wide - close) * apart)
@@ -456,15 +478,6 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         left[side] = about(z=sign * math.radians(manner.knees_out)).apply(LEFT)
         ankles[side] = outward.apply(ankle) + xyz(before, across, 0.0)
         feet[side] = outward * about(y=pitch)
-        upper = thorax * about(
-            x=sign * subject.uneven[side] * raised,
-            y=-np.radians(manner.forward + swung),
-        )
-        fore = upper * about(
-            x=sign * math.radians(manner.overhead) * (raised - lowest) / (highest - lowest),
-            y=-np.radians(manner.elbow + manner.elbow_swing * moving),
-        )
-        arms[side] = Arm(upper, fore, fore)
     return Pose(
         root=xyz(height * (manner.sway * roll + manner.rock * apart) + landed, 0.0, z),
         pelvis=about(z=turn, y=0.5 * lean),
@@ -472,7 +485,7 @@ def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: A
         head=about(y=0.5 * lean),
         ankles=ankles,
         feet=feet,
-        arms=arms,
+        arms=_arms(subject, manner, thorax, raised, (lowest, highest), swung),
         left=left,
         shrug=math.radians(manner.shrug) * apart,
     )
