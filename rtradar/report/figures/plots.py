@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rtradar.clouds import SpatialCloud
@@ -259,8 +258,6 @@ class Plots:
         dots = rdt_points(axes, points[shown], fastest=max(abs(slow), abs(fast)), s=4)
         axes.set(ylim=(low, high), zlim=(slow, fast), zlabel="Velocity [m/s]")
         axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
-        for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-            axis.set_major_locator(MaxNLocator(5))
         axes.xaxis.labelpad = axes.yaxis.labelpad = 10
         title = f"Range-Doppler-time cloud, {len(points)} points"
         if not shown.all():
