@@ -1,6 +1,7 @@
 """Six gaits of recorded people by four fidelity levels: does ray tracing matter where it is hard?
 
-    RTRADAR_JOINTS=folder python validation/measurements/gaits.py OUT [--conditions] [--quick]
+    RTRADAR_JOINTS=folder python validation/measurements/gaits.py OUT [--conditions | --quick]
+        [--no-build]
 
 With ``--conditions`` the level is the same and the room, the radar or the noise differs; what
 stands still is removed from all.
@@ -191,15 +192,15 @@ def main() -> int:
     which.add_argument("--conditions", action="store_true", help="rooms, radars and noise")
     parser.add_argument("--no-build", action="store_true", help="measure what is there")
     options = parser.parse_args()
-    levels = CONDITIONS if options.conditions else LEVELS
+    conditions = CONDITIONS if options.conditions else LEVELS
     if options.quick:
-        levels = {name: levels[name] for name in ("analytic-paper", "analytic")}
+        conditions = {name: LEVELS[name] for name in ("analytic-paper", "analytic")}
     if not options.no_build:
-        build(options.out, 1 if options.quick else STRETCHES, levels)
-    sets = {level: Collection(options.out / level) for level in levels}
+        build(options.out, 1 if options.quick else STRETCHES, conditions)
+    sets = {name: Collection(options.out / name) for name in conditions}
     asked = [sorted(clouds.column("recording").tolist()) for clouds in sets.values()]
     if any(some != asked[0] for some in asked):
-        raise SystemExit("the levels have not the same recordings; build them to the end")
+        raise SystemExit("the data sets have not the same recordings; build them to the end")
     names, truth = classes_of(next(iter(sets.values())))
     print(
         f"{len(truth)} stretches; balanced accuracy, chance {1 / len(names):.1%}, 95 % over people"

@@ -27,7 +27,7 @@ from sklearn.preprocessing import StandardScaler
 
 from rtradar.classify.baselines import axis_features
 from rtradar.classify.prepare import stacked_for
-from rtradar.classify.recipes import EDGES, SMALL, SPECTROGRAM
+from rtradar.classify.recipes import EDGES, SMALL, SPECTROGRAM, Recipe
 from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.splits import subjects_of
 from rtradar.classify.study import classes_of
@@ -188,6 +188,12 @@ def alike(truth: NDArray[np.int64], counts: NDArray[np.int64], seed: int) -> NDA
     return np.concatenate(drawn)
 
 
+def examples_of(clouds: Collection, recipe: Recipe) -> Examples:
+    """What the network of a recipe takes of the clouds, and their classes."""
+    names, truth = classes_of(clouds)
+    return Examples(stacked_for(clouds, recipe), torch.from_numpy(truth), names)
+
+
 def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
     """Learn from actors and ask about recordings."""
     _, learnt = classes_of(actors)
@@ -198,10 +204,7 @@ def to_recorded(actors: Collection, recorded: Collection, seeds: int) -> None:
         found[title] = make().fit(x, learnt).predict_proba(asked)
         told(title, answers_of(recorded, found[title], truth))
     for recipe in (SMALL, EDGES, SPECTROGRAM):
-        sets = [
-            Examples(stacked_for(one, recipe), torch.from_numpy(those), names)
-            for one, those in ((actors, learnt), (recorded, truth))
-        ]
+        sets = [examples_of(clouds, recipe) for clouds in (actors, recorded)]
         each: list[NDArray[np.float64]] = []
         for seed in range(seeds):
             network, _ = train_network(*sets, recipe, seed=seed)
@@ -273,29 +276,25 @@ def people_left_out_of_networks(actors: Collection, recorded: Collection) -> Non
     Beside it `both` learns from the descriptions of the same people, and their answers are
     averaged.
     """
-    _, learnt = classes_of(actors)
-    names, truth = classes_of(recorded)
-    groups = subjects_of(recorded) % 10
-    sets = [
-        Examples(stacked_for(one, SPECTROGRAM), torch.from_numpy(those), names)
-        for one, those in ((actors, learnt), (recorded, truth))
-    ]
+    (_, learnt), (names, truth) = classes_of(actors), classes_of(recorded)
+    acted, taken = (examples_of(clouds, SPECTROGRAM) for clouds in (actors, recorded))
     features, more = described(recorded), (described(actors), learnt)
-    for beside in (False, True):
+    groups = subjects_of(recorded) % 10
+    for title, those in (("", None), (", actors beside", more)):
         by_network = np.zeros((len(truth), len(names)))
         for group in np.unique(groups):
             learn, asked = np.flatnonzero(groups != group), np.flatnonzero(groups == group)
-            known = sets[1][learn.repeat(RECORDED_OVER_ACTORS if beside else 1)]
-            if beside:
+            known = taken[learn]
+            if those:
+                often = taken[learn.repeat(RECORDED_OVER_ACTORS)]
                 known = Examples(
-                    torch.cat([known.points, sets[0].points]),
-                    torch.cat([known.classes, sets[0].classes]),
+                    torch.cat([often.points, acted.points]),
+                    torch.cat([often.classes, acted.classes]),
                     names,
                 )
-            network, _ = train_network(known, sets[1][asked], SPECTROGRAM, seed=0)
-            by_network[asked] = np.exp(predict(network, sets[1][asked], SPECTROGRAM))
-        described_by = left_out(features, truth, groups, both, more if beside else None)
-        title = ", actors beside" if beside else ""
+            network, _ = train_network(known, taken[asked], SPECTROGRAM, seed=0)
+            by_network[asked] = np.exp(predict(network, taken[asked], SPECTROGRAM))
+        described_by = left_out(features, truth, groups, both, those)
         for said, chances in (
             ("network 'spectrogram'", by_network),
             ("both, descriptions", described_by),

@@ -1,6 +1,7 @@
 """Synthetic jumping jacks, and jumps on the spot.
 
-Each flight is a parabola, each contact a quintic between flights.
+The root flies along a parabola and is thrown and caught along quintics. The ankles follow it where
+the legs are stretched, so that the knees bend on the floor.
 """
 
 from __future__ import annotations
@@ -251,10 +252,20 @@ def _contacts(
     yield (hops[-1].end, hops[-1].end + longest_s), hops[-1], None
 
 
-def _thrown(hop: _Flight, levels: tuple[float, ...]) -> tuple[float, float, float]:
-    """Height of the root at take-off and landing, and its speed upward at take-off."""
-    before, after = levels[int(not hop.apart)], levels[int(hop.apart)]
-    return before, after, (after - before) / hop.span + GRAVITY_MPS2 * hop.span / 2
+class _Throw(NamedTuple):
+    """Heights of the root at take-off and landing [m], and its speeds, up and down [m/s]."""
+
+    take_off: float
+    landing: float
+    up: float
+    down: float
+
+
+def _thrown(hop: _Flight, levels: tuple[float, ...]) -> _Throw:
+    """Return how a flight begins and ends; levels are those of the feet together, and apart."""
+    begin, end = levels[int(not hop.apart)], levels[int(hop.apart)]
+    up = (end - begin) / hop.span + GRAVITY_MPS2 * hop.span / 2
+    return _Throw(begin, end, up, GRAVITY_MPS2 * hop.span - up)
 
 
 _Knot = tuple[float, tuple[float, float, float]]
@@ -279,7 +290,7 @@ def _height(
     levels: tuple[float, ...],
     standing: float,
 ) -> Array:
-    """Height of the root (n,): standing, thrown, free, caught; levels are those of landings.
+    """Height of the root (n,): standing, thrown, free, caught.
 
     A curve between knots is a parabola in flight, for the accelerations at both ends are the same.
     """
@@ -287,15 +298,14 @@ def _height(
     for hops in sets:
         knots: list[_Knot] = []
         for (begin, end), before, after in _contacts(hops, longest_s):
-            low, high = (begin, _REST), (end, _REST)
+            caught = thrown = _REST
             if before:
-                _, level, up = _thrown(before, levels)
-                down = up - GRAVITY_MPS2 * before.span
-                low = begin, (level - standing, down, -GRAVITY_MPS2)
+                last = _thrown(before, levels)
+                caught = last.landing - standing, -last.down, -GRAVITY_MPS2
             if after:
-                level, _, up = _thrown(after, levels)
-                high = end, (level - standing, up, -GRAVITY_MPS2)
-            knots += [low, high]
+                following = _thrown(after, levels)
+                thrown = following.take_off - standing, following.up, -GRAVITY_MPS2
+            knots += [(begin, caught), (end, thrown)]
         z += _through(t, knots)
     return z
 
@@ -321,10 +331,9 @@ def _rise(
             span, down, up = end - begin, 0.0, 0.0
             least = 2 * drop / (longest_s if before and after else span)
             if before:
-                landing = GRAVITY_MPS2 * before.span - _thrown(before, levels)[2]
-                down = max(manner.follow * landing, least)
+                down = max(manner.follow * _thrown(before, levels).down, least)
             if after:
-                up = max(manner.follow * _thrown(after, levels)[2], least)
+                up = max(manner.follow * _thrown(after, levels).up, least)
             stays = not (down and up) or 2 * drop * (1 / down + 1 / up) < span
             if not stays:  # the largest speeds at which the heels do not go below the floor
                 down, up = (min(speed, 3.2 * drop / span) for speed in (down, up))

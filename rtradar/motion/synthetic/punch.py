@@ -59,10 +59,10 @@ KINDS: Mapping[str, Kind] = {
 
 STYLES = tuple(KINDS)
 BOXING_STYLES = ("outfighter", "infighter", "steady")
-"""People who have not learnt to box punch steadily with both hands in turn, and stay in place."""
+"""From a distance, close by, or steadily with both hands in turn and without a step."""
 
 _BOXERS = (0.25, 0.25, 0.5)
-"""Probabilities of the styles."""
+"""Probabilities of the styles; the people of Berkeley MHAD, asked to box, do so steadily."""
 
 _FAVOURITES = {
     "": (0.7, 0.8, 0.6, 0.4, 0.5),
