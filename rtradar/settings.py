@@ -10,10 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
-import numpy as np
-
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number, check_order
+from rtradar.system.checks import brief, check_number, check_order, is_real
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -199,7 +197,7 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         _check_noise(self.snr_db, self.noise_power_m2)
-        if not _is_number(self.pfa) or not 0 < self.pfa < 1:
+        if not is_real(self.pfa) or not 0 < self.pfa < 1:
             raise InputError(
                 f"pfa = {brief(self.pfa)}; a false-alarm rate is a number between 0 and 1, "
                 "both excluded (--pfa)"
@@ -210,7 +208,7 @@ class RunSettings:
         check_order(self.order)
         check_breathing("", self.breathing)
         tolerance_db = self.path_tolerance_db
-        if tolerance_db is not None and not _is_number(tolerance_db):
+        if tolerance_db is not None and not is_real(tolerance_db):
             tolerance_db = math.nan
         if tolerance_db == -math.inf:
             object.__setattr__(self, "path_tolerance_db", None)
@@ -253,23 +251,19 @@ def settings_of(caller: str, taken: type, options: Mapping[str, Any]) -> RunSett
     return RunSettings(**options)
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-
-
 def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
     if isinstance(snr_db, str):
         if snr_db != "physical":
             raise InputError(
                 f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)"
             )
-    elif not _is_number(snr_db) or not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
+    elif not is_real(snr_db) or not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
         raise InputError(
             f"snr_db = {brief(snr_db)}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf for no "
             "noise (--snr-db)"
         )
     if noise_power_m2 is not None and not (
-        _is_number(noise_power_m2) and 0 <= noise_power_m2 < math.inf
+        is_real(noise_power_m2) and 0 <= noise_power_m2 < math.inf
     ):
         raise InputError(
             f"noise_power_m2 = {brief(noise_power_m2)}; it must be a number of square metres, "

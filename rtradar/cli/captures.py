@@ -348,17 +348,22 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments that `run` and `compare` share."""
     check_place(options.json)
     from rtradar.settings import RunSettings
+    from rtradar.system.registries import radar_table, scene_table
 
     given = vars(options)
     names = [field.name for field in dataclasses.fields(RunSettings) if field.name in given]
     settings = {name: given[name] for name in names}
-    RunSettings(**settings)  # refuses what is wrong before anything slow is imported
+    # What is wrong is refused before anything slow is imported.
+    RunSettings(**settings)
+    radar_table(options.radar)
+    scene_table(options.scene)
+    skeletons = _checked_people(options)
     from rtradar.radar import Radar
     from rtradar.scene import Scene
 
     radar, scene = Radar.load(options.radar), Scene.load(options.scene)
     return settings | {
-        "motion": _people(options),
+        "motion": _people(options, skeletons),
         "radar": radar,
         "scene": scene,
         "out": options.out,
@@ -366,21 +371,31 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _people(options: argparse.Namespace) -> list[Motion | Person]:
-    """Return the motions of the command line, as people where places are given."""
+def _checked_people(options: argparse.Namespace) -> dict[str, Path]:
+    """Return the skeletons of recordings by name; InputError where there cannot be such people."""
     names, places = options.motion, options.at
     if len(places) != len(names) and (places or len(names) > 1):
         raise InputError(
             f"{len(names)} MOTION and {len(places)} --at; several people need places: give "
             "--at X,Y once for each MOTION, in the same order"
         )
-    if not names:
-        return []
-    skeletons = _skeletons(names, options.skeleton)
+    from rtradar.system.registries import check_activity, reader_of
+
+    skeletons = _skeletons(names, options.skeleton) if names else {}
+    for name in names:
+        if name.startswith(_SYNTHETIC):
+            check_activity(name.removeprefix(_SYNTHETIC))
+        else:
+            reader_of(name, skeletons.get(name))
+    return skeletons
+
+
+def _people(options: argparse.Namespace, skeletons: Mapping[str, Path]) -> list[Motion | Person]:
+    """Return the motions of the command line, as people where places are given."""
     from rtradar.motion import load_motion, synthetic_motion
 
     motions: list[Motion] = []
-    for person, name in enumerate(names):
+    for person, name in enumerate(options.motion):
         if name.startswith(_SYNTHETIC):
             duration_s = _SYNTHETIC_S if options.duration_s is None else options.duration_s
             motion = synthetic_motion(
@@ -391,11 +406,11 @@ def _people(options: argparse.Namespace) -> list[Motion | Person]:
         else:
             motion = load_motion(name, skeleton=skeletons.get(name))
         motions.append(motion)
-    if not places:
+    if not options.at:
         return [*motions]
     from rtradar.body import Person  # which takes long to import
 
-    return [Person(motion, **own) for motion, own in zip(motions, places, strict=True)]
+    return [Person(motion, **own) for motion, own in zip(motions, options.at, strict=True)]
 
 
 def _skeletons(names: Sequence[str], skeletons: Sequence[Path]) -> dict[str, Path]:

@@ -24,7 +24,7 @@ from rtradar.clouds.sample_files import (
 )
 from rtradar.clouds.sample_index import read_index
 from rtradar.errors import InputError
-from rtradar.system.checks import brief
+from rtradar.system.checks import brief, is_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -255,7 +255,7 @@ class Collection:
         """
         if kind not in list(KINDS):  # whatever it is
             raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
-        if isinstance(points, bool) or not isinstance(points, int | np.integer) or points < 1:
+        if not is_whole(points) or points < 1:
             raise InputError(f"points = {brief(points)}; it must be a whole number from 1 on")
         try:
             from rtradar.clouds.torch_dataset import SampleDataset

@@ -21,6 +21,7 @@ from skimage.measure import marching_cubes
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.system.checks import is_whole
 from rtradar.system.seeds import check_seed, stream
 
 _WITH_REPLACEMENT = 1  # selects a random stream apart from that of the keys
@@ -36,7 +37,7 @@ class UniformSample:
     """
 
     def __init__(self, n_rows: int, seed: int, columns: int = 3) -> None:
-        if isinstance(n_rows, bool) or not isinstance(n_rows, int | np.integer) or n_rows < 1:
+        if not is_whole(n_rows) or n_rows < 1:
             raise InputError(f"cloud: n_points = {n_rows!r}; it must be a whole number, at least 1")
         self._n_rows = int(n_rows)
         self._seed = check_seed("cloud: ", seed)

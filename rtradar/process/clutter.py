@@ -43,6 +43,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.spectra import checked_chirps
 from rtradar.radar import Radar
+from rtradar.system.checks import is_real
 from rtradar.system.threads import thread_map
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
@@ -328,8 +329,7 @@ def clutter_removal(
 
 def check_time_constant(time_constant_s: float) -> float:
     """The time constant as a float; InputError unless it is positive and finite."""
-    numbers = int | float | np.integer | np.floating
-    if isinstance(time_constant_s, bool) or not isinstance(time_constant_s, numbers):
+    if not is_real(time_constant_s):
         raise InputError(f"time_constant_s = {time_constant_s!r}; it must be a number of seconds")
     if not 0 < time_constant_s < math.inf:
         raise InputError(

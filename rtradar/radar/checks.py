@@ -11,7 +11,7 @@ from rtradar.antenna import Antenna
 from rtradar.errors import InputError
 from rtradar.radar.schedule import FollowingCount
 from rtradar.receiver import Receiver
-from rtradar.system.checks import brief, check_keys
+from rtradar.system.checks import brief, check_keys, is_real, is_whole
 
 if TYPE_CHECKING:
     from rtradar.radar.radar import Radar
@@ -31,13 +31,7 @@ class FieldRule(NamedTuple):
 
 
 def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    return bool(-_LARGEST < value < _LARGEST)
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return is_real(value) and bool(-_LARGEST < value < _LARGEST)
 
 
 def _same(value: Any) -> Any:
@@ -64,7 +58,7 @@ _TABLES = {id(_ANTENNA): ("antenna", Antenna), id(_RECEIVER): ("receiver", Recei
 
 def _count(least: int) -> FieldRule:
     return FieldRule(
-        lambda value: _is_count(value) and least <= value <= _MOST,
+        lambda value: is_whole(value) and least <= value <= _MOST,
         int,
         f"it must be a whole number from {least} to {_MOST}",
     )
@@ -126,7 +120,7 @@ _PLACES = _list_of(
 _ANGLES = _list_of(
     _TRIPLE.allows, _TRIPLE.convert, "it must be a list of [yaw, pitch, roll] in degrees"
 )
-_ORDER = _list_of(_is_count, int, "it must be a list of whole numbers, each Tx once")
+_ORDER = _list_of(is_whole, int, "it must be a list of whole numbers, each Tx once")
 _TIMES = _list_of(_is_number, float, "it must be a list of times [s]")
 
 FIELD_RULES: dict[str, FieldRule] = {
@@ -139,7 +133,7 @@ FIELD_RULES: dict[str, FieldRule] = {
     "adc_rate_hz": _or_none(_POSITIVE),
     "frame_period_s": _or_none(_POSITIVE),
     "chirps_per_frame": FieldRule(
-        lambda value: value is None or (_is_count(value) and 1 <= value <= _MOST_CHIRPS),
+        lambda value: value is None or (is_whole(value) and 1 <= value <= _MOST_CHIRPS),
         lambda value: value if isinstance(value, int | None) else int(value),
         f"it must be a whole number from 1 to {_MOST_CHIRPS}",
     ),
@@ -158,7 +152,7 @@ FIELD_RULES: dict[str, FieldRule] = {
     "noise_figure_db": _between(0, 100),
     "noise_temperature_k": _between(0, 1e6, optional=False),
     "carrier_step_hz": _if(_is_number, float),
-    "doppler_bands": _if(_is_count, int),
+    "doppler_bands": _if(is_whole, int),
     "tx_antenna": _ANTENNA,
     "rx_antenna": _ANTENNA,
     "receiver": _RECEIVER,
@@ -261,7 +255,7 @@ def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     )
     yield (
         r.doppler_bands is None
-        or (_is_count(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST),
+        or (is_whole(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST),
         f"doppler_bands = {brief(r.doppler_bands)}; it must be a whole number above {r.n_tx}, the "
         "number of Tx",
     )

@@ -22,8 +22,8 @@ from rtradar.radar.array import Places
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.radar.schedule import FollowingCount, Schedule
 from rtradar.receiver import Receiver
-from rtradar.system.checks import check_keys, printable, read_toml
-from rtradar.system.registries import RADARS
+from rtradar.system.checks import check_keys, printable
+from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -227,7 +227,7 @@ class Radar(Schedule):
         >>> rt.Radar.preset("paper-77ghz").start_frequency_hz
         77000000000.0
         """
-        make = PRESETS.find(name, instead=", or the path of a TOML or .cfg file")
+        make = PRESETS.find(name, instead=OR_RADAR_FILE)
         with PRESETS.guarded(name):
             radar = make()
         if not isinstance(radar, Radar):
@@ -252,12 +252,9 @@ class Radar(Schedule):
         InputError
             Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
-        path = Path(source)
-        if path.suffix == ".cfg":
-            return cls.from_ti_cfg(path)
-        if str(source) in PRESETS or path.suffix != ".toml":
-            return cls.preset(str(source))
-        table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
+        path, table = Path(source), radar_table(source)
+        if table is None:
+            return cls.from_ti_cfg(path) if path.suffix == ".cfg" else cls.preset(str(source))
         keys = tuple(sorted(field.name for field in dataclasses.fields(cls)))
         try:
             check_keys("", table, (), keys)

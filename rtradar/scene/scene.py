@@ -29,11 +29,10 @@ from rtradar.system.checks import (
     check_vector,
     inside,
     printable,
-    read_toml,
     table_at,
     tables_at,
 )
-from rtradar.system.registries import scene_files
+from rtradar.system.registries import scene_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,8 +193,7 @@ class Scene:
           furniture    6: bed, wardrobe, desk, desk chair, radiator, door
           materials    plasterboard, wood, chipboard, metal
         """
-        path = Path(source) if Path(source).suffix == ".toml" else _named(str(source))
-        table = read_toml(path, "scene", "give a TOML file or the name of a scene")
+        path, table = scene_table(source)
         try:
             scene = cls(**_fields(table, path))
             for piece in (*scene.furniture, *scene.objects):
@@ -293,16 +291,6 @@ class Scene:
                     "are needed"
                 )
         return placed
-
-
-def _named(name: str) -> Path:
-    known = scene_files()
-    if name not in known:
-        raise InputError(
-            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or the path of a "
-            "TOML file"
-        )
-    return known[name]
 
 
 def _fields(table: Table, path: Path) -> dict[str, Any]:

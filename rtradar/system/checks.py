@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral, Real
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
 
 from rtradar.errors import InputError, InputErrors
 from rtradar.system.files import read_bytes
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike, NDArray
 
 Vector = tuple[float, float, float]
 Table = Mapping[str, Any]
@@ -52,6 +53,22 @@ def inside(folder: Path, name: str) -> Path | None:
     return None
 
 
+def is_real(value: object) -> TypeGuard[float]:
+    """Whether a value is a real number of Python or of NumPy, and not a truth value."""
+    return _is_of(Real, (int, float), value)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether a value is a whole number of Python or of NumPy, and not a truth value."""
+    return _is_of(Integral, (int,), value)
+
+
+def _is_of(kind: type, own: tuple[type, ...], value: object) -> bool:
+    # NumPy's numbers are known by their type of data: to import NumPy takes longer than a refusal.
+    numpys = isinstance(value, kind) and hasattr(value, "dtype")
+    return (numpys or isinstance(value, own)) and not isinstance(value, bool)
+
+
 def check_number(where: str, key: str, value: object, least: float, most: float) -> float:
     """Return a finite number from ``least`` to ``most`` as a float."""
     number = _number(value)
@@ -66,6 +83,8 @@ def check_vector(
     where: str, key: str, value: object, size: int, most: float = 1000.0
 ) -> tuple[float, ...]:
     """Return ``size`` finite numbers of magnitude up to ``most`` as a tuple of floats."""
+    import numpy as np  # a refusal on the command line does not need it
+
     if (
         isinstance(value, Sequence | np.ndarray)
         and not isinstance(value, str | bytes)
@@ -90,8 +109,7 @@ def check_text(where: str, key: str, value: object) -> str:
 
 def check_order(order: object) -> None:
     """Refuse what is no number of reflections at walls on a path."""
-    whole = isinstance(order, int | np.integer) and not isinstance(order, bool)
-    if not whole or order not in range(4):
+    if not is_whole(order) or order not in range(4):
         raise InputError(
             f"order = {brief(order)} of reflections at walls; it must be a whole number from 0 to 3"
         )
@@ -101,6 +119,8 @@ def array_to_fill(
     where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike
 ) -> NDArray[Any]:
     """Return the array given to be filled, or a new one."""
+    import numpy as np  # a refusal on the command line does not need it
+
     if out is None:
         return np.empty(shape, dtype=dtype)
     if out.shape == shape and out.dtype == dtype and out.flags.carray:
@@ -113,7 +133,7 @@ def array_to_fill(
 
 def _number(value: object) -> float | None:
     """Return a finite number as a float, and None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_real(value):
         return None
     try:
         number = float(value)

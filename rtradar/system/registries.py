@@ -5,9 +5,12 @@ The code of each is loaded on use, so that a name can be checked, or listed, at 
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
-from rtradar.system.files import shipped_folder
+from rtradar.errors import InputError
+from rtradar.system.checks import Table, brief, read_toml
+from rtradar.system.files import shipped_folder, special_kind
 from rtradar.system.registry import Registry
 
 BOARDS = ("iwr1443", "iwr1843", "awr1843", "awr2243", "iwr6843", "iwr6843aop", "awr2944")
@@ -23,6 +26,9 @@ RADARS = Registry(
     },
 )
 """Radars that have a name: each is made by a function without arguments."""
+
+OR_RADAR_FILE = ", or the path of a TOML or .cfg file"
+"""What else than a name says which radar is meant."""
 
 READERS = Registry(
     "rtradar.readers",
@@ -53,6 +59,12 @@ MODELS = Registry(
 )
 """Every model, cheapest first, the one that chooses among them, and those of other packages."""
 
+ACTIVITY_NAMES = (
+    "walk", "kick", "punch", "jumping_jack", "stand", "sit", "bend", "squat", "wave", "jump",
+    "fall", "walk_in_place", "boxing",
+)  # fmt: skip
+"""What synthetic actors can do; `rtradar.motion.ACTIVITIES` says how."""
+
 DETECTORS = Registry(
     "rtradar.detectors",
     "detector",
@@ -69,3 +81,73 @@ of range spectra ``cube``, ``radar`` and ``window_functions``."""
 def scene_files() -> dict[str, Path]:
     """Find the scenes that come with rtradar, by name."""
     return {file.stem: file for file in sorted(shipped_folder("scenes").glob("*.toml"))}
+
+
+def radar_table(source: str | Path) -> Table | None:
+    """Return the table of a radar's TOML file; None for a name, and for a .cfg file.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or is not TOML, or no radar has the name.
+    """
+    path, name = Path(source), str(source)
+    if path.suffix == ".toml" and name not in RADARS:
+        return read_toml(path, "radar", f"give a TOML file or one of: {', '.join(RADARS)}")
+    if path.suffix != ".cfg":
+        RADARS.check(name, instead=OR_RADAR_FILE)
+    return None
+
+
+def scene_table(source: str | Path) -> tuple[Path, Table]:
+    """Return the TOML file of a scene, given by its path or a name, and the file's table.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or is not TOML, or no scene has the name.
+    """
+    path, known = Path(source), scene_files()
+    if path.suffix != ".toml":
+        if str(source) not in known:
+            raise InputError(
+                f"scene {brief(str(source))} is unknown; allowed: {', '.join(known)}, or the path "
+                "of a TOML file"
+            )
+        path = known[str(source)]
+    return path, read_toml(path, "scene", "give a TOML file or the name of a scene")
+
+
+def check_activity(asked: str) -> None:
+    """Raise InputError where no synthetic actor does what is asked for, traits as text left out."""
+    activity = asked.partition(",")[0]
+    if activity not in ACTIVITY_NAMES:
+        raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITY_NAMES)}")
+
+
+def reader_of(path: str | Path, skeleton: str | Path | None = None) -> str:
+    """Return the name of the reader of a motion file, which is there.
+
+    Raises
+    ------
+    InputError
+        Where no reader takes such a file, or it is no file, or none without a ``skeleton``.
+    """
+    file = Path(path)
+    name = file.suffix.lower().removeprefix(".")
+    if name not in READERS:
+        known = ", ".join(f".{known}" for known in READERS)
+        raise InputError(
+            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc "
+            "with its .asf)"
+        )
+    # Readers of other packages may take folders, and names of what is no file; none may wait.
+    if kind := special_kind(file):
+        raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
+    # A skeleton is read before its recording.
+    if name in READERS.built_in and skeleton is None and not os.path.lexists(file):
+        raise InputError(
+            f"{file}: cannot read this {name.upper()} file (No such file or directory); check the "
+            "path"
+        )
+    return name

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief
+from rtradar.system.checks import brief, is_whole
+
+if TYPE_CHECKING:
+    import numpy as np
 
 MOST_SEED = 2**63 - 1
 """Largest seed, which fits the integers of every file format."""
@@ -16,11 +19,7 @@ _WORD = 2**32
 
 def check_seed(where: str, seed: object) -> int:
     """Return a seed from 0 to `MOST_SEED` as an int; InputError, begun with ``where``, if not."""
-    if (
-        isinstance(seed, bool)
-        or not isinstance(seed, int | np.integer)
-        or not 0 <= seed <= MOST_SEED
-    ):
+    if not is_whole(seed) or not 0 <= seed <= MOST_SEED:
         raise InputError(
             f"{where}seed = {brief(seed)}; it must be a whole number from 0 to {MOST_SEED}"
         )
@@ -47,6 +46,8 @@ def stream(seed: int, *numbers: int) -> np.random.SeedSequence:
     InputError
         If the seed is out of range.
     """
+    import numpy as np  # a refusal on the command line does not need it
+
     seed = check_seed("", seed)
     if seed < _WORD:
         return np.random.SeedSequence([seed, *numbers])

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 import rtradar as rt
 from rtradar.scene import Furniture, material
 from rtradar.scene.plan import MOST_NAMES
-from rtradar.scene.scene import scene_files
+from rtradar.system.registries import scene_files
 
 
 def named(axes: Axes) -> list[Text]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import inspect
-import os
 from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.system.files import special_kind
-from rtradar.system.registries import READERS
+from rtradar.system.registries import READERS, reader_of
 
 register_reader = READERS.register
 
@@ -43,23 +41,7 @@ def load_motion(
     ExtensionError
         Where the reader comes from another package, and fails.
     """
-    file = Path(path)
-    name = file.suffix.lower().removeprefix(".")
-    if name not in READERS:
-        known = ", ".join(f".{known}" for known in READERS)
-        raise InputError(
-            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc "
-            "with its .asf)"
-        )
-    # Readers of other packages may take folders, and names of what is no file; none may wait.
-    if kind := special_kind(file):
-        raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
-    # Before the reader is loaded, which takes longer. A skeleton is read before its recording.
-    if name in READERS.built_in and skeleton is None and not os.path.lexists(file):
-        kind = name.upper()
-        raise InputError(
-            f"{file}: cannot read this {kind} file (No such file or directory); check the path"
-        )
+    file, name = Path(path), reader_of(path, skeleton)
     read = READERS[name]
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters

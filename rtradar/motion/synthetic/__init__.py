@@ -31,6 +31,8 @@ from rtradar.motion.synthetic.gait import walk, walk_in_place
 from rtradar.motion.synthetic.gait_styles import GAITS
 from rtradar.motion.synthetic.jacks import jump, jumping_jack
 from rtradar.motion.synthetic.stance import stand
+from rtradar.system.checks import is_whole
+from rtradar.system.registries import check_activity
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
 
@@ -171,9 +173,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
 
 def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:
     """The activity, and all its traits, those that are not given by their defaults."""
+    check_activity(asked)
     activity, *texts = asked.split(",")
-    if activity not in ACTIVITIES:
-        raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
     defaults = {name: default for name, (default, _, _) in _RANGES.items()}
     chosen: dict[str, Any] = {"side": "left", "style": "", "take": 0, **defaults}
     for name in traits:
@@ -196,7 +197,7 @@ def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:
             f"style {chosen['style']!r} of {activity}; allowed are {', '.join(styles) or 'none'}"
         )
     take = chosen["take"]
-    if isinstance(take, bool) or not isinstance(take, (int, np.integer)) or take < 0:
+    if not is_whole(take) or take < 0:
         raise InputError(f"take {take!r}; it must be a whole number, zero or more")
     for name, (_, low, high) in _RANGES.items():
         value = chosen[name]

@@ -17,6 +17,7 @@ from rtradar.body.body import MAXIMUM_SUBDIVISIONS, unit_sphere
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves, integrate
+from rtradar.system.checks import is_whole
 from rtradar.system.threads import thread_map
 
 MAXIMUM_FACETS = 20 * 4**MAXIMUM_SUBDIVISIONS
@@ -37,8 +38,7 @@ _PARALLEL_TERMS = 4_000_000
 
 def subdivisions_for(facets: int) -> int:
     """Subdivisions of the icosphere with at least that many triangles, 20 to `MAXIMUM_FACETS`."""
-    whole = isinstance(facets, int | np.integer) and not isinstance(facets, bool)
-    if not whole or not 20 <= facets <= MAXIMUM_FACETS:
+    if not is_whole(facets) or not 20 <= facets <= MAXIMUM_FACETS:
         raise InputError(
             f"facets = {facets!r}; it must be a whole number from 20 to {MAXIMUM_FACETS}, "
             "counted per ellipsoid"

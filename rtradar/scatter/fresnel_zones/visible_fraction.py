@@ -31,6 +31,7 @@ from rtradar.kernels.scatter.zones.fresnel_zones import (
     zone_sums,
 )
 from rtradar.kernels.scatter.zones.zone_edges import Edges, open_fractions
+from rtradar.system.checks import is_whole
 from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -114,8 +115,7 @@ def bounds_of(shadow_rays: int) -> Bounds:
     (`validation/other_methods/fresnel.py`, power beside the Doppler line). An `InputError` is
     raised if ``shadow_rays`` is out of range.
     """
-    whole = isinstance(shadow_rays, int | np.integer) and not isinstance(shadow_rays, bool)
-    if not (whole and LEAST_SHADOW_RAYS <= shadow_rays <= MOST_SHADOW_RAYS):
+    if not (is_whole(shadow_rays) and LEAST_SHADOW_RAYS <= shadow_rays <= MOST_SHADOW_RAYS):
         raise InputError(
             f"fresnel: shadow_rays = {shadow_rays!r}; it must be a whole number from "
             f"{LEAST_SHADOW_RAYS} to {MOST_SHADOW_RAYS}"

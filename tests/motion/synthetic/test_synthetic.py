@@ -20,6 +20,7 @@ from rtradar.motion.synthetic.figure import (
     keyed,
     smooth,
 )
+from rtradar.system.registries import ACTIVITY_NAMES
 
 NODE = NODES.index
 
@@ -28,6 +29,10 @@ def speeds(motion: Motion, node: str) -> np.ndarray:
     return np.linalg.norm(
         np.gradient(motion.positions[:, NODE(node)], 1 / motion.rate_hz, axis=0), axis=1
     )
+
+
+def test_every_activity_has_the_name_that_is_checked() -> None:
+    assert tuple(ACTIVITIES) == ACTIVITY_NAMES
 
 
 subjects = st.fixed_dictionaries(
