@@ -233,11 +233,13 @@ def _doppler_power(k: Any) -> Calls:
     return call, lambda: k.doppler_power_reference(spectra, range(8), weights)
 
 
-@kernel_case("prime_factor_dft.pick_cells", "3600 cells of 133 cycles, 8 channels, 256 bins", 3e-6)
+@kernel_case(
+    "prime_factor_dft.pick_cells", "3600 cells of 133 cycles, 8 channels, 142 of 256 bins", 3e-6
+)
 def _pick_cells(k: Any) -> Calls:
     spectra, weights = _spectra(133, 8, 256), np.linspace(0, 1, 133, dtype=np.float32)
     cell = np.arange(400)
-    cells = cell * 7 % 133, (cell[:, None] // 3 + np.arange(9)) % 256
+    cells = cell * 7 % 133, cell[:, None] // 3 + np.arange(9), np.arange(142) + 60
     out = np.empty((400, 9, 8), dtype=np.complex64)
     given = spectra, range(8), weights, k.prime_factor_dft(133), cells
     call = filled(k.pick_cells, *given, out=(out,))

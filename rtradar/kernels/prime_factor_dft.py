@@ -93,7 +93,7 @@ def add_doppler_power(
     range)``, contiguous, have in ``channels``, in steps of one, with ``weights (cycle,)``; all are
     of single precision.
     """
-    none = np.empty(0, np.int64), np.empty((0, 0), np.int64)
+    none = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0, np.int64)
     values = np.empty((0, 0, 0), np.complex64)
     _transform(
         _read_only(spectra), channels.start, channels.stop, weights, dft, power, none, values
@@ -111,17 +111,20 @@ def pick_cells(
     channels: range,
     weights: NDArray[np.float32],
     dft: PrimeFactorDft,
-    cells: tuple[NDArray[np.int64], NDArray[np.int64]],
+    cells: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
     values: NDArray[np.complex64],
 ) -> None:
     """Fill in some channels the chosen cells of weighted DFTs over the cycles.
 
-    ``cells`` are the Doppler bin ``(cell,)`` in the order of the DFT and the range bins ``(cell,
-    offset)`` of each; ``values (cell, offset, channel)`` are filled. The rest is as for
+    ``cells`` are the Doppler bin ``(cell,)`` of each in the order of the DFT, its range bins
+    ``(cell, offset)`` as places in a list, and that list of the range bins ``(bin,)`` that are
+    transformed; ``values (cell, offset, channel)`` are filled. The rest is as for
     `add_doppler_power`.
     """
-    turns, bins = cells
-    place = np.argsort(dft.bin_at)[turns], bins
+    turns, at, bins = cells
+    # A few bins of some channels side by side fill the lanes.
+    lanes = (np.asarray(channels)[:, None] * spectra.shape[2] + bins).ravel()
+    place = np.argsort(dft.bin_at)[turns], at, lanes
     power = np.empty((0, 0), np.float32)
     _transform(
         _read_only(spectra), channels.start, channels.stop, weights, dft, power, place, values
@@ -130,9 +133,9 @@ def pick_cells(
 
 def pick_cells_reference(spectra, weights, cells):
     """The values of `pick_cells` in all channels, by SciPy."""
-    turns, bins = cells
+    turns, at, bins = cells
     transformed = scipy.fft.fft(spectra * weights[:, None, None], axis=0, overwrite_x=True)
-    return transformed[turns[:, None], :, bins]
+    return transformed[turns[:, None], :, bins[at]]
 
 
 def _read_only(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
@@ -180,6 +183,15 @@ def _read(samples, weight, out):
     for c in range(len(samples)):
         out[c] = samples[c].real * weight
         out[_COLUMNS + c] = samples[c].imag * weight
+
+
+@inlined(fastmath={"contract"})
+def _gather(samples, lanes, weight, out):
+    """As `_read`, but of samples at these places."""
+    for c in range(len(lanes)):
+        sample = samples[lanes[c]]
+        out[c] = sample.real * weight
+        out[_COLUMNS + c] = sample.imag * weight
 
 
 @inlined(fastmath={"contract"})
@@ -302,23 +314,29 @@ def _transform_line(cosines, sines, store, line, to_power):
 
 
 @inlined()
-def _pick(store, cells, begin, end, channel, values):
-    """Fill values of a channel that lie in these range bins from the transformed grid."""
-    places, bins = cells
+def _pick(store, cells, begin, end, channel_begin, channel_end, values):
+    """Fill values of these channels that lie in these lanes from the transformed grid."""
+    places, at, lanes = cells
+    bins = len(lanes) // (channel_end - channel_begin)
     for cell in range(len(places)):
         row = _row(store.grid, places[cell])
-        for offset in range(bins.shape[1]):
-            c = bins[cell, offset] - begin
-            if 0 <= c < end - begin:
-                values[cell, offset, channel] = complex(row[c], row[_COLUMNS + c])
+        for offset in range(at.shape[1]):
+            for channel in range(channel_begin, channel_end):
+                c = (channel - channel_begin) * bins + at[cell, offset] - begin
+                if 0 <= c < end - begin:
+                    values[cell, offset, channel] = complex(row[c], row[_COLUMNS + c])
 
 
 # One function for both, because it takes longer to compile than most.
 @compiled(fastmath={"contract"})
 def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, values):
-    """Add power (doppler, range), unless it is empty; else fill values at cells (place, bins)."""
+    """Add power (doppler, range), unless it is empty; else fill values at cells.
+
+    These are (place, place of their bins among those of a channel, lanes).
+    """
     to_power = len(power) > 0
     cycles, _, n_range = spectra.shape
+    n_lanes, passes = (n_range, channel_end - channel_begin) if to_power else (len(cells[2]), 1)
     n_1, n_2 = dft.factors
     terms = max(dft.cosines[0].shape[1], dft.cosines[1].shape[1])
     store = _Store(
@@ -331,14 +349,19 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
         on_cache_lines(_TOGETHER * _ROW, weights),
         on_cache_lines(_TOGETHER * _ROW, weights),
     )
-    for begin in range(0, n_range, _COLUMNS):
-        end = min(begin + _COLUMNS, n_range)
-        # Lanes beyond the last range bins are 0 as well.
-        store.grid[:], store.sums[:], store.even[:], store.odd[:] = 0, 0, 0, 0
-        for channel in range(channel_begin, channel_end):
+    store.grid[:], store.even[:], store.odd[:] = 0, 0, 0
+    for begin in range(0, n_lanes, _COLUMNS):
+        # What lanes beyond the last ones hold is transformed, too, and not read.
+        end = min(begin + _COLUMNS, n_lanes)
+        store.sums[:] = 0
+        for channel in range(channel_begin, channel_begin + passes):
             for place in range(cycles):
-                cycle = dft.cycle_at[place]
-                _read(spectra[cycle, channel, begin:end], weights[cycle], _row(store.grid, place))
+                cycle, row = dft.cycle_at[place], _row(store.grid, place)
+                if to_power:
+                    _read(spectra[cycle, channel, begin:end], weights[cycle], row)
+                else:
+                    samples = spectra[cycle].reshape(-1)
+                    _gather(samples, cells[2][begin:end], weights[cycle], row)
             for last in (False, True):
                 # First along the second factor, whose places are neighbours, then the first.
                 factor, step = (n_1, n_2) if last else (n_2, 1)
@@ -353,7 +376,8 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
                     line = first, step, factor, at_half
                     _fold_line(store, line)
                     _transform_line(cosines, sines, store, line, to_power and last)
-            _pick(store, cells, begin, end, channel, values)
+        if not to_power:
+            _pick(store, cells, begin, end, channel_begin, channel_end, values)
         for place in range(cycles if to_power else 0):
             own, out = _powers(store.sums, place), power[dft.bin_at[place], begin:end]
             for c in range(len(out)):

@@ -7,6 +7,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
+import h5py
+
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large_maps
@@ -153,7 +155,7 @@ def run_into(
         # Only now, for the echoes that the view asks for do not belong into the model's account.
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(capture))
-            with open_maps(folder / "maps.h5") as maps:
+            with h5py.File(folder / "maps.h5") as maps:
                 _add_room(summary, capture, maps)
         with capture.stages.time("report"):
             write_report(

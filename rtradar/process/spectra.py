@@ -230,17 +230,18 @@ def cell_spectra(
     scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     dft = prime_factor_dft(n_cycles) if cube.dtype == np.complex64 else None
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
+    used, place = np.unique(steps, return_inverse=True)
+    place = place.reshape(steps.shape)
     if dft is not None:
+        cells = turns, place, used
         # Channels of one Tx lie side by side in what is filled.
         thread_map(
             lambda first: pick_cells(
-                channels, range(first, first + radar.n_rx), scale, dft, (turns, steps), values
+                channels, range(first, first + radar.n_rx), scale, dft, cells, values
             ),
             range(0, radar.n_channels, radar.n_rx),
         )
         return values
-    used, place = np.unique(steps, return_inverse=True)
-    place = place.reshape(steps.shape)
 
     def transform(channel: int) -> None:
         # One channel at a time fits the cache of a core.

@@ -22,7 +22,7 @@ from rtradar.report.view.run_view import (
     view_data,
 )
 from rtradar.report.view.snapshots import Snapshots
-from rtradar.report.view.three_d import semi_axis_poses
+from rtradar.report.view.three_d import drawn_sphere, semi_axis_poses
 
 pytestmark = pytest.mark.drawn
 
@@ -198,3 +198,13 @@ def test_a_false_alarm_does_not_set_the_box() -> None:
     points = [(0.1, 4.5, 0.5)] * 200 + [(0.1, 9.0, 7.0)]
     (_, fast), (_, far) = linked(points).shown_box()
     assert (fast, far) == pytest.approx((1.5, 5.5))
+
+
+def test_the_sphere_that_pages_draw_is_closed_and_its_faces_look_outward() -> None:
+    vertices, faces = drawn_sphere()
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, rtol=1e-12)
+    # Volumes of the tetrahedra from the centre to each face: all positive, and together those of a
+    # sphere but for its curvature.
+    volumes = np.linalg.det(vertices[faces]) / 6
+    assert volumes.min() > 0
+    assert volumes.sum() == pytest.approx(4 / 3 * np.pi, rel=0.06)

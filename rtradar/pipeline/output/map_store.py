@@ -72,6 +72,7 @@ _SINGLE = {
     "detections_received": _Map(_FRAME[1:], _MARKED, np.uint8, "1"),
     "range_azimuth_received": _Map(("range", "azimuth"), _BEFORE.format("range_azimuth of that")),
 }
+_MOST_WAITING = 2_000_000  # bytes of maps that are not yet written
 _STEPS_A_CHUNK = 64  # time steps written together, for maps with few numbers a step
 
 
@@ -99,6 +100,8 @@ class MapStore:
         self._owned, self._unit = isinstance(file, Path), unit
         self._raw = LastingFile(file.open("w+b") if isinstance(file, Path) else file)
         self._file = h5py.File(self._raw, "w", libver="latest")
+        self._waiting: dict[str, list[NDArray[Any]]] = {}
+        self._waiting_bytes = 0
         self._file.attrs.update(attributes)
         for name in _GROWING:
             self._scale(name, data=np.zeros(0), maxshape=(None,), chunks=(1024,))
@@ -132,12 +135,24 @@ class MapStore:
             data.dims[number].attach_scale(self._file[axis])
 
     def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
-        """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it."""
+        """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it.
+
+        They wait until there are some megabytes, for HDF5 takes as long for one step as for many.
+        """
         for name, added in ((axis, values), *maps.items()):
-            steps = np.asarray(added)
-            data = self._file[name]
+            kind = _MAPS[name].dtype if name in _MAPS else np.float64
+            steps: NDArray[Any] = np.array(added, dtype=kind)
+            self._waiting.setdefault(name, []).append(steps)
+            self._waiting_bytes += steps.nbytes
+        if self._waiting_bytes >= _MOST_WAITING:
+            self._write()
+
+    def _write(self) -> None:
+        for name, added in self._waiting.items():
+            steps, data = np.concatenate(added), self._file[name]
             data.resize(len(data) + len(steps), axis=0)
             data[len(data) - len(steps) :] = steps
+        self._waiting, self._waiting_bytes = {}, 0
         self._raw.check()
 
     def put(self, time_s: float, **maps: ArrayLike) -> None:
@@ -149,6 +164,7 @@ class MapStore:
 
     def put_truth(self, body: Body) -> None:
         """Write what is true of each person of a body at the times of the frames."""
+        self._write()
         for name, names in truth_axes(body).items():
             axis = self._file.create_dataset(name, data=list(names), dtype=h5py.string_dtype())
             axis.make_scale(name)
@@ -160,9 +176,13 @@ class MapStore:
 
     def close(self) -> None:
         """Write what is buffered and close the file; may be called again."""
-        self._file.close()
-        if self._owned:
-            self._raw.close()
+        try:
+            if self._file:
+                self._write()
+        finally:
+            self._file.close()
+            if self._owned:
+                self._raw.close()
 
 
 def open_maps(file: Path | BinaryIO) -> xr.Dataset:

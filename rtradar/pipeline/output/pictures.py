@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
-from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
@@ -43,7 +42,7 @@ def draw_found(
 ) -> tuple[dict[str, Path], int]:
     """Draw ``maps.h5`` of this folder and the clouds; also return the frame that was chosen."""
     drawn: dict[str, Path] = {}
-    with open_maps(folder / "maps.h5") as maps:
+    with h5py.File(folder / "maps.h5") as maps:
         found = maps, clouds.rdt.points, clouds.spatial, radar
         plots = Plots(*found, {"parameters": settings.parameters()}, new_figure=new_figure)
         angles = [name for name in ("azimuth", "elevation") if name in maps]

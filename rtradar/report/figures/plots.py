@@ -37,6 +37,7 @@ from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of
 
 if TYPE_CHECKING:
+    import h5py
     import xarray as xr
 
 _FRAMES_AT_ONCE = 64
@@ -64,7 +65,7 @@ class Plots:
 
     Parameters
     ----------
-    maps : xarray.Dataset
+    maps : xarray.Dataset or h5py.File
         Maps as ``maps.h5`` has them.
     points : (point, 3) float64
         RDT cloud: time [s], range [m], velocity [m/s].
@@ -78,7 +79,7 @@ class Plots:
         Function that makes the figure, from its height [inch].
     """
 
-    maps: xr.Dataset
+    maps: xr.Dataset | h5py.File
     points: NDArray[np.float64]
     spatial_cloud: SpatialCloud
     radar: Radar
@@ -103,10 +104,11 @@ class Plots:
         """
         when_s, ax = axes_given(time_s, ax)
         frame, when = self.frame(when_s)
-        map_, mask = self.maps["range_doppler"][frame], self.maps["detections"][frame].values > 0
+        maps = self.maps["range_doppler"]
+        power, mask = np.asarray(maps[frame]), np.asarray(self.maps["detections"][frame]) > 0
         unit = self._unit(range_m=self.radar.range_m[:, None])
-        level = unit.level(map_.values / self.radar.n_channels)
-        velocity, distance = self.maps["velocity"].values, self.radar.range_m
+        level = unit.level(power / self.radar.n_channels)
+        velocity, distance = self._axis("velocity"), self.radar.range_m
         view = (
             fitted_limits(mask.sum(axis=0), velocity, include=0.0),
             fitted_limits(mask.sum(axis=1), distance),
@@ -119,10 +121,10 @@ class Plots:
         left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
         note = colours
         if self._parameters.get("detector") != "ti-oob":  # which leaves out what is no peak
-            note += f" {masking_note(map_.values, mask)}"
+            note += f" {masking_note(power, mask)}"
         what = "Range-Doppler map"
         what += f" and {np.count_nonzero(mask)} detections" if right is not None else ""
-        title = self._title(f"{what},\n{when}", map_)
+        title = self._title(f"{what},\n{when}", maps)
         axes = [left]
         if right is not None:
             rows, columns = np.nonzero(mask)
@@ -150,7 +152,7 @@ class Plots:
         """
         axes = self._axes(ax)
         data = self.maps["range_time"]
-        power, times = thinned(data, self.maps["slow_time"].values)
+        power, times = thinned(data, self._axis("slow_time"))
         unit = self._unit(range_m=self.radar.range_m)
         view = None, self._range_limits
         level = unit.level(power).T
@@ -184,8 +186,8 @@ class Plots:
                 "spectrogram: the capture is shorter than one window; simulate a longer one"
             )
         axes = self._axes(ax)
-        power, times = thinned(data, self.maps["spectrogram_time"].values)
-        velocity = self.maps["spectrogram_velocity"].values
+        power, times = thinned(data, self._axis("spectrogram_time"))
+        velocity = self._axis("spectrogram_velocity")
         # One echo is spread over as many range bins.
         power = power / noise_bandwidth_bins(
             self._parameters.get("range_window", "hann"), self.radar.samples_per_chirp
@@ -362,7 +364,7 @@ class Plots:
         InputError
             If the time is not within the capture.
         """
-        times = self.maps["time"].values
+        times = self._axis("time")
         if time_s is None:
             frame = int(self._found.moving.argmax())
             return frame, f"window of most energy, at {times[frame]:.2f} s"
@@ -410,7 +412,10 @@ class Plots:
             return FieldUnit(COUNTS, 1.0)
         return field_unit(self.radar, spreading=self._parameters.get("spreading", True), **options)
 
-    def _title(self, what: str, data: xr.DataArray) -> str:
+    def _axis(self, name: str) -> NDArray[np.float64]:
+        return np.asarray(self.maps[name])
+
+    def _title(self, what: str, data: Any) -> str:
         lines = [what, str(self.maps.attrs.get("title", ""))]
         how = str(data.attrs.get("clutter_removal", "none"))
         lines += [] if how == "none" else [f"static clutter removed: {how}"]
@@ -425,13 +430,13 @@ class Plots:
         by_range, by_velocity = np.zeros(n_range), np.zeros(n_velocity)
         moving, still = np.zeros(n_frames), np.zeros(n_frames)
         # Not static clutter, which fills the main lobe of the window function at velocity 0.
-        moves = np.abs(self.maps["velocity"].values) > 2.5 * self.radar.velocity_bin_mps
+        moves = np.abs(self._axis("velocity")) > 2.5 * self.radar.velocity_bin_mps
         for first in range(0, n_frames, _FRAMES_AT_ONCE):
             some = slice(first, first + _FRAMES_AT_ONCE)
-            mask = masks[some].values > 0
+            mask = np.asarray(masks[some]) > 0
             by_range += mask.sum(axis=(0, 2))
             by_velocity += mask.sum(axis=(0, 1))
-            power = np.where(mask, maps[some].values, 0)
+            power = np.where(mask, np.asarray(maps[some]), 0)
             moving[some] = power[..., moves].sum(axis=(1, 2))
             still[some] = power.sum(axis=(1, 2))
         return _Found(by_range, by_velocity, moving if moving.any() else still)
@@ -440,13 +445,13 @@ class Plots:
     def _range_limits(self) -> tuple[float, float]:
         counts = self._found.by_range
         if not counts.any():
-            times = self.maps["slow_time"].values
+            times = self._axis("slow_time")
             counts = above_floor(thinned(self.maps["range_time"], times)[0]).sum(axis=0)
         return fitted_limits(counts, self.radar.range_m, handful=self._handful)
 
     @cached_property
     def _velocity_limits(self) -> tuple[float, float]:
-        counts, velocity = self._found.by_velocity, self.maps["velocity"].values
+        counts, velocity = self._found.by_velocity, self._axis("velocity")
         return fitted_limits(counts, velocity, include=0.0, handful=self._handful)
 
     @property
@@ -460,9 +465,9 @@ class Plots:
     ) -> Axes:
         frame, when = self.frame(time_s)
         axes = self._axes(ax)
-        data, angles = self.maps[f"range_{name}"][frame], np.degrees(self.maps[name].values)
+        maps, angles = self.maps[f"range_{name}"], np.degrees(self._axis(name))
         # One echo is spread over as many velocities.
-        power = data.values / noise_bandwidth_bins(
+        power = np.asarray(maps[frame]) / noise_bandwidth_bins(
             self._parameters.get("doppler_window", "hann"), self.radar.cycles_per_frame
         )
         unit = self._unit(range_m=self.radar.range_m[:, None])
@@ -472,7 +477,7 @@ class Plots:
             axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=40
         )
         axes.set(xlabel=angle_label(name, self.radar), ylabel="Range [m]")
-        title = self._title(f"Range-{name}, {when}", data) if heading else f"Range-{name}"
+        title = self._title(f"Range-{name}, {when}", maps) if heading else f"Range-{name}"
         dress(axes, title=title, note=colours, grid=False)
         add_colour_bar(image, [axes], unit.label("detected cells"))
         return axes

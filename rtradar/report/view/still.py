@@ -14,9 +14,9 @@ from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
-from rtradar.body import unit_sphere
 from rtradar.report.figures.canvas import VELOCITY_LABEL, add_colour_bar
 from rtradar.report.view.run_view import GROUPS, VELOCITY_COLOURS, Levels, RunView, group_of_parts
+from rtradar.report.view.three_d import drawn_sphere
 from rtradar.system.figure_style import dress, new_figure, save_figure, write_heading
 from rtradar.system.files import atomic_file
 
@@ -134,7 +134,7 @@ class _Paint:
 def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     snapshots = run_view.snapshots
     radar = run_view.radar.at(float(snapshots.times[step]))
-    vertices, faces = unit_sphere(2)
+    vertices, faces = drawn_sphere()
     poses = snapshots.poses[step].astype(np.float64)
     tints = paint.parts(step)
     for part in np.flatnonzero(snapshots.drawn_parts):

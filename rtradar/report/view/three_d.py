@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body import Body, unit_sphere
+from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
@@ -19,8 +19,27 @@ from rtradar.report.figures.fitting import place_limits
 MOST_POINTS = 20_000
 """Largest number of points of a cloud that a browser still rotates smoothly."""
 
-_SUBDIVISIONS = 2
+_PARALLELS, _MERIDIANS = 9, 18
 _MARGIN_M = 0.4
+
+
+def drawn_sphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (vertex, xyz) and faces (face, corner) of a unit sphere, to be looked at.
+
+    They lie on meridians; `rtradar.body.unit_sphere`, which is computed with, takes a package whose
+    import takes longer than a page.
+    """
+    polar, around = np.meshgrid(
+        np.linspace(0, np.pi, _PARALLELS + 1),
+        np.linspace(0, 2 * np.pi, _MERIDIANS, endpoint=False),
+        indexing="ij",
+    )
+    places = np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)
+    at = np.arange(polar.size).reshape(polar.shape)
+    east = np.roll(at, -1, axis=1)
+    lower = np.stack([at[:-1], at[1:], east[1:]], axis=-1)[:-1]  # none at the south pole
+    upper = np.stack([at[:-1], east[1:], east[:-1]], axis=-1)[1:]  # none at the north pole
+    return np.stack(places, axis=-1).reshape(-1, 3), np.concatenate([lower, upper]).reshape(-1, 3)
 
 
 def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -41,7 +60,7 @@ def posed_figure(
     [m] of every frame, or once of a radar at rest; ``ranges`` of the axes x, y, z [m].
     """
     centres, axes = poses[:, :, 0], poses[:, :, 1:]
-    vertices, faces = unit_sphere(_SUBDIVISIONS)
+    vertices, faces = drawn_sphere()
     # Half the extent of an ellipsoid along a world axis is the root of the sum of squares of its
     # semi-axes' components.
     extent = np.sqrt((axes**2).sum(axis=2))
