@@ -38,6 +38,8 @@ STYLE: Mapping[str, Any] = {
 }
 """Sizes and fonts [pt], by the names of Matplotlib's settings; ``font.size`` is that of notes."""
 
+_PNG_LEVEL = 3  # takes 0.6 of the time of the usual 6, for files larger by a tenth
+
 DIVERGING = "coolwarm"
 """Colour map of velocities: blue approaches, red recedes."""
 
@@ -146,7 +148,7 @@ def write_png(figure: Any, file: Path | BinaryIO) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas: Any = FigureCanvasAgg(figure)
-    canvas.print_png(file)
+    canvas.print_png(file, pil_kwargs={"compress_level": _PNG_LEVEL})
     FigureCanvasBase(figure)  # in place of the canvas that holds what was drawn
 
 
