@@ -89,6 +89,7 @@ DATA_SET_KEYS = {
             "of maps",
             "`[]`",
         ),
+        "angles": ("`false` leaves spatial clouds empty, which saves the time of angles", "`true`"),
         "folder": ("folder of the recordings, from the folder of this file", "`.`"),
     },
     "[windows]": {

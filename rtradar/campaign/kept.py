@@ -42,16 +42,22 @@ class Capture(NamedTuple):
 
 
 def capture_of(
-    people: Moving, radar: Radar, scene: Scene, keep: Sequence[str], **options: Unpack[RunOptions]
+    people: Moving,
+    radar: Radar,
+    scene: Scene,
+    keep: Sequence[str],
+    angles: bool = True,
+    **options: Unpack[RunOptions],
 ) -> Capture:
     """Compute the clouds of a run with these settings, and the kinds of arrays to ``keep``.
 
-    Joints are those of the first person.
+    Joints are those of the first person. Without ``angles`` the spatial cloud is empty.
     """
     capture = prepare(people, radar, scene, RunSettings(**options))
     sources = (*capture.body.names, *(one.name for one in capture.scene.objects))
-    several = len(sources) > 1
-    keeper = MapKeeper(capture.processing, keep, Sources(capture).of_cells if several else None)
+    several = angles and len(sources) > 1
+    source_of = Sources(capture).of_cells if several else None
+    keeper = MapKeeper(capture.processing, keep, source_of, angles)
     capture.stream(keeper, progress=False)
     maps = keeper.maps()
     if "joints" in keep:
@@ -73,7 +79,8 @@ def sizes(radar: Radar) -> tuple[object, ...]:
 class MapKeeper:
     """Makes the clouds of one capture from its range spectra, and collects maps on the way.
 
-    ``source_of`` tells who returned most of a cell, where that is asked. So that memory stays low,
+    ``source_of`` tells who returned most of a cell, where that is asked; without ``angles`` the
+    spatial cloud is empty. So that memory stays low,
     `push` takes at most ``max_chirps`` chirps.
     """
 
@@ -82,9 +89,10 @@ class MapKeeper:
         processing: Processing,
         keep: Sequence[str],
         source_of: SourceOfCells | None = None,
+        angles: bool = True,
     ) -> None:
         self._processing, self._keep, radar = processing, keep, processing.radar
-        self._clouds = CloudMaker(processing, source_of)
+        self._clouds = CloudMaker(processing, source_of, angles)
         self.max_chirps = self._clouds.max_chirps
         self._spectrogram = SlidingSpectrogram(
             radar, removal=processing.removal, window_functions=processing.window_functions

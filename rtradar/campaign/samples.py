@@ -145,6 +145,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
     if spec.keep:
         common["keep"] = list(spec.keep)
+    if not spec.angles:
+        common["angles"] = False
     planned = [
         _plan(interval, combination, common, spec.others)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
@@ -326,7 +328,12 @@ def make_sample(plan: SamplePlan) -> Made:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         clouds, maps, warmup_s, sources = capture_of(
-            people, plan.radar, plan.scene, values.get("keep", ()), **settings
+            people,
+            plan.radar,
+            plan.scene,
+            values.get("keep", ()),
+            values.get("angles", True),
+            **settings,
         )
     limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}
     found = {

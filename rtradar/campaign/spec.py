@@ -99,6 +99,7 @@ class Spec(NamedTuple):
     """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
 
     ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
+    Without ``angles`` spatial clouds are empty.
     """
 
     run: RunSettings
@@ -110,6 +111,7 @@ class Spec(NamedTuple):
     keep: tuple[str, ...] = ()
     others: Others | None = None
     augmented: Augmented | None = None
+    angles: bool = True
 
 
 def check_samples(intervals: int, combinations: int) -> None:

@@ -78,6 +78,7 @@ _TOP = (
     "seed",
     *RUN_KEYS,
     "keep",
+    "angles",
     "folder",
     "windows",
     "each",
@@ -139,12 +140,14 @@ def _spec(table: Table, folder: Path) -> Spec:
         for key, (usual, least, most) in DRAWN.items()
     }
     keep = wrong.of(_keep, table) or ()
+    angles = wrong.of(_angles, table, keep)
     run = wrong.of(_run_settings, table)
     others = wrong.of(_others, table)
     augmented = wrong.of(_augmented, table)
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
+    assert angles is not None
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.most(intervals.needed_s)
     copies = 1 + (augmented.copies if augmented else 0)
@@ -155,13 +158,25 @@ def _spec(table: Table, folder: Path) -> Spec:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
         check_equal_sizes(keep, lengths, combinations)
-    return Spec(run, intervals, combinations, drawn, actors, recordings, keep, others, augmented)
+    return Spec(
+        run, intervals, combinations, drawn, actors, recordings, keep, others, augmented, angles
+    )
 
 
 def _keep(table: Table) -> tuple[str, ...]:
     """Return the kinds of arrays to keep, in the order of `KEPT`."""
     kinds = _names("keep", table.get("keep", []), KEPT)
     return tuple(kind for kind in KEPT if kind in kinds)
+
+
+def _angles(table: Table, keep: Collection[str]) -> bool:
+    """Return whether angles are computed, for spatial clouds and for what is kept."""
+    angles = table.get("angles", True)
+    if not isinstance(angles, bool):
+        raise InputError(f"angles = {brief(angles)}; allowed: true, false")
+    if not angles and "range_azimuth" in keep:
+        raise InputError("angles = false, and keep has range_azimuth; leave one of them out")
+    return angles
 
 
 def _names(key: str, value: object, allowed: Collection[str]) -> list[str]:

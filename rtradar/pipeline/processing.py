@@ -154,12 +154,19 @@ SourceOfCells = Callable[[int, NDArray[np.floating], NDArray[np.bool_]], NDArray
 class CloudMaker:
     """Accumulates the clouds of one capture from its range spectra.
 
-    ``source_of`` tells who returned most of a cell, where that is known. So that memory stays low,
+    ``source_of`` tells who returned most of a cell, where that is known. Without ``angles`` the
+    spatial cloud is empty, as it is where the radar measures none. So that memory stays low,
     `push` takes at most ``max_chirps`` chirps.
     """
 
-    def __init__(self, processing: Processing, source_of: SourceOfCells | None = None) -> None:
+    def __init__(
+        self,
+        processing: Processing,
+        source_of: SourceOfCells | None = None,
+        angles: bool = True,
+    ) -> None:
         self._processing, radar, self._source_of = processing, processing.radar, source_of
+        self._angles = angles and bool(measured_angles(radar))
         self._sliding = SlidingWindows(radar)
         self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
         self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=7)
@@ -181,7 +188,7 @@ class CloudMaker:
         """Process and yield the frames that end with these chirps, and add them to the clouds."""
         radar, stages = self._processing.radar, self._processing.stages
         window_functions = self._processing.window_functions
-        for _, start, window in self._sliding.push(spectra):
+        for _, start, window in stages.each("frames", self._sliding.push(spectra)):
             with stages.time("clutter removal"):
                 cube = self._processing.removal.window(window)
             with stages.time("doppler"):
@@ -195,7 +202,7 @@ class CloudMaker:
             if self._source_of is not None:
                 with stages.time("sources"):
                     source = self._source_of(start, power, mask)
-            if measured_angles(radar):
+            if self._angles:
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
                     found = (

@@ -7,10 +7,11 @@ import platform
 import resource
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from typing import TypeVar
 
 _LINES = {
     "survey": "link budget",
@@ -20,6 +21,8 @@ _LINES = {
     "report": "writing the report",
 }
 """Stages that have a line of their own on a terminal. Echoes and maps have a progress bar."""
+
+_Item = TypeVar("_Item")
 
 _lines_shown: ContextVar[bool] = ContextVar("lines_shown", default=False)
 
@@ -67,6 +70,17 @@ class Stages:
                 yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+    def each(self, name: str, items: Iterable[_Item]) -> Iterator[_Item]:
+        """Yield items, and add the time until each comes to stage ``name``."""
+        left = iter(items)
+        while True:
+            with self.time(name):
+                try:
+                    item = next(left)
+                except StopIteration:
+                    return
+            yield item
 
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h of the GNU C library

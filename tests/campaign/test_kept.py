@@ -160,9 +160,28 @@ def test_nothing_more_is_kept_unless_asked_for(tmp_path: Path) -> None:
     assert "keep" not in made.sample.provenance
 
 
+def test_without_angles_the_other_clouds_are_the_same(tmp_path: Path) -> None:
+    made = []
+    for text in ("angles = true\n", "angles = false\n"):
+        plans = plan_samples(read_spec(write(tmp_path, text + SPEC)))
+        plans.sort(key=lambda plan: str(plan.parameters["recording"]))
+        made.append(make_sample(plans[0].packed()))
+    with_angles, without = made
+    np.testing.assert_array_equal(with_angles.sample.points, without.sample.points)
+    assert len(with_angles.spatial) > 0
+    assert without.spatial.shape == (0, 3)
+    assert "angles" not in with_angles.sample.provenance
+    assert without.sample.provenance["angles"] is False
+    assert build_dataset(tmp_path / "set.toml", tmp_path / "out")["made"] == 3
+    clouds = Collection(tmp_path / "out")
+    assert all(clouds.spatial(index).shape == (0, 3) for index in range(3))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        ("angles = 1\n" + SPEC, "angles = 1; allowed: true, false"),
+        ("angles = false\n" + KEEP + SPEC, "angles = false, and keep has range_azimuth; leave one"),
         (
             'keep = ["pictures"]\n' + SPEC,
             "keep = ['pictures']; it must be a list of: spectrograms,",

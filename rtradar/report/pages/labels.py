@@ -92,6 +92,7 @@ _STAGES = {
     "motion": "Motion and body", "survey": "Link budget", "room": "Tracing the room",
     "scatter": "Echoes", "signal": "IF samples", "clutter": "Static clutter", "noise": "Noise",
     "range": "Range spectra", "clutter removal": "Clutter removal", "write": "Writing files",
+    "frames": "Range spectra into frames",
     "doppler": "Range-Doppler maps", "cfar": "Detection", "cloud": "Clouds", "angle": "Angles",
     "received": "Frame before clutter removal", "spectrogram": "Spectrogram",
     "sources": "Who returned each detection",
