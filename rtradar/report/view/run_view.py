@@ -120,7 +120,7 @@ class Levels:
     def packed(self) -> dict[str, Any]:
         """Return plain values for JSON; ``levels`` are compressed by zlib and encoded in base64."""
         return {
-            # Level 9 takes ten times as long, for a twentieth less.
+            # A higher level takes much longer, and leaves little less.
             "levels": base64.b64encode(zlib.compress(self.level.tobytes(), 4)).decode(),
             "shape": list(self.level.shape[1:]),
             "x": list(self.across),

@@ -26,8 +26,8 @@ _MARGIN_M = 0.4
 def drawn_sphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return vertices (vertex, xyz) and faces (face, corner) of a unit sphere, to be looked at.
 
-    They lie on meridians; `rtradar.body.unit_sphere`, which is computed with, takes a package whose
-    import takes longer than a page.
+    It is finest at its poles. The one to compute with is `rtradar.body.unit_sphere`, which needs
+    trimesh, a package that is slow to import and that a page needs for nothing else.
     """
     polar, around = np.meshgrid(
         np.linspace(0, np.pi, _PARALLELS + 1),
