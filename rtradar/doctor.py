@@ -13,6 +13,7 @@ from pathlib import Path
 
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
+from rtradar.pipeline.compile_ahead import compile_ahead
 from rtradar.system.files import write_json
 from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.backends.llvm import candidates
@@ -35,7 +36,8 @@ class DoctorReport:
     ``cores`` are those that this process may use. The memory of the machine [MiB] is None where
     the system does not report it, and a version where one of `PACKAGES` is not installed. ``llvm``
     has each libLLVM in the order of trial, ``backends`` says ``good`` or what is wrong with each,
-    ``compiled_code`` where compiled code was kept and loaded again, or why not. ``chosen`` is
+    ``compiled_code`` where compiled code was kept and loaded again, or why not, and how long it
+    took to compile all levels. ``chosen`` is
     Mitsuba's variant that ``--variant auto`` takes, None where nothing works; ``advice`` says what
     to do, most urgent first.
     """
@@ -59,7 +61,7 @@ class DoctorReport:
 
 
 def examine() -> DoctorReport:
-    """Examine this machine, which takes some seconds.
+    """Examine this machine, which takes some seconds, and compile all levels if none has.
 
     Every backend is probed anew, in a process of its own, and a function is compiled, kept and
     loaded again.
@@ -80,6 +82,9 @@ def examine() -> DoctorReport:
         compiled_code, what_to_do = try_cache()
     if what_to_do:
         advice.append(what_to_do)
+    elif chosen:
+        seconds = compile_ahead()
+        compiled_code += f"; all levels {f'took {seconds:.0f} s' if seconds else 'are there'}"
     total, available = _memory_mb()
     implementation = platform.python_implementation()
     return DoctorReport(

@@ -37,6 +37,7 @@ def _machine(
         monkeypatch.setattr(module, "candidates", lambda: libraries)
         monkeypatch.setattr(module, "probe_backend", probe_backend)
     monkeypatch.setattr(backends, "loaded_llvm_version", lambda: None)
+    monkeypatch.setattr(doctor, "compile_ahead", lambda: 0.0)
 
 
 def test_all_well(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -81,14 +82,24 @@ def test_whether_compiled_code_is_kept(
     _machine(monkeypatch, LIBRARIES)
     monkeypatch.setattr(doctor, "try_cache", lambda: (finding, advice))
     found = doctor.examine()
+    levels = "" if advice else "; all levels are there"
     assert (found.compiled_code, found.advice, found.exit_status) == (
-        finding,
+        finding + levels,
         [advice] if advice else [],
         0,
     )
     text = doctor.report_text(found)
     assert f"Compiled  {finding}" in text
     assert advice in text
+
+
+def test_all_levels_are_compiled_where_one_can_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    _machine(monkeypatch, LIBRARIES)
+    monkeypatch.setattr(doctor, "try_cache", lambda: ("kept", ""))
+    monkeypatch.setattr(doctor, "compile_ahead", lambda: 31.4)
+    assert doctor.examine().compiled_code == "kept; all levels took 31 s"
+    _machine(monkeypatch, [], scalar="fails: broken")
+    assert doctor.examine().compiled_code == "kept"
 
 
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -54,6 +54,7 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
         dispatcher = numba_decorator(function)
         if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
             dispatcher._cache = _CodeOnDisk(dispatcher)
+            _functions[f"{function.__module__}.{function.__qualname__}"] = dispatcher
         return dispatcher
 
     return decorator
@@ -187,6 +188,7 @@ class _CodeOnDisk(NullCache):
 
 
 _warned = False
+_functions: dict[str, _Function] = {}
 
 CACHE_ADVICE = (
     "every process compiles anew, for a minute or so: name a folder that can be written in "
@@ -202,6 +204,14 @@ def is_on_disk(function: _Function) -> bool:
     """
     cache = getattr(function, "_cache", None)
     return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
+
+
+def functions_to_compile() -> set[str]:
+    """Compiled functions, of modules imported so far, of which there is no code on disk.
+
+    None where code is not kept, and where nothing is compiled.
+    """
+    return {name for name, function in _functions.items() if not is_on_disk(function)}
 
 
 def check_cache() -> None:

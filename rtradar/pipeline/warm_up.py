@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -31,7 +31,7 @@ from rtradar.radar import Radar
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.system.threads import thread_count, thread_environment
 
-_MAX_S = 120.0  # for the second process; what it has not compiled by then is compiled here
+_MAX_S = 120.0  # for the other process; what it has not compiled by then is compiled here
 
 
 def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
@@ -63,17 +63,8 @@ def _warm_up_sources() -> None:
     fields_in_bins(none, none, steps, fields, np.ones(1, dtype=np.float32), fields.copy())
 
 
-def compile_for_another_process() -> None:
-    """Compile the processing of the paper's radar; another one compiles the rest itself.
-
-    It ends as soon as standard input closes with the process that started this one.
-    """
-
-    def end_with_it() -> None:
-        os.read(sys.stdin.fileno(), 1)
-        os._exit(1)
-
-    threading.Thread(target=end_with_it, daemon=True).start()
+def warm_up_any_processing() -> None:
+    """Compile or load the processing of the paper's radar, without a person before it."""
     radar = Radar.preset("paper-12ghz")
     shape = 2 * radar.n_tx, radar.n_rx, 1
     echoes = Echoes(
@@ -87,25 +78,54 @@ def compile_for_another_process() -> None:
     warm_up_processing(echoes, radar)
 
 
-@contextmanager
-def processing_compiled_beside() -> Iterator[None]:
-    """Have another process compile the processing if none has; it is done when this ends."""
+def end_with_the_other_process() -> None:
+    """End this process as soon as standard input closes with the one that started it."""
+
+    def wait() -> None:
+        os.read(sys.stdin.fileno(), 1)
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def can_share_work() -> bool:
+    """Whether another process of this Python can be started and has a core to itself."""
     # Within another program, the interpreter is that program.
-    is_python = Path(sys.executable or "").name.startswith("python")
-    if is_on_disk(add_tones) or thread_count() < 2 or not is_python:
-        yield
-        return
-    code = "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"
+    return thread_count() > 1 and Path(sys.executable or "").name.startswith("python")
+
+
+@contextmanager
+def other_process(work: str) -> Iterator[Callable[[], None]]:
+    """Have another process, of one thread, do ``work``, a line of Python.
+
+    Given is a function that waits for it, for two minutes at most; what is left then, or when this
+    ends, is given up.
+    """
+    line = f"from {__name__} import end_with_the_other_process as also; also(); {work}"
     with subprocess.Popen(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", line],
         env={**os.environ, **thread_environment(1)},
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     ) as other:
-        try:
-            yield
+
+        def wait() -> None:
             with suppress(subprocess.TimeoutExpired):
                 other.wait(_MAX_S)
+
+        try:
+            yield wait
         finally:
             other.kill()
+
+
+@contextmanager
+def processing_compiled_beside() -> Iterator[None]:
+    """Have another process compile the processing if none has; it is done when this ends."""
+    if is_on_disk(add_tones) or not can_share_work():
+        yield
+        return
+    with other_process(f"from {__name__} import warm_up_any_processing as go; go()") as wait:
+        yield
+        wait()

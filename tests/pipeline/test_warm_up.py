@@ -78,12 +78,15 @@ def test_standard_input_is_open_as_long_as_the_first_process_is_there(
 
 
 def test_it_ends_with_standard_input(tmp_path: Path) -> None:
-    words = "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"
+    words = (
+        "from rtradar.pipeline.warm_up import *; import time\n"
+        "end_with_the_other_process(); time.sleep(60)"
+    )
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     ended = subprocess.run(
         [sys.executable, "-c", words], env=environment, stdin=subprocess.DEVNULL, check=False
     )
-    assert ended.returncode == 1  # and 0 when all is compiled
+    assert ended.returncode == 1
 
 
 def test_one_that_takes_too_long_is_not_waited_for(

@@ -1,0 +1,60 @@
+"""All levels compiled ahead: nothing is left that a run would compile."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rtradar.pipeline import compile_ahead as ahead
+from rtradar.system.threads import THREADS_VARIABLE
+
+RUNS = """
+import sys
+import rtradar as rt
+motion, radar = rt.synthetic_motion("kick", seed=1, duration_s=0.2), rt.Radar.preset("paper-77ghz")
+for level in "analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto":
+    rt.run(motion, radar, fidelity=level, clutter_removal="mti", out=f"{sys.argv[1]}/{level}")
+rt.run(motion, rt.Radar.preset("iwr6843"), rt.Scene.load("bedroom"), out=f"{sys.argv[1]}/room")
+"""
+
+
+@pytest.mark.slow
+def test_runs_of_all_levels_find_their_code(tmp_path: Path) -> None:
+    def code() -> set[Path]:
+        return set((tmp_path / "cache").rglob("*.nbc"))
+
+    def python(*words: str) -> str:
+        environment = {
+            **os.environ,
+            "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+            THREADS_VARIABLE: "2",
+        }
+        command = [sys.executable, "-W", "ignore", "-c", *words]
+        return subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True
+        ).stdout
+
+    said = python(
+        "from rtradar.pipeline.compile_ahead import *\n"
+        "print(compile_ahead() > 0, left_to_compile(), compile_ahead())"
+    )
+    assert said.split("\n")[-2] == "True set() 0.0"
+    before = code()
+    python(RUNS, str(tmp_path))
+    assert code() == before
+
+
+def test_nothing_is_done_where_all_is_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ahead, "left_to_compile", set)
+    assert ahead.compile_ahead() == 0.0
+
+
+def test_one_core_does_both_shares(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(ahead, "left_to_compile", lambda: {"one"})
+    monkeypatch.setattr(ahead, "can_share_work", lambda: False)
+    monkeypatch.setattr(ahead, "_SHARES", (lambda: done.append("a"), lambda: done.append("b")))
+    assert ahead.compile_ahead() > 0
+    assert done == ["a", "b"]
