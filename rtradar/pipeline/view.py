@@ -22,7 +22,6 @@ from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.figures.maps import thinned
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import Snapshots, load_snapshots
-from rtradar.report.view.still import draw_still
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json, stored
 from rtradar.system.output_folder import check_whole
@@ -89,6 +88,8 @@ def view(
         write_view(page, run_view, name=printable(Path(folder).resolve().name), colour=colour)
         shown["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
     if still is not None:
+        from rtradar.report.view.still import draw_still
+
         step = run_view.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
         draw_still(still, run_view, step, colour=colour)
         size = Path(still).stat().st_size

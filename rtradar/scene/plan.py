@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
@@ -26,6 +23,9 @@ from rtradar.system.figure_style import (
     png_of,
     theme_of,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
@@ -147,6 +147,9 @@ def height_of_plan(limits: NDArray[np.float64]) -> float:
 
 def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
     """Draw walls, furniture and reflectors without their names, which `name_parts` writes."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
     theme = theme_of(axes)
     covering: dict[str, list[NDArray[np.float64]]] = {theme.furniture: [], theme.reflector: []}
     for piece in (*scene.furniture, *scene.objects):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import html
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -145,3 +147,14 @@ def test_every_public_name_is_listed() -> None:
     assert set(rt.__all__) <= set(dir(rt))
     for name in dir(rt):
         assert getattr(rt, name) is not None
+
+
+def test_matplotlib_is_loaded_by_the_first_picture(tmp_path: Path) -> None:
+    code = (
+        "import sys, rtradar as rt\n"
+        "motion = rt.synthetic_motion('kick', seed=0, duration_s=0.15)\n"
+        "result = rt.run(motion, rt.Radar.preset('paper-12ghz'), fidelity='analytic')\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "result.plot.range_time(); assert 'matplotlib' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=tmp_path)

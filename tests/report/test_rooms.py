@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import collections
 
 from rtradar.radar import Radar
 from rtradar.report.figures.rooms import draw_room_plan
-from rtradar.scene import Furniture, Scene, material, plan
+from rtradar.scene import Furniture, Scene, material
 
 pytestmark = pytest.mark.drawn
 
@@ -18,13 +19,13 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[np.ndarray] = []
-    collection = plan.PolyCollection
+    collection = collections.PolyCollection
 
     def counted(corners: list[np.ndarray], **words: object) -> object:
         drawn.append(np.array(corners))
         return collection(corners, **words)
 
-    monkeypatch.setattr(plan, "PolyCollection", counted)
+    monkeypatch.setattr(collections, "PolyCollection", counted)
     chair = Furniture(
         name="chair",
         mesh="chair",

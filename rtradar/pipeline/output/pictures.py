@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
@@ -21,6 +20,9 @@ from rtradar.report.figures.plots import Plots
 from rtradar.scatter.multipath.ghosts import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _TRACK_POINTS = 400
 

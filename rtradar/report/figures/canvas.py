@@ -25,15 +25,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.image import AxesImage
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar import Radar
 from rtradar.system.figure_style import STYLE, dress, fit, theme_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
 
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
@@ -168,6 +170,8 @@ def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any)
     In a figure whose axes have equal scales, it is as high as they are if ``compressed`` is its
     layout.
     """
+    from matplotlib.image import AxesImage
+
     figure: Any = axes[0].get_figure(root=True)
     options = {"extend": "min" if isinstance(image, AxesImage) else "neither"} | options
     bounds = [one.get_position(original=True) for one in axes]

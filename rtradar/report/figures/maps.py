@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from rtradar.process import measured_angles
@@ -55,6 +54,8 @@ def angle_view(
 
 def rdt_points(axes: Any, points: NDArray[np.float64], *, fastest: float, s: float) -> Any:
     """Draw points (point, 3) [s, m, m/s] in 3D, coloured by velocity up to ``fastest`` [m/s]."""
+    from matplotlib.ticker import MaxNLocator
+
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(MaxNLocator(5))

@@ -9,8 +9,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from rtradar.clouds import SpatialCloud
@@ -39,6 +37,8 @@ from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for
 if TYPE_CHECKING:
     import h5py
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _FRAMES_AT_ONCE = 64
 _DOTS = 20_000
@@ -229,7 +229,7 @@ class Plots:
         upper, lower = self.new_figure(7.0).subplots(2, 1)
         self._range_angle(names[0], when_s, upper)
         self._range_angle(names[1], when_s, lower, heading=False)
-        return cast(Axes, upper)
+        return cast("Axes", upper)
 
     def rdt(self, ax: Axes | None = None) -> Axes:
         """Draw the range-Doppler-time cloud in three dimensions, coloured by velocity.
@@ -266,7 +266,7 @@ class Plots:
             title += f" ({int(shown.sum())} of them within the axes)"
         dress(axes, title=self._title(title, self.maps["range_doppler"]))
         add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
-        return cast(Axes, axes)
+        return cast("Axes", axes)
 
     def spatial(self, ax: Axes | None = None) -> Axes:
         """Draw the strongest points of the spatial cloud from above and from the side.

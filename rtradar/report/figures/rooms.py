@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
@@ -40,6 +39,9 @@ from rtradar.scene.plan import (
 )
 from rtradar.system.figure_labels import Label, around, place_labels
 from rtradar.system.figure_style import DARK, dress, new_figure, save_figure, theme_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _HALF_TURN = 180.0
 

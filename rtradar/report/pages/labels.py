@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from matplotlib.ticker import EngFormatter
-
 _LABELS = {
     # what was found
     "windows": "Frames",
@@ -138,6 +136,8 @@ def with_unit(value: object, unit: str) -> str:
         return grouped(value)
     if isinstance(value, int | float):
         if unit in _PREFIXED and value:
+            from matplotlib.ticker import EngFormatter
+
             return EngFormatter(unit=unit, places=None)(value)
         shown = f"{value:.5g}"
     else:
