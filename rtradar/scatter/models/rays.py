@@ -50,9 +50,9 @@ class Rays(BuiltInModel):
     rays_per_wavelength : float
         The edge of a tube's facet is the wavelength at the sweep centre over this.
     bounces : int
-        Largest number of reflections on the way. Two bounces on a body of ellipsoids go mostly
-        by the creases where two of them touch, which no real body has, and return half the field
-        of one: one is the default.
+        Largest number of reflections on the way. Two bounces on a body of ellipsoids go partly
+        over the creases where two of them touch, which no real body has, and add 0.9 dB to the
+        power of a walker: one is the default.
     anchor_s : float
         Time between keyframes [s]; 0 shoots at every chirp.
 
