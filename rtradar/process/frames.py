@@ -23,8 +23,8 @@ class SlidingWindows:
     """The frames of a stream of chirps, however the stream is cut into blocks.
 
     The frames are those of `Radar.window_starts` for as many chirps as were pushed. The buffer
-    holds one and a half frames, whatever the size of the blocks: with the half, what is kept moves
-    to its front at most once for every half a frame of new chirps.
+    holds one and a quarter frames, whatever the size of the blocks: with the quarter, what is kept
+    moves to its front at most once for every quarter of a frame of new chirps.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class SlidingWindows:
     def __init__(self, radar: Radar) -> None:
         self._radar = radar
         frame = radar.chirps_per_frame
-        chirps = frame + max(2 * radar.n_tx, frame // 2)
+        chirps = frame + max(2 * radar.n_tx, frame // 4)
         shape = (chirps, radar.n_rx, radar.samples_per_chirp)
         self._buffer = np.empty(shape, np.complex64)
         self._first = 0  # chirp at the front of the buffer
