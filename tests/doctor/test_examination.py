@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rtradar import doctor
+from rtradar.doctor import examination as doctor
 from rtradar.errors import InputError
 from rtradar.trace.backends import backend as backends
 from rtradar.trace.backends.llvm import Library

@@ -11,9 +11,9 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+from rtradar.doctor.compile_ahead import compile_ahead
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
-from rtradar.pipeline.compile_ahead import compile_ahead
 from rtradar.system.files import write_json
 from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.backends.llvm import candidates

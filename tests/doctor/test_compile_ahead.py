@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rtradar.pipeline import compile_ahead as ahead
+from rtradar.doctor import compile_ahead as ahead
 from rtradar.system.threads import THREADS_VARIABLE
 
 RUNS = """
@@ -37,7 +37,7 @@ def test_runs_of_all_levels_find_their_code(tmp_path: Path) -> None:
         ).stdout
 
     said = python(
-        "from rtradar.pipeline.compile_ahead import *\n"
+        "from rtradar.doctor.compile_ahead import *\n"
         "print(compile_ahead() > 0, left_to_compile(), compile_ahead())"
     )
     assert said.split("\n")[-2] == "True set() 0.0"
