@@ -150,13 +150,18 @@ class Runner:
         """Environment with all caches of compiled code and of fonts in a folder of the model."""
         home = self._folder / fidelity
         home.mkdir(exist_ok=True)
-        # Packages of the user are found through HOME, unless their folder is named.
-        moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
-        return {
-            **os.environ,
-            "PYTHONUSERBASE": site.getuserbase(),
-            **{name: str(place) for name, place in moved.items()},
-        }
+        return with_caches_in(home)
+
+
+def with_caches_in(home: Path) -> dict[str, str]:
+    """Environment with all caches of compiled code and of fonts in a folder."""
+    # Packages of the user are found through HOME, unless their folder is named.
+    moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
+    return {
+        **os.environ,
+        "PYTHONUSERBASE": site.getuserbase(),
+        **{name: str(place) for name, place in moved.items()},
+    }
 
 
 def _json_of(

@@ -21,10 +21,12 @@ from rtradar.kernels.jit import functions_to_compile
 from rtradar.motion import Motion, synthetic_motion
 from rtradar.pipeline.run import run
 from rtradar.pipeline.timing import lines_shown, stage_line
-from rtradar.pipeline.warm_up import can_share_work, other_process, warm_up_any_processing
+from rtradar.pipeline.warm_up import other_process, warm_up_any_processing
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scene import Scene
+
+_MAX_S = 600.0  # for each process
 
 _LEVELS: dict[str, dict[str, Any]] = {
     "specular": {"bounces": 2, "terms": 2},
@@ -54,19 +56,16 @@ def compile_ahead() -> float:
     """Compile what runs of all levels need, by two processes side by side; return the seconds.
 
     Nothing is done, and 0 returned, where all of it is on disk or nothing can be kept there.
+    `left_to_compile` tells afterwards whether something went wrong in a process.
     """
     if not left_to_compile():
         return 0.0
     start = time.perf_counter()
     with lines_shown(), stage_line("compiling all levels"):
-        if can_share_work():
-            work = (f"from {__name__} import {own.__name__} as go; go()" for own in _SHARES)
-            with ExitStack() as others:
-                for wait in [others.enter_context(other_process(own)) for own in work]:
-                    wait()
-        else:
-            for own in _SHARES:
-                own()
+        work = (f"from {__name__} import {own.__name__} as go; go()" for own in _SHARES)
+        with ExitStack() as others:
+            for wait in [others.enter_context(other_process(own, _MAX_S)) for own in work]:
+                wait()
     return time.perf_counter() - start
 
 
@@ -81,6 +80,7 @@ def compile_levels() -> None:
     radar, body = Radar.preset("paper-12ghz"), Body.from_motion(_motion())
     for level, options in _LEVELS.items():
         build_model(level, radar, body, **options).echoes(np.arange(2 * radar.n_tx))
+    # By now the other process has compiled what processes samples.
     for level, options in _LEVELS.items():
         _run(level, options, "free-space")
 

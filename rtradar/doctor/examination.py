@@ -11,7 +11,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from rtradar.doctor.compile_ahead import compile_ahead
+from rtradar.doctor.compile_ahead import compile_ahead, left_to_compile
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
@@ -84,7 +84,10 @@ def examine() -> DoctorReport:
         advice.append(what_to_do)
     elif chosen:
         seconds = compile_ahead()
-        compiled_code += f"; all levels {f'took {seconds:.0f} s' if seconds else 'are there'}"
+        done = f"were compiled in {seconds:.0f} s" if seconds else "are compiled"
+        left = len(left_to_compile())
+        said = f"{left} functions are left to the first runs" if left else f"all levels {done}"
+        compiled_code += f"; {said}"
     total, available = _memory_mb()
     implementation = platform.python_implementation()
     return DoctorReport(

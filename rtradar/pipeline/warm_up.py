@@ -88,17 +88,11 @@ def end_with_the_other_process() -> None:
     threading.Thread(target=wait, daemon=True).start()
 
 
-def can_share_work() -> bool:
-    """Whether another process of this Python can be started and has a core to itself."""
-    # Within another program, the interpreter is that program.
-    return thread_count() > 1 and Path(sys.executable or "").name.startswith("python")
-
-
 @contextmanager
-def other_process(work: str) -> Iterator[Callable[[], None]]:
+def other_process(work: str, most_s: float) -> Iterator[Callable[[], None]]:
     """Have another process, of one thread, do ``work``, a line of Python.
 
-    Given is a function that waits for it, for two minutes at most; what is left then, or when this
+    Given is a function that waits for it, for ``most_s`` at most; what is left then, or when this
     ends, is given up.
     """
     line = f"from {__name__} import end_with_the_other_process as also; also(); {work}"
@@ -112,7 +106,7 @@ def other_process(work: str) -> Iterator[Callable[[], None]]:
 
         def wait() -> None:
             with suppress(subprocess.TimeoutExpired):
-                other.wait(_MAX_S)
+                other.wait(most_s)
 
         try:
             yield wait
@@ -123,9 +117,12 @@ def other_process(work: str) -> Iterator[Callable[[], None]]:
 @contextmanager
 def processing_compiled_beside() -> Iterator[None]:
     """Have another process compile the processing if none has; it is done when this ends."""
-    if is_on_disk(add_tones) or not can_share_work():
+    # Within another program, the interpreter is that program.
+    is_python = Path(sys.executable or "").name.startswith("python")
+    if is_on_disk(add_tones) or thread_count() < 2 or not is_python:
         yield
         return
-    with other_process(f"from {__name__} import warm_up_any_processing as go; go()") as wait:
+    work = f"from {__name__} import warm_up_any_processing as go; go()"
+    with other_process(work, _MAX_S) as wait:
         yield
         wait()

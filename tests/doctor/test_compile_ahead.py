@@ -42,6 +42,7 @@ def test_runs_of_all_levels_find_their_code(tmp_path: Path) -> None:
     )
     assert said.split("\n")[-2] == "True set() 0.0"
     before = code()
+    assert before
     python(RUNS, str(tmp_path))
     assert code() == before
 
@@ -49,12 +50,3 @@ def test_runs_of_all_levels_find_their_code(tmp_path: Path) -> None:
 def test_nothing_is_done_where_all_is_on_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ahead, "left_to_compile", set)
     assert ahead.compile_ahead() == 0.0
-
-
-def test_one_core_does_both_shares(monkeypatch: pytest.MonkeyPatch) -> None:
-    done: list[str] = []
-    monkeypatch.setattr(ahead, "left_to_compile", lambda: {"one"})
-    monkeypatch.setattr(ahead, "can_share_work", lambda: False)
-    monkeypatch.setattr(ahead, "_SHARES", (lambda: done.append("a"), lambda: done.append("b")))
-    assert ahead.compile_ahead() > 0
-    assert done == ["a", "b"]

