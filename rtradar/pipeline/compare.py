@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Unpack
 
-import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_runs
 from rtradar.pipeline.prepare import Moving
@@ -236,7 +236,7 @@ def _draw(
     parts, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
     comparison.draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
 
-    with h5py.File(_maps_of(results[reference])) as maps:
+    with read_maps(_maps_of(results[reference])) as maps:
         frame = int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
         velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
         cleaned = removed(maps["range_doppler"])
@@ -248,7 +248,7 @@ def _draw(
     range_bins = noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     levels, spectrograms, shown = {}, {}, []
     for name, result in results.items():
-        with h5py.File(_maps_of(result)) as maps:
+        with read_maps(_maps_of(result)) as maps:
             power = maps["range_doppler"][frame]
             levels[name] = by_range.level(power / radar.n_channels)
             shown.append(above_floor(power))
@@ -340,7 +340,7 @@ def map_figures(ours: Path, reference: Path, *, gain: bool = False) -> dict[str,
     Of captures of other lengths the frames at the start count. With a ``gain`` between both, root
     mean squares are about the mean difference.
     """
-    with h5py.File(ours) as first, h5py.File(reference) as second:
+    with read_maps(ours) as first, read_maps(reference) as second:
         cells, both, either = [], 0, 0
         for frame in range(min(len(maps["time"]) for maps in (first, second))):
             mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))

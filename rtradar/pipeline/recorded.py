@@ -21,7 +21,7 @@ from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.timing import forget_peak_memory
+from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.settings import ProcessingOptions, RunSettings, settings_of
@@ -142,6 +142,7 @@ def _write(
     """Write maps, clouds, pictures, report and summary; return the clouds and the summary."""
     radar = processing.radar
     clouds = _stream(blocks, processing, folder / "maps.h5")
+    return_freed_memory()
     with processing.stages.time("write"):
         write_clouds(folder, clouds)
     with processing.stages.time("pictures"):

@@ -7,12 +7,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
-import h5py
-
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large_maps
-from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.map_store import open_maps, read_maps
 from rtradar.pipeline.output.pictures import draw_pictures
 from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
@@ -22,7 +20,7 @@ from rtradar.pipeline.prepare import Moving, check_radar, people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.sources import Sources
-from rtradar.pipeline.timing import forget_peak_memory
+from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
 from rtradar.pipeline.view import run_view_of
 from rtradar.radar import Radar
 from rtradar.report import write_report
@@ -31,6 +29,8 @@ from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, settings_of
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
+
+_MOMENTS = 100, 20.0  # of the moving body on the page, and as many a second at most
 
 
 def run(
@@ -143,6 +143,7 @@ def run_into(
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
         clouds = _stream(capture, folder / "maps.h5", kept)
+        return_freed_memory()
         points = clouds.rdt.points
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
@@ -150,12 +151,13 @@ def run_into(
         if pictures:
             with capture.stages.time("pictures"):
                 drawn = draw_pictures(folder, capture, clouds)
+        return_freed_memory()
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
         # Only now, for the echoes that the view asks for do not belong into the model's account.
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(capture))
-            with h5py.File(folder / "maps.h5") as maps:
+            with read_maps(folder / "maps.h5") as maps:
                 _add_room(summary, capture, maps)
         with capture.stages.time("report"):
             write_report(
@@ -166,7 +168,11 @@ def run_into(
                 rdt_points=points,
                 spatial=clouds.spatial,
                 run_view=run_view_of(
-                    folder, summary, capture.radar, capture.processing.window_functions
+                    folder,
+                    summary,
+                    capture.radar,
+                    capture.processing.window_functions,
+                    at_most=_MOMENTS,
                 ),
             )
         summary |= {"pictures": pictures} | cost_of(capture, started)

@@ -99,6 +99,12 @@ def reuse_freed_memory() -> None:
         library.mallopt(_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)
 
 
+def return_freed_memory() -> None:
+    """Return freed arrays to the system, so that what follows does not come on top of them."""
+    if platform.libc_ver()[0] == "glibc":
+        ctypes.CDLL(None).malloc_trim(0)
+
+
 def forget_peak_memory() -> None:
     """Restart `peak_memory_mb` on Linux; elsewhere it stays that of the whole process."""
     with suppress(OSError):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
+from rtradar.pipeline.output.map_store import read_maps
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
@@ -112,13 +113,21 @@ def load_run_view(folder: Path) -> RunView:
 
 
 def run_view_of(
-    folder: Path, summary: Mapping[str, Any], radar: Radar, windows: WindowFunctions
+    folder: Path,
+    summary: Mapping[str, Any],
+    radar: Radar,
+    windows: WindowFunctions,
+    *,
+    at_most: tuple[int, float] | None = None,
 ) -> RunView:
     """Read ``view.npz``, ``maps.h5`` and both clouds of a run with this summary and radar.
 
+    ``at_most`` so many snapshots are shown, at no more than this rate [Hz]; all if left out.
     InputError as in `load_run_view`.
     """
     snapshots = load_snapshots(folder / "view.npz")
+    if at_most is not None:
+        snapshots = snapshots.every(snapshots.stride(*at_most))
     points = run_points(folder)
     columns = ("points", "velocity", "power", "time")
     spatial = _archive(folder / "cloud_xyz.npz", columns, ("points",), ("source",))
@@ -198,7 +207,7 @@ def run_maps(folder: Path) -> Iterator[h5py.File]:
     """Open the maps of a folder; InputError if they are missing or damaged."""
     path = folder / "maps.h5"
     try:
-        with open_regular(path) as raw, h5py.File(raw) as file:
+        with open_regular(path) as raw, read_maps(raw) as file:
             yield file
     except InputError:
         raise
@@ -268,13 +277,22 @@ def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def _quantised(
-    maps_db: Iterable[NDArray[np.float64]], top_db: float, noise_db: float, **axes: Any
+    maps_db: Iterable[NDArray[np.float64]],
+    shape: tuple[int, int, int],
+    top_db: float,
+    noise_db: float,
+    **axes: Any,
 ) -> Levels:
-    """Quantise maps [dB] from 3 dB below the noise, or 60 dB below the peak, to the peak."""
+    """Quantise maps [dB] from 3 dB below the noise, or 60 dB below the peak, to the peak.
+
+    ``shape`` is the number of maps, of their rows and of their columns.
+    """
     low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
     step = (top_db - low) / MOST_LEVEL
-    levels = [np.clip(np.rint((one - low) / step), 0, MOST_LEVEL).astype("u1") for one in maps_db]
-    return Levels(level=np.stack(levels), low_db=low, step_db=step, **axes)
+    level = np.empty(shape, np.uint8)
+    for one, quantised in zip(maps_db, level, strict=True):
+        quantised[:] = np.clip(np.rint((one - low) / step), 0, MOST_LEVEL)
+    return Levels(level=level, low_db=low, step_db=step, **axes)
 
 
 def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
@@ -299,8 +317,10 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
         return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
 
     maps_db = (scaled.level(_powers(pooled(power[window] * scale))) for window in windows)
+    shape = len(windows), math.ceil(len(distance) / rows), math.ceil(len(velocity) / columns)
     axes = {"across": centres(velocity, columns), "up": centres(distance, rows)}
-    return _quantised(maps_db, top_db, noise_db, label=unit.label("mean of channels"), **axes)
+    label = unit.label("mean of channels")
+    return _quantised(maps_db, shape, top_db, noise_db, label=label, **axes)
 
 
 def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFunctions) -> Levels:
@@ -318,7 +338,8 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     top_db, noise_db = float(level_db.max()), float(np.median(level_db))
     axes = {"across": (float(times[0]), step_s), "up": up}
-    return _quantised([level_db], top_db, noise_db, label=unit.label("one channel"), **axes)
+    label, shape = unit.label("one channel"), (1, *level_db.shape)
+    return _quantised([level_db], shape, top_db, noise_db, label=label, **axes)
 
 
 def _at_points(

@@ -182,8 +182,22 @@ def phases_of(
 # Both lines of two radars; 20 MB each, computed at once, so that memory does not grow with motion.
 @lru_cache(maxsize=4)
 def steering_everywhere(radar: Radar, axis: int) -> Steering:
-    """`steering` for every range bin of a radar, with the Taylor taper."""
+    """`steering` for every range bin of a radar, with the Taylor taper.
+
+    Where both lines of a cross have the same elements, they share their weights.
+    """
+    if axis == 2 and _lines_are_alike(radar):
+        return steering_everywhere(radar, 1)
     return steering(radar, axis, np.arange(radar.samples_per_chirp), "taylor")
+
+
+def _lines_are_alike(radar: Radar) -> bool:
+    elements = [
+        (line.tx_m, line.rx_m, radar.tx_offset_hz[line.channels // radar.n_rx])
+        for line in virtual_lines(radar)
+        if line is not None
+    ]
+    return len(elements) == 2 and all(map(np.array_equal, *elements))
 
 
 def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:

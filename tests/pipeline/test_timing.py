@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import sys
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -10,7 +11,13 @@ import numpy as np
 import pytest
 
 from rtradar.pipeline import timing
-from rtradar.pipeline.timing import Stages, forget_peak_memory, peak_memory_mb
+from rtradar.pipeline.timing import (
+    Stages,
+    forget_peak_memory,
+    peak_memory_mb,
+    return_freed_memory,
+    reuse_freed_memory,
+)
 
 
 def test_stages_add_up_by_name_also_after_an_error() -> None:
@@ -56,3 +63,17 @@ def test_a_peak_is_seen_and_forgotten() -> None:
     assert peak_memory_mb() >= with_it - 1
     forget_peak_memory()
     assert peak_memory_mb() < with_it - 200
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only the GNU C library is told")
+def test_what_is_freed_below_what_is_in_use_is_returned() -> None:
+    reuse_freed_memory()
+    arrays = [np.ones(125_000) for _ in range(200)]  # 200 MB
+    last = arrays[-1]
+    arrays.clear()
+    forget_peak_memory()
+    before = peak_memory_mb()
+    return_freed_memory()
+    forget_peak_memory()
+    assert peak_memory_mb() < before - 150
+    assert last.all()

@@ -25,6 +25,8 @@ from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import (
     range_walk,
     sine_grid,
+    steering,
+    steering_everywhere,
     taper_weights,
     virtual_lines,
 )
@@ -400,3 +402,15 @@ def test_the_grid_of_sines_ends_at_the_unambiguous_angle() -> None:
     np.testing.assert_allclose(grid, -grid[::-1], atol=1e-15)
     # A quarter of a resolution cell: the wavelength over 47 virtual spacings of 0.583 wavelengths.
     assert np.diff(grid).max() <= 1 / (47 * 7 / 12) / 4
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_lines_share_the_weights_of_their_beams_only_if_they_have_the_same_elements(
+    alike: bool,
+) -> None:
+    radar = SHORT if alike else dataclasses.replace(SHORT, tx_y=8)
+    along_y, along_z = (steering_everywhere(radar, axis) for axis in (1, 2))
+    assert (along_y is along_z) == alike
+    own = steering(radar, 2, np.arange(radar.samples_per_chirp), "taylor")
+    for shared, computed in zip(along_z, own, strict=True):
+        np.testing.assert_array_equal(shared, computed)

@@ -185,6 +185,14 @@ class MapStore:
                 self._raw.close()
 
 
+def read_maps(file: Path | BinaryIO) -> h5py.File:
+    """Open what a `MapStore` has written, without HDF5's cache, which would hold 8 MB of each map.
+
+    Whoever reads maps through reads each chunk once.
+    """
+    return h5py.File(file, "r", rdcc_nbytes=0)
+
+
 def open_maps(file: Path | BinaryIO) -> xr.Dataset:
     """Open what a `MapStore` has written; values are read when they are needed.
 

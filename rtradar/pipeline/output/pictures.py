@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
@@ -34,7 +34,7 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
     """
     drawn, frame = draw_found(folder, clouds, capture.radar, capture.settings)
     if capture.inside:
-        with h5py.File(folder / "maps.h5") as maps:
+        with read_maps(folder / "maps.h5") as maps:
             drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
     return drawn
 
@@ -44,7 +44,7 @@ def draw_found(
 ) -> tuple[dict[str, Path], int]:
     """Draw ``maps.h5`` of this folder and the clouds; also return the frame that was chosen."""
     drawn: dict[str, Path] = {}
-    with h5py.File(folder / "maps.h5") as maps:
+    with read_maps(folder / "maps.h5") as maps:
         found = maps, clouds.rdt.points, clouds.spatial, radar
         plots = Plots(*found, {"parameters": settings.parameters()}, new_figure=new_figure)
         angles = [name for name in ("azimuth", "elevation") if name in maps]

@@ -124,11 +124,16 @@ def draw_levels(
     limits_db: tuple[float, float] | None = None,
     **style: Any,
 ) -> AxesImage:
-    """Draw ``level_db`` (up, across) over evenly spaced axes, in the colours of `colour_limits`."""
+    """Draw ``level_db`` (up, across) over evenly spaced axes, in the colours of `colour_limits`.
+
+    Each pixel shows the nearest cell.
+    """
     low, high = limits_db or colour_limits(level_db)
     extent = (*bin_edges(across), *bin_edges(up))
     style = {"cmap": "viridis", "aspect": "auto", "origin": "lower"} | style
-    return axes.imshow(level_db, vmin=low, vmax=high, extent=extent, **style)
+    # Levels are resampled before they have colours, in float32: a third of the memory, same pixels.
+    style |= {"interpolation": "nearest", "interpolation_stage": "data"}
+    return axes.imshow(level_db.astype(np.float32), vmin=low, vmax=high, extent=extent, **style)
 
 
 def draw_view(
@@ -149,7 +154,7 @@ def draw_view(
     x_limits, y_limits = view[0] or bin_edges(across), view[1]
     seen = level_db[np.ix_(_inside(up, y_limits), _inside(across, x_limits))]
     low, high = colour_limits(seen if seen.size else level_db, below_peak_db)
-    image = draw_levels(axes, level_db, across, up, (low, high), interpolation="nearest")
+    image = draw_levels(axes, level_db, across, up, (low, high))
     axes.set(xlim=x_limits, ylim=y_limits)
     floor = (
         f"{below_peak_db:.0f} dB below that"

@@ -130,7 +130,7 @@ def draw_before_after(
             image, words = draw_view(left, level, velocity, distance, view, unit=unit)
             colours = image.get_clim()
         else:
-            draw_levels(left, level, velocity, distance, colours, interpolation="nearest")
+            draw_levels(left, level, velocity, distance, colours)
         rows, columns = np.nonzero(mask)
         style: dict[str, Any] = {"s": 2, "linewidths": 0, "color": theme_of(right).detection}
         right.scatter(velocity[columns], distance[rows], **style)

@@ -120,7 +120,7 @@ def draw_maps(
     panels = figure.subplots(len(maps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     limits = colour_limits(np.concatenate([np.ravel(level) for level in maps.values()]))
     for axes, (name, level) in zip(panels, maps.items(), strict=True):
-        image = draw_levels(axes, level, across[1], up[1], limits, interpolation="nearest")
+        image = draw_levels(axes, level, across[1], up[1], limits)
         axes.set_ylabel(up[0])
         dress(axes, title=f"{title}\n{name}" if axes is panels[0] else name, grid=False)
     panels[-1].set(

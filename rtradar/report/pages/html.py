@@ -49,6 +49,7 @@ _NO_SCRIPT = """
 without.</p></noscript>
 """
 _LONG = 16
+_LETTERS_AT_ONCE = 1 << 20
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -86,13 +87,14 @@ def write_page(
     (2.3 MB), and ``data`` as JSON in the element ``report-data``. InputError if the file cannot be
     written; an existing file is then unchanged.
     """
-    plotly, code = b"", b""
+    plotly, code, allowed = b"", b"", []
     if scripts:
-        plotly = files("plotly").joinpath("package_data/plotly.min.js").read_bytes()
+        plotly, digest = _plotly()
         text = "".join(map(_asset, scripts))
         code = f'(() => {{\n"use strict";\n{text}}})();\n'.encode()
+        allowed = [digest, _digest(code)]
     head = _HEAD.substitute(
-        policy=_policy([plotly, code] if scripts else []),
+        policy=_policy(allowed),
         title=escape(f"{titles.heading} - {titles.kind.split()[0]}"),
         style=_asset("page.css"),
         **{name: escape(value) for name, value in titles._asdict().items()},
@@ -105,10 +107,12 @@ def write_page(
             # Without any <, so that no text can end the element.
             content = json.dumps(data, allow_nan=False, separators=(",", ":"))
             file.write(b'<script type="application/json" id="report-data">')
-            file.write(content.replace("<", "\\u003c").encode() + b"</script>\n")
-            packed = base64.b64encode(gzip.compress(plotly, compresslevel=1, mtime=0))
+            for first in range(0, len(content), _LETTERS_AT_ONCE):
+                part = content[first : first + _LETTERS_AT_ONCE]
+                file.write(part.replace("<", "\\u003c").encode())
+            file.write(b"</script>\n")
             file.writelines(
-                (b'<script type="application/gzip" id="plotly">', packed, b"</script>\n")
+                (b'<script type="application/gzip" id="plotly">', plotly, b"</script>\n")
             )
             file.writelines((b"<script>", code, b"</script>\n"))
         file.write(b"</body>\n</html>\n")
@@ -125,10 +129,20 @@ def _asset(name: str) -> str:
     return files("rtradar.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def _policy(scripts: Iterable[bytes]) -> str:
-    """Content security policy that allows these scripts and embedded pictures only."""
-    none, digests = "'none'", (hashlib.sha256(text).digest() for text in scripts)
-    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
+def _plotly() -> tuple[bytes, str]:
+    """Return plotly.js, compressed and in base64, and the digest of what it is unpacked to."""
+    script = files("plotly").joinpath("package_data/plotly.min.js").read_bytes()
+    packed = gzip.compress(script, compresslevel=1, mtime=0)
+    return base64.b64encode(packed), _digest(script)
+
+
+def _digest(script: bytes) -> str:
+    return base64.b64encode(hashlib.sha256(script).digest()).decode()
+
+
+def _policy(digests: Iterable[str]) -> str:
+    """Content security policy that allows scripts of these digests and embedded pictures only."""
+    none, hashes = "'none'", " ".join(f"'sha256-{digest}'" for digest in digests)
     # Plotly writes style rules of its own, and pictures for download are blobs.
     sources = f"script-src {hashes or none}; style-src 'unsafe-inline'; img-src data: blob:"
     return f"default-src {none}; {sources}; base-uri {none}; form-action {none}"

@@ -21,11 +21,6 @@ from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
 from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import rdt_data, spatial_data
 
-MOST_STEPS = 100
-"""Largest number of moments that the linked views of the page show."""
-
-_STEPS_HZ = 20.0
-
 _MORE_VIEWS = """<p class="note">The same for every frame, on a page of its own:
 <code>rtradar view DIR</code>, where DIR is the folder of this page.</p>"""
 
@@ -60,8 +55,8 @@ def write_report(
     spatial : SpatialCloud, optional
         Spatial cloud, shown as a whole.
     run_view : RunView, optional
-        Data of the views that one slider moves, which the page shows at up to `MOST_STEPS` moments.
-        Without it, as for samples that were measured, the page has no moving body.
+        Data of the views that one slider moves, at as many moments as it has. Without it, as for
+        samples that were measured, the page has no moving body.
 
     Raises
     ------
@@ -75,7 +70,6 @@ def write_report(
         data["spatial"] = spatial_data(spatial, radar)
     scripts = ["plots.js"]
     if run_view is not None:
-        run_view = run_view.thinned(MOST_STEPS, _STEPS_HZ)
         data |= view_data(run_view) | {"name": Path(path).stem}
         scripts += ["figure.js", "linked.js"]
     sections = _sections(summary, radar, data, pictures, run_view)

@@ -6,7 +6,6 @@ The page has body, room, paths and echoes beside the maps and the cloud of the s
 from __future__ import annotations
 
 import base64
-import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -205,9 +204,7 @@ class RunView:
 
     def thinned(self, most_steps: int, rate_hz: float) -> RunView:
         """Return a copy of at most so many snapshots, at no more than this rate [Hz]."""
-        times = self.snapshots.times
-        rate = (len(times) - 1) / max(float(times[-1] - times[0]), 1e-9)
-        every = max(math.ceil(len(times) / most_steps), math.ceil(rate / rate_hz - 1e-6), 1)
+        every = self.snapshots.stride(most_steps, rate_hz)
         levels = replace(self.range_doppler, level=self.range_doppler.level[::every])
         return replace(self, snapshots=self.snapshots.every(every), range_doppler=levels)
 

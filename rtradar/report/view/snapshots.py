@@ -3,6 +3,7 @@
 # ruff: noqa: RUF009 - the calls in the dataclass make its fields
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,11 @@ class Snapshots:
         """Return a copy with every ``number``-th snapshot, from the first on."""
         stepped = (one.name for one in fields(self) if one.metadata["axes"][0] == "step")
         return replace(self, **{name: getattr(self, name)[::number] for name in stepped})
+
+    def stride(self, most_steps: int, rate_hz: float) -> int:
+        """Return the number for `every` that leaves at most so many, and no more a second."""
+        rate = (len(self.times) - 1) / max(float(self.times[-1] - self.times[0]), 1e-9)
+        return max(math.ceil(len(self.times) / most_steps), math.ceil(rate / rate_hz - 1e-6), 1)
 
     def nearest(self, time_s: float) -> int:
         """Return the index of the snapshot nearest to this time [s]."""

@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from rtradar.pipeline.output.map_store import MapStore
-from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb
+from rtradar.pipeline.output.map_store import MapStore, read_maps
+from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb, return_freed_memory
 
 FIXED = {"range": np.arange(256.0), "velocity": np.arange(128.0)}
 
@@ -44,11 +44,32 @@ def test_a_long_file_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> No
             store.extend("time", [window], range_doppler=power, detections=mask)
             store.extend("slow_time", window + np.arange(64) / 64, range_time=rows)
 
-    write(range(5))
+    write(range(20))  # 5 MB, some of which have waited to be written together
     forget_peak_memory()
     before = peak_memory_mb()
-    write(range(5, 205))
+    write(range(20, 220))
     # 46 MB are written; HDF5 would keep 8 MB of each map. Its own book-keeping takes a few hundred
     # kB.
     assert peak_memory_mb() - before < 4
     store.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
+def test_reading_a_long_file_through_takes_no_more_memory_than_a_frame(tmp_path: Path) -> None:
+    store = MapStore(tmp_path / "maps.h5", FIXED, {})
+    ones = np.ones((1, 256, 128), np.float32)
+    for window in range(200):
+        store.extend("time", [window], range_doppler=ones, detections=ones > 0)
+    store.close()
+    with read_maps(tmp_path / "maps.h5") as maps:
+        power, mask = maps["range_doppler"], maps["detections"]
+        assert power[0].all()
+        assert mask[0].all()
+        return_freed_memory()
+        forget_peak_memory()
+        before = peak_memory_mb()
+        for window in range(200):
+            assert power[window].all()
+            assert mask[window].all()
+    # 33 MB are read; HDF5 would keep 8 MB of each map.
+    assert peak_memory_mb() - before < 4
