@@ -151,7 +151,6 @@ def run_into(
         if pictures:
             with capture.stages.time("pictures"):
                 drawn = draw_pictures(folder, capture, clouds)
-        return_freed_memory()
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
         # Only now, for the echoes that the view asks for do not belong into the model's account.
@@ -159,6 +158,7 @@ def run_into(
             save_snapshots(folder / "view.npz", snapshots(capture))
             with read_maps(folder / "maps.h5") as maps:
                 _add_room(summary, capture, maps)
+        return_freed_memory()
         with capture.stages.time("report"):
             write_report(
                 folder / "report.html",

@@ -25,7 +25,7 @@ LIMIT_MB = 3000.0
 # placed. If the IF samples were held, it would be gigabytes. How the arrays of two threads share a
 # heap is chance, which only adds, so the need of a run is the least of several.
 GROWTH = 1.01
-RUNS, SHORT_RUNS = 3, 8  # short ones differ by 3 MB, of the 5 MB that they may grow
+RUNS = 3
 
 # Ten times as long: held twice, the recording alone would add 45 MB to some 330, and the link
 # budget 9. Only the heap may grow.
@@ -218,7 +218,7 @@ def measure(quick: bool) -> list[Row]:
     for radar in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
         for fidelity in ("specular",) if quick else ("analytic", "specular"):
             peaks: dict[float, list[float]] = {short_s: [], long_s: []}
-            for duration_s in (short_s, long_s) * (SHORT_RUNS if quick else RUNS):
+            for duration_s in (short_s, long_s) * RUNS:
                 with tempfile.TemporaryDirectory() as folder:
                     found = summary(folder, radar, fidelity, duration_s)
                 peaks[duration_s].append(found["peak_memory_mb"])
