@@ -26,6 +26,9 @@ from rtradar.system.threads import in_threads, thread_map
 _INSTANTS = 8
 """Times in a frame at which echoes are looked at."""
 
+_LOOKS_AHEAD = 8
+"""Times that are looked at with those that are needed, because a call has its price."""
+
 _RATE_CYCLES = 2
 """Cycles before and after such a time, over which range rates are taken."""
 
@@ -153,8 +156,19 @@ class Sources:
             del self._kept[old]
         missing = [number for number in numbers.tolist() if number not in self._kept]
         if missing:
+            missing += self._ahead(missing[-1])
             self._kept |= zip(missing, self._look(np.array(missing)), strict=True)
         return [self._kept[number] for number in numbers.tolist()]
+
+    def _ahead(self, number: int) -> list[int]:
+        """Return the cycles after this one at which the next frames will be looked at."""
+        radar, every = self._capture.radar, self._every
+        if radar.in_frames:
+            return []
+        last = (self._capture.n_chirps // radar.n_tx - 1) // every + 1
+        return list(
+            range(number + every, min(number // every + _LOOKS_AHEAD, last) * every + 1, every)
+        )
 
     def _look(self, numbers: NDArray[np.int64]) -> list[_Echoes]:
         capture, radar = self._capture, self._capture.radar

@@ -6,6 +6,7 @@ for each delay in them.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -99,10 +100,10 @@ class RoomEchoes:
         """Return some of the echoes."""
         return replace(
             self,
-            length=self.length[..., which],
-            amplitude=self.amplitude[..., which],
+            length=np.compress(which, self.length, axis=-1),
+            amplitude=np.compress(which, self.amplitude, axis=-1),
             bounces=self.bounces[which],
-            points=self.points[:, :, which],
+            points=np.compress(which, self.points, axis=2),
         )
 
     def received(self, radar: Radar) -> RoomEchoes:
@@ -112,27 +113,48 @@ class RoomEchoes:
 
     def at_nodes(self, frequency: Array) -> Field:
         """Interpolate amplitudes (node, tx, rx, echo) at other frequencies (node,) [Hz]."""
+        if np.array_equal(frequency, self.frequency):
+            return self.amplitude
         weights = interpolation_weights(self.frequency, frequency)
-        return np.asarray(np.tensordot(weights, self.amplitude, axes=1))
+        parts = weights @ _real_and_imaginary(self.amplitude)
+        return parts.view(np.complex128).reshape(len(frequency), *self.amplitude.shape[1:])
 
-    def with_fewest_nodes(self, radar: Radar, error: float = FREQUENCY_ERROR) -> RoomEchoes:
+    def strongest_m(self) -> float:
+        """Return the largest |amplitude| [m]."""
+        each = np.moveaxis(self.amplitude, 1, 0)
+        return max((_largest(_real_and_imaginary(own)) for own in each), default=0.0)
+
+    def with_fewest_nodes(
+        self, radar: Radar, error: float = FREQUENCY_ERROR, strongest_m: float | None = None
+    ) -> RoomEchoes:
         """Return the echoes at the fewest nodes that keep amplitudes to this; see ``off_m``.
 
-        The error is relative to the strongest amplitude.
+        The error is relative to ``strongest_m`` [m], or to the strongest of these echoes.
         """
-        largest = np.abs(self.amplitude).max(initial=0.0)
+        most = error * (self.strongest_m() if strongest_m is None else strongest_m)
         for count in _NODES:
-            nodes = sweep_nodes(radar, count)
+            nodes, off = sweep_nodes(radar, count), 0.0
             there = interpolation_weights(self.frequency, nodes)
             change = interpolation_weights(nodes, self.frequency) @ there - np.eye(there.shape[1])
-            # Tx by Tx, which takes less memory.
-            off = max(
-                float(np.abs(np.tensordot(change, own, axes=1)).max(initial=0.0))
-                for own in np.moveaxis(self.amplitude, 1, 0)
-            )
-            if off <= error * largest:
+            for own in np.moveaxis(self.amplitude, 1, 0):  # all at once would take more memory
+                off = max(off, _largest(change @ _real_and_imaginary(own)))
+                if off > most and count < _NODES[-1]:
+                    break
+            if off <= most:
                 return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=0.0)
         return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=off)
+
+
+def _real_and_imaginary(amplitude: Field) -> Array:
+    """Return amplitudes (node, ...) as (node, number), for real weights need no complex product."""
+    flat = np.ascontiguousarray(amplitude).reshape(len(amplitude), math.prod(amplitude.shape[1:]))
+    return flat.view(np.float64)
+
+
+def _largest(parts: Array) -> float:
+    """Return the largest of the amplitudes of `_real_and_imaginary`."""
+    parts = parts.ravel() ** 2
+    return math.sqrt((parts[0::2] + parts[1::2]).max(initial=0.0))
 
 
 # -- behind walls ----------------------------------------------------------------------------------
@@ -172,18 +194,22 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     if not behind.any():
         return returns
     count, series = _series_behind(scene.walls, crossed, radar)
-    nodes = sweep_nodes(radar, count)
-    returns = replace(returns, amplitude=returns.at_nodes(nodes), frequency=nodes)
-    parts, off = _transmitted(returns.take(behind), radar, scene, series)
+    nodes, hidden = sweep_nodes(radar, count), returns.take(behind)
+    hidden = replace(hidden, amplitude=hidden.at_nodes(nodes), frequency=nodes)
+    parts, off = _transmitted(hidden, radar, scene, series)
     parts = [returns.take(~behind), *parts]
-    whole = replace(
+    strongest_m = max(part.strongest_m() for part in parts)
+    parts = [part.with_fewest_nodes(radar, ENOUGH, strongest_m) for part in parts]
+    nodes = max((part.frequency for part in parts), key=len)
+    return replace(
         returns,
         length=np.concatenate([part.length for part in parts], axis=-1),
-        amplitude=np.concatenate([part.amplitude for part in parts], axis=-1),
+        amplitude=np.concatenate([part.at_nodes(nodes) for part in parts], axis=-1),
+        frequency=nodes,
         bounces=np.concatenate([part.bounces for part in parts]),
         points=np.concatenate([part.points for part in parts], axis=2),
-    ).with_fewest_nodes(radar, ENOUGH)
-    return replace(whole, off_m=max(whole.off_m, off))
+        off_m=max(off, *(part.off_m for part in parts)),
+    )
 
 
 def _series_behind(
