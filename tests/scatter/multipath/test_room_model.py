@@ -224,7 +224,10 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
         np.arange(20)
     )  # type: ignore[arg-type]
     stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
-    np.testing.assert_array_equal(kept.amplitude, again.amplitude[..., stay])
+    # What is left is of conductors, and the same at all frequencies.
+    assert len(kept.frequency) == 1
+    for amplitude in again.amplitude[..., stay]:
+        np.testing.assert_array_equal(kept.amplitude[0], amplitude)
     np.testing.assert_array_equal(kept.length, again.length[..., stay])
 
 
@@ -402,3 +405,22 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(
     root = np.sqrt(eta - 1 + cosine**2)
     # The sphere's radius moves the angle by a degree, and the field is a little out of the plane.
     assert ratio == pytest.approx(np.conj((root - cosine) / (root + cosine)), rel=0.01)
+
+
+def test_direct_echoes_of_a_conductor_need_one_frequency(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    model = build_model(
+        "specular",
+        single(),
+        one(),
+        scene=Scene(walls=(wall("left", "brick"),)),
+        variant=backend.kind,
+    )  # type: ignore[arg-type]
+    chirps = np.arange(40)
+    whole, direct = model.echoes(chirps), model.without_ghosts().echoes(chirps)
+    assert len(whole.frequency) > 1
+    assert len(direct.frequency) == 1
+    np.testing.assert_array_equal(direct.frequency, whole.frequency[len(whole.frequency) // 2])
+    first = np.broadcast_to(direct.amplitude, whole.amplitude[..., :1].shape)
+    np.testing.assert_allclose(first, whole.amplitude[..., :1], rtol=1e-6)
