@@ -6,7 +6,6 @@ for each delay in them.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
+from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scatter.multipath.slab_series import WallSeries, room_series
@@ -113,16 +113,11 @@ class RoomEchoes:
 
     def at_nodes(self, frequency: Array) -> Field:
         """Interpolate amplitudes (node, tx, rx, echo) at other frequencies (node,) [Hz]."""
-        if np.array_equal(frequency, self.frequency):
-            return self.amplitude
-        weights = interpolation_weights(self.frequency, frequency)
-        parts = weights @ _real_and_imaginary(self.amplitude)
-        return parts.view(np.complex128).reshape(len(frequency), *self.amplitude.shape[1:])
+        return np.asarray(at_nodes(self.amplitude, self.frequency, frequency))
 
     def strongest_m(self) -> float:
         """Return the largest |amplitude| [m]."""
-        each = np.moveaxis(self.amplitude, 1, 0)
-        return max((_largest(_real_and_imaginary(own)) for own in each), default=0.0)
+        return float(np.abs(self.amplitude).max(initial=0.0))
 
     def with_fewest_nodes(
         self, radar: Radar, error: float = FREQUENCY_ERROR, strongest_m: float | None = None
@@ -133,28 +128,17 @@ class RoomEchoes:
         """
         most = error * (self.strongest_m() if strongest_m is None else strongest_m)
         for count in _NODES:
-            nodes, off = sweep_nodes(radar, count), 0.0
+            nodes = sweep_nodes(radar, count)
             there = interpolation_weights(self.frequency, nodes)
             change = interpolation_weights(nodes, self.frequency) @ there - np.eye(there.shape[1])
-            for own in np.moveaxis(self.amplitude, 1, 0):  # all at once would take more memory
-                off = max(off, _largest(change @ _real_and_imaginary(own)))
-                if off > most and count < _NODES[-1]:
-                    break
+            # Tx by Tx, which takes less memory.
+            off = max(
+                float(np.abs(np.tensordot(change, own, axes=1)).max(initial=0.0))
+                for own in np.moveaxis(self.amplitude, 1, 0)
+            )
             if off <= most:
                 return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=0.0)
         return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=off)
-
-
-def _real_and_imaginary(amplitude: Field) -> Array:
-    """Return amplitudes (node, ...) as (node, number), for real weights need no complex product."""
-    flat = np.ascontiguousarray(amplitude).reshape(len(amplitude), math.prod(amplitude.shape[1:]))
-    return flat.view(np.float64)
-
-
-def _largest(parts: Array) -> float:
-    """Return the largest of the amplitudes of `_real_and_imaginary`."""
-    parts = parts.ravel() ** 2
-    return math.sqrt((parts[0::2] + parts[1::2]).max(initial=0.0))
 
 
 # -- behind walls ----------------------------------------------------------------------------------

@@ -286,7 +286,7 @@ class RoomModel:
         # Times what walls, the body's surface and occluders leave.
         frequency = self._around.walls.frequency
         if all(bool((own.factor == own.factor[:, :1]).all()) for own in factors):
-            # Direct echoes of a conductor: one node spares most of what a sample takes.
+            # Nothing changes over the sweep, as with the direct echoes of a conductor.
             factors = [
                 own._replace(factor=np.ascontiguousarray(own.factor[:, :1])) for own in factors
             ]
