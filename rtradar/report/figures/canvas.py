@@ -131,7 +131,7 @@ def draw_levels(
     low, high = limits_db or colour_limits(level_db)
     extent = (*bin_edges(across), *bin_edges(up))
     style = {"cmap": "viridis", "aspect": "auto", "origin": "lower"} | style
-    # Levels are resampled before they have colours, in float32: a third of the memory, same pixels.
+    # Levels are resampled before they have colours, and in float32, which takes less memory.
     style |= {"interpolation": "nearest", "interpolation_stage": "data"}
     return axes.imshow(level_db.astype(np.float32), vmin=low, vmax=high, extent=extent, **style)
 

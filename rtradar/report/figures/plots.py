@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_BYTES_AT_ONCE = 1 << 21  # of a map that is read through: more is not quicker
+_BYTES_AT_ONCE = 1 << 21  # of a map that is read through
 _DOTS = 20_000
 _HIGHEST_IN = 6.5
 _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
@@ -437,7 +437,7 @@ class Plots:
             mask = np.asarray(masks[some]) > 0
             by_range += mask.sum(axis=(0, 2))
             by_velocity += mask.sum(axis=(0, 1))
-            power = (np.asarray(maps[some]) * mask).sum(axis=1)  # (frame, velocity)
+            power = np.where(mask, np.asarray(maps[some]), 0).sum(axis=1)  # (frame, velocity)
             moving[some] = power[:, moves].sum(axis=1)
             still[some] = power.sum(axis=1)
         return _Found(by_range, by_velocity, moving if moving.any() else still)
