@@ -17,6 +17,7 @@ sys.path.insert(0, str(HERE))
 import api_pages  # noqa: E402
 import code_tables  # noqa: E402
 import drawings  # noqa: E402
+import level_tables  # noqa: E402
 
 import rtradar  # noqa: E402
 
@@ -75,8 +76,10 @@ def displayed_math(page: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Teach Sphinx MathML and tables from the code; draw, and write the API's pages."""
+    """Teach Sphinx MathML, and tables and names from the code; draw, and write the API's pages."""
+    code_tables.TABLES.update(level_tables.TABLES)
     app.add_directive("from-code", code_tables.CodeTable)
+    app.add_role("names", level_tables.names_role)
     app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))
     app.connect("builder-inited", lambda app: api_pages.write(Path(app.srcdir) / "api"))
     app.connect("builder-inited", lambda app: drawings.draw(Path(app.srcdir) / "drawn"))

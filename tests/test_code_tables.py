@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
-import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,11 +13,18 @@ import pytest
 import rtradar as rt
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
+from rtradar.scatter import MODELS
+from rtradar.scatter.echo_models import models_that
 
 pytest.importorskip("docutils", reason="pages are built by what the extra docs brings")
 
 ROOT = Path(__file__).parents[1]
-TABLES = runpy.run_path(str(ROOT / "docs" / "code_tables.py"))["TABLES"]
+sys.path.insert(0, str(ROOT / "docs"))
+import code_tables  # noqa: E402
+import level_tables  # noqa: E402
+
+sys.path.remove(str(ROOT / "docs"))
+TABLES = code_tables.TABLES
 SURFACE = 'material = "wood"\nthickness_m = 0.1\n'
 ROOM = f"[room]\nsize_m = [4, 4, 3]\ncorner_m = [0, 0]\n[room.walls]\n{SURFACE}"
 SCENE = {
@@ -55,10 +63,42 @@ def first_column(table: str) -> list[str]:
 
 
 def test_every_table_is_on_a_page_and_no_page_asks_for_another() -> None:
-    used = re.findall(
-        r"\{from-code\} (\S+)", "".join(map(page, ("radar.md", "scenes.md", "data-sets.md")))
-    )
-    assert sorted(used) == sorted(TABLES)
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))
+    assert sorted(re.findall(r"\{from-code\} (\S+)", text)) == sorted(TABLES | level_tables.TABLES)
+
+
+def test_names_that_sentences_ask_for_are_there() -> None:
+    text = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))
+    asked = re.findall(r"\{names\}`([^`]*)`", text)
+    assert asked
+    assert all(map(level_tables.names, asked))
+    assert level_tables.names("levels: not traces") == ["analytic-paper", "analytic"]
+    for wrong in ("levels: flies", "levels", "radars"):
+        with pytest.raises(ValueError, match="there are no such names"):
+            level_tables.names(wrong)
+
+
+def test_tables_of_levels_have_every_level_and_option() -> None:
+    for name, table in level_tables.TABLES.items():
+        if name != "level-options":
+            assert first_column(table()) == list(MODELS.built_in), name
+    options = [
+        (level, name)
+        for level in MODELS.built_in
+        for name in inspect.signature(MODELS[level]).parameters
+        if name not in level_tables.GIVEN
+    ]
+    shown = re.findall(r"^\| `([^`]+)` \| `([^`]+)` \|", level_tables.options(), re.M)
+    assert sorted(shown) == sorted(options)
+
+
+@pytest.mark.parametrize("level", MODELS.built_in)
+def test_a_level_says_what_it_computes_and_what_occludes(level: str) -> None:
+    said = level_tables.said(level)
+    assert len(said.computes) > 20
+    assert (inspect.getdoc(MODELS[level]) or "").startswith(f"`{level}`: ")
+    assert (said.occlusion != "none") == (level in models_that("traces"))
+    assert said.asked.endswith(".")
 
 
 def test_tables_from_the_code_are_complete() -> None:

@@ -39,7 +39,8 @@ class BuiltInModel:
     each path has one of its own, before images of the antennas."""
 
     accepts_meshes: ClassVar[bool] = False
-    """Whether `scattering_length` by this model takes meshes as well as ellipsoids."""
+    """Whether the model takes meshes as well as ellipsoids, as people and as targets of
+    `scattering_length`."""
 
     relative_cost: ClassVar[float | None] = None
     """Rough time per part and chirp over that of `analytic`; None if it depends on the pose."""

@@ -115,7 +115,7 @@ class FormulaModel(BuiltInModel, ABC):
 
 
 class Analytic(FormulaModel):
-    """`analytic`: the specular range to each antenna, and the cross-section of each ellipsoid."""
+    """`analytic`: closed-form cross-section at the specular range of each antenna."""
 
     @staticmethod
     def scattering(
@@ -135,7 +135,7 @@ class Analytic(FormulaModel):
 
 
 class AnalyticPaper(FormulaModel):
-    """`analytic-paper`: ranges of centres and plane waves over the array, as in the paper."""
+    """`analytic-paper`: range of the centre and plane waves over the array, as in the paper."""
 
     fast_over_walls = False
 

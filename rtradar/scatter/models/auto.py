@@ -83,15 +83,17 @@ class _Group(NamedTuple):
 
 
 class Auto(BuiltInModel):
-    """`auto`: each part by what the tolerance requires, faded over where that changes.
+    """`auto`: for each part, every 25 ms, the cheapest that keeps a tolerance.
+
+    Occlusion: as chosen. What is chosen for a part asks as it does alone.
 
     Parameters
     ----------
     tolerance_db : float
-        Largest error of the power of a frame, of each person [dB].
+        Largest error of the power of a frame, of each person [dB], above 0.
     tolerance_complex : float, optional
-        Largest rms error of the received field over its rms, of each person; None: only the power
-        matters.
+        Largest rms error of the received field over its rms, of each person, 0.001 and more; None:
+        only the power matters.
 
     Raises
     ------

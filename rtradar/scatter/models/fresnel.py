@@ -80,9 +80,10 @@ def fresnel_scattering(
 
 
 class Fresnel(TwoBounceModel):
-    """`fresnel`: lengths and returns of `specular`, times the visible fraction V of Fresnel zones.
+    """`fresnel`: echoes of `specular`, times the visible fraction of the Fresnel zones.
 
-    Mitsuba decides for each antenna which corners of the zones' cells it sees.
+    Occlusion: gradual. Each node of the array is asked which corners of the zones' cells it sees,
+    and where edges cross their sides, every 10 ms, and more often while an edge passes.
 
     Parameters
     ----------

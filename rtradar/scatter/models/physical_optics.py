@@ -73,24 +73,29 @@ def optics_scattering(
 
 
 class PhysicalOptics(TwoBounceModel):
-    """`physical-optics`: facets at keyframes, three frequencies and a few places of the array.
+    """`physical-optics`: facets fixed to the body, interpolated between keyframes.
+
+    The path over the specular point is exact at every chirp. At the keyframes facets are summed for
+    a few frequencies and places of the array.
+
+    Occlusion: facet by facet. Each Tx and Rx is asked at the keyframes which corners it sees.
 
     Parameters
     ----------
     facets : int, optional
-        Least number per ellipsoid; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for
-        a grown person. A mesh is always divided by the wavelength.
+        Least number per ellipsoid, 20 to 1 310 720; None: by the wavelength, 5120 at 12 GHz and
+        20 480 at 77 GHz for a grown person. A mesh is always divided by the wavelength.
     anchor_s : float
-        Time between keyframes [s]; where the echo bends it comes down to an eighth of it.
+        Time between keyframes [s], above 0; where the echo bends it comes down to an eighth of it.
     tolerance : float
         Bend of a part's echo, over the root of the power of the whole person, above which keyframes
-        come closer.
+        come closer; above 0.
     unevenness : float
         Change of a part's echo over the array, over the same, above which it is computed at more
-        places of the array.
+        places of the array; above 0.
     frequencies : int
-        Number of frequencies over the sweep. Where a part is half occluded at 12 GHz, three leave
-        an error of 3.1 % of the field and five 1.9 %
+        Number of frequencies over the sweep, 1 to 9. Where a part is half occluded at 12 GHz, three
+        leave an error of 3.1 % of the field and five 1.9 %
         (``tests/scatter/models/test_physical_optics.py``), but the IF takes longer.
     bounces : int
         1, or 2 for reflections from part to part as well, by geometric optics

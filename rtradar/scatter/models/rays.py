@@ -38,7 +38,11 @@ Array = NDArray[np.float64]
 
 
 class Rays(BuiltInModel):
-    """`rays`: tubes fixed in the material of the body, shot from each Tx.
+    """`rays`: ray tubes, with bounces.
+
+    Tubes go from each Tx to facets fixed to the body, and are summed at each Rx as vectors.
+
+    Occlusion: at every bounce. Each ray is asked which part it meets, every 10 ms.
 
     The path over the specular point of each part is exact at every chirp. Rays are shot at
     keyframes, and the amplitude on that path, which varies slowly, is interpolated by cubics over
@@ -48,13 +52,13 @@ class Rays(BuiltInModel):
     Parameters
     ----------
     rays_per_wavelength : float
-        The edge of a tube's facet is the wavelength at the sweep centre over this.
+        Wavelength at the sweep centre over the edge of a tube's facet, 0.1 to 100.
     bounces : int
-        Largest number of reflections on the way. Two bounces on a body of ellipsoids go partly
-        over the creases where two of them touch, which no real body has, and add 0.9 dB to the
-        power of a walker: one is the default.
+        Largest number of reflections on the way, 1 to 10. Two bounces on a body of ellipsoids go
+        partly over the creases where two of them touch, which no real body has, and add 0.9 dB to
+        the power of a walker: one is the default.
     anchor_s : float
-        Time between keyframes [s]; 0 shoots at every chirp.
+        Time between keyframes [s], below 1; 0 shoots at every chirp.
 
     Raises
     ------

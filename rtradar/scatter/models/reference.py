@@ -19,15 +19,18 @@ beside it, and its phase changes over the sweep: three frequencies would not fol
 
 
 class Reference(BuiltInModel):
-    """`reference`: path lengths and facets at every chirp, visibility once in every TDM cycle.
+    """`reference`: all facets at every chirp.
 
-    In one cycle of the paper's radars a limb at 5 m/s goes 4 mm, less than a facet.
+    The other levels are compared with it.
+
+    Occlusion: facet by facet. Each Tx and Rx is asked in every TDM cycle which corners it sees. In
+    one cycle of the paper's radars a limb at 5 m/s goes 4 mm, less than a facet.
 
     Parameters
     ----------
     facets : int, optional
-        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
-        grown person.
+        Least number per part, 20 to 1 310 720; None: by the wavelength, 5120 at 12 GHz and 20 480
+        at 77 GHz for a grown person.
     """
 
     accepts_meshes = True

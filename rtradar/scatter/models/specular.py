@@ -26,7 +26,11 @@ from rtradar.trace.body_tracer import BodyTracer
 
 
 class Specular(TwoBounceModel):
-    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
+    """`specular`: near-field geometric optics for each Tx and Rx.
+
+    Specular point, curvature and spreading are solved in float64 at every chirp.
+
+    Occlusion: the specular point is visible or not. Each Tx and Rx is asked every 10 ms.
 
     Parameters
     ----------
