@@ -285,8 +285,8 @@ def two_sphere_rows(quick: bool) -> Iterator[Row]:
                 reference = 2 * between_spheres(tx, pair.centres, radius)
                 what = f"{polarization}, radius {radius} m, {apart} m apart, from {distance:g} m"
                 # Stationary phase omits terms of the order 1 / (k a), 2 % here. A sphere far behind
-                # the glint of the other is lit by some twenty ray tubes across, and those on its
-                # outline count as a whole or not at all.
+                # the specular point of the other is lit by some twenty ray tubes across, and those
+                # on its outline count as a whole or not at all.
                 says, error = (
                     "double bounce of two spheres against stationary phase",
                     abs(float(field_db((two - one) / reference))),

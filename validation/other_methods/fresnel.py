@@ -171,7 +171,8 @@ def edge_rows(quick: bool) -> Iterator[Row]:
             wrong = np.concatenate(errors)
             quantity = f"rms complex error, {len(wrong)} cases partly covered"
             says = (
-                "knife edge and limbs across a glint by `fresnel`, 12 and 77 GHz: rms complex error"
+                "knife edge and limbs across a specular point by `fresnel`, 12 and 77 GHz: "
+                "rms complex error"
             )
             yield judged(
                 claim, quantity, "", rms(wrong), EDGE_ERROR, key="edge", says=says, cases=len(wrong)

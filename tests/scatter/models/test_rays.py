@@ -104,8 +104,8 @@ def test_a_sphere_is_that_of_physical_optics(backend: Backend) -> None:
 def test_under_sampled_tubes_degrade_gracefully() -> None:
     reference = abs(complex(rt.rcs.sphere(0.25, 14e9, "po")))
     field = backscatter(sphere(0.25), [FAR, 0, 0], 14e9, bounces=1, rays_per_wavelength=1.0)
-    # Facets of one wavelength, ten to the glint; plain sums of one ray a facet would be 12 dB too
-    # high.
+    # Facets of one wavelength, ten around the specular point; plain sums of one ray a facet would
+    # be 12 dB too high.
     assert 20 * np.log10(abs(field) / reference) == pytest.approx(0, abs=1.0)
 
 
