@@ -12,7 +12,6 @@ from statistics import median
 from typing import Any
 
 from rtradar.bench.floors import Rates, Work, floors, measure_rates
-from rtradar.bench.kernels import measure_kernels
 from rtradar.bench.plan import CHEAPEST, Case, Plan, model_cases, plan_of
 from rtradar.bench.report import draw, tables
 from rtradar.bench.runs import (
@@ -78,8 +77,8 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
 def measure(plan: Plan) -> dict[str, Any]:
     """Measure all that the plan asks for, and give it as plain values.
 
-    The keys are ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth`` and
-    ``kernels``. `RunError` where a run fails.
+    The keys are ``settings``, ``machine``, ``rates``, ``models``, ``paper`` and ``growth``.
+    `RunError` where a run fails.
     """
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
     found: dict[str, Any] = {
@@ -89,7 +88,6 @@ def measure(plan: Plan) -> dict[str, Any]:
         "models": [],
         "paper": {"trouble": "", "radars": {}},
         "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": []},
-        "kernels": measure_kernels() if "kernels" in plan.parts else [],
     }
     with temporary_folder("rtradar-bench-") as folder:
         runner = Runner(folder)

@@ -10,9 +10,9 @@ from rtradar.radar import Radar
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import affordable_models
 
-PARTS = ("models", "growth", "kernels")
-"""Parts that may be measured alone: models with baseline and bounds, growth with the size of the
-problem, and compiled kernels beside their references."""
+PARTS = ("models", "growth")
+"""Parts that may be measured alone: models with baseline and bounds, and growth with the size of
+the problem."""
 
 CHEAPEST = "analytic"
 """Model with which all others are compared."""

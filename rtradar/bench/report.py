@@ -40,20 +40,6 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
         for radar in dict.fromkeys(row["radar"] for row in models):
             yield _stages(radar, [row for row in models if row["radar"] == radar])
     yield from _growth(found["growth"])
-    if found["kernels"]:
-        head = ["kernel", "computes", "takes", "its reference", "ratio", "differs by"]
-        yield table(head, [_kernel(row) for row in found["kernels"]])
-
-
-def _kernel(row: Row) -> list[str]:
-    times = [f"{1e3 * row[name]:.3g} ms" for name in ("kernel_s", "reference_s")]
-    return [
-        f"`{row['name']}`",
-        row["does"],
-        *times,
-        f"{row['ratio']:.3g}",
-        f"{row['difference']:.1g}",
-    ]
 
 
 def _models(models: Sequence[Row]) -> str:

@@ -33,7 +33,7 @@ def add(commands: Subcommands) -> None:
         "bench",
         "measure the time of every stage, beside other models, the paper's method and bounds",
         _add_bench,
-        ("rtradar bench --quick", "rtradar bench --only kernels --json kernels.json"),
+        ("rtradar bench --quick", "rtradar bench --only growth --json growth.json"),
     )
 
 
@@ -73,9 +73,7 @@ def _add_bench(bench: OneLineParser) -> None:
     bench.option(
         "--duration", "S", "length of the capture [s] (default: 3; with --quick 0.5)", type=seconds
     )
-    bench.option(
-        "--only", "PART", "models (with the paper's method and floors), growth, or kernels"
-    )
+    bench.option("--only", "PART", "models (with the paper's method and floors), or growth")
     bench.flag("--quick", "measure little of everything, in some minutes")
     bench.option("--json", "FILE", "write all that is measured there as JSON", type=path)
     bench.option("--figure", "FILE", "draw it there, as PNG", type=path)

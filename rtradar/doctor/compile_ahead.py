@@ -40,9 +40,8 @@ _LEVELS: dict[str, dict[str, Any]] = {
 ON_DEMAND = (
     *("rtradar.kernels.receiver", "rtradar.kernels.scatter.facets_by_length"),
     *("rtradar.kernels.surface_currents", "rtradar.kernels.surface_integrals"),
-    "rtradar.kernels.elementary.fill_phasors",
 )
-"""Modules and functions that no run of a level needs: receivers, moving objects, full wave."""
+"""Modules that no run of a level needs: receivers, moving objects, full wave."""
 
 
 def left_to_compile() -> set[str]:

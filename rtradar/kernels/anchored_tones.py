@@ -104,15 +104,6 @@ def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors
                         change[power - 1, 1, anchor, tx, receiver, kept - flat] = total.imag
 
 
-def fill_anchors_reference(chirps, length, amplitude, which, weights, changing):
-    """The `Anchors` that `fill_anchors` fills, in plain NumPy."""
-    own = np.einsum("sn,nacre->sacre", weights, amplitude[:, chirps][..., which])
-    own[1][..., : len(which) - changing] = own[0][..., : len(which) - changing]
-    level, *powers = (np.stack([part.real, part.imag]) for part in own[1:])
-    change = np.array(powers)[..., len(which) - changing :]
-    return Anchors(length[chirps][..., which], level, change)
-
-
 class _Windows(NamedTuple):
     """The windows of tones, and what undoes them after the FFT.
 
@@ -307,22 +298,3 @@ def _spread(place, turned, flat, level, powers, real, imaginary):
             real[cell + tap] += a0 * w0[tap] + a1 * w1[tap] + a2 * w2[tap]
         for tap in range(np.uint64(_WIDER)):
             imaginary[cell + tap] += b0 * w0[tap] + b1 * w1[tap] + b2 * w2[tap]
-
-
-def anchored_tones_reference(anchors, between, sweep, samples):
-    """The sum of `add_anchored_tones` (chirp, rx, sample), by NumPy."""
-    which = between.first[:, None] + np.arange(ANCHORS), between.tx[:, None]
-    parts = (part[0] + 1j * part[1] for part in (anchors.level, *anchors.change))
-    length, level, tilt, curve = (
-        np.einsum("ck,ckre->cre", between.weight, part[which]) for part in (anchors.length, *parts)
-    )
-    delay = length / SPEED_OF_LIGHT_MPS
-    beat, n = sweep.slope * delay, np.arange(samples)
-    start = between.carrier[:, None, None] * delay - beat * delay / 2
-    turns = start[..., None] + beat[..., None] * n / sweep.sample_rate
-    u = (n - samples // 2) / samples
-    own = np.repeat(level[..., None], samples, axis=3)
-    flat = level.shape[2] - tilt.shape[2]
-    own[:, :, flat:] += tilt[..., None] * u + curve[..., None] * u**2
-    received = (beat >= 0) & (beat < sweep.sample_rate)
-    return np.sum(own * received[..., None] * np.exp(2j * np.pi * turns), axis=2)

@@ -55,18 +55,6 @@ def beam_power(begin, end, values, still, place, channels, steering, power):
             power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2
 
 
-def beam_power_reference(values, still, place, channels, steering):
-    """Power (cell, sine) of `beam_power`, by NumPy."""
-    weights, runs, starts = steering
-    offsets = np.zeros(weights.shape, dtype=np.int64)
-    whose = np.repeat(np.arange(len(weights)), np.diff(starts))
-    for own, (element, offset, first, last) in zip(whose, runs, strict=True):
-        offsets[own, element, first:last] = offset
-    cell, channel = np.arange(len(values))[:, None, None], channels[:, None]
-    read = (values * still[:, None])[cell, offsets[place], channel].astype(np.complex128)
-    return np.abs((read * weights[place]).sum(axis=1)) ** 2
-
-
 @compiled()
 def highest_maxima(power, below, above, index, count):
     """Fill index (cell, peak) with the maxima of power (cell, sine), and count (cell,) of them.
@@ -110,20 +98,6 @@ def highest_maxima(power, below, above, index, count):
         count[cell] = found
 
 
-def highest_maxima_reference(power, below, above, peaks):
-    """Index and count of `highest_maxima`, by NumPy."""
-    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
-    good = (power > padded[:, :-2]) & (power >= padded[:, 2:]) & (power > 0)
-    highest = power.max(axis=1, keepdims=True)
-    good &= power >= highest * below
-    lower = (power[:, None] * above <= power[:, :, None]).sum(axis=2)
-    good &= (power == highest) | (2 * lower > power.shape[1])
-    count = np.minimum(good.sum(axis=1), peaks)
-    order = np.argsort(np.where(good, -power, np.inf), axis=1, kind="stable")[:, :peaks]
-    index = np.where(np.arange(peaks) < count[:, None], order, order[:, :1])
-    return np.where(count[:, None] > 0, index, power.argmax(axis=1)[:, None]), count
-
-
 @compiled()
 def add_interpolated(power, sines, first, step, bins, total):
     """Add power (cell, sine), read at sines (cell, angle) on its uniform grid, to (bin, angle)."""
@@ -135,12 +109,3 @@ def add_interpolated(power, sines, first, step, bins, total):
             part = place - left
             read = (1 - part) * power[cell, left] + part * power[cell, left + 1]
             total[bins[cell], angle] += read
-
-
-def add_interpolated_reference(power, sines, first, step, bins, shape):
-    """The map (bin, angle) that `add_interpolated` adds, by NumPy."""
-    total = np.zeros(shape)
-    grid = first + step * np.arange(power.shape[1])
-    read = [np.interp(own, grid, values) for own, values in zip(sines, power, strict=True)]
-    np.add.at(total, bins, read)
-    return total

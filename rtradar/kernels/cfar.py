@@ -68,12 +68,3 @@ def os_cfar_rows(begin, end, cells, thresholds, ranks, counts, guard, outer, mas
                 if missing <= 0 or spare < 0:
                     break
             mask[i, j] = missing <= 0
-
-
-def os_cfar_reference(cells, thresholds, ranks, guard, outer):
-    """Mask of `os_cfar_rows`, by NumPy."""
-    padded, width = np.pad(cells, outer, constant_values=np.nan), 2 * outer + 1
-    ring = np.ones((width, width), dtype=bool)
-    ring[outer - guard : outer + guard + 1, outer - guard : outer + guard + 1] = False
-    training = np.lib.stride_tricks.sliding_window_view(padded, (width, width))[:, :, ring]
-    return (training < thresholds[..., None]).sum(axis=2) >= ranks

@@ -89,19 +89,6 @@ def phasor(turns):
     return -across if quadrant == 1 or quadrant == 2 else across, -up if quadrant >= 2 else up
 
 
-@compiled(fastmath={"contract"})
-def fill_phasors(turns, out):
-    """Fill ``out`` with exp(2j pi turns)."""
-    for i in range(len(turns)):
-        across, up = phasor(turns[i])
-        out[i] = complex(across, up)
-
-
-def phasor_reference(turns):
-    """The same by NumPy."""
-    return np.exp(2j * np.pi * (turns - np.rint(turns)))
-
-
 # -- blends of keyframes --
 
 
@@ -132,11 +119,6 @@ def add_blended(tx, weights, keyframes, whole, out):
         of_a, of_b, of_c, of_d = weights[chirp]
         for i in range(len(own)):
             own[i] += kept[i] - (of_a * a[i] + of_b * b[i] + of_c * c[i] + of_d * d[i])
-
-
-def add_blended_reference(tx, weights, keyframes, whole):
-    """`add_blended` to zeros."""
-    return whole[tx] - np.einsum("ck,kcv->cv", weights, keyframes[:, tx])
 
 
 def cubic_weights(fraction):

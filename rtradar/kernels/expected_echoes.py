@@ -55,23 +55,6 @@ def follow_echoes(start, stop, first, looks, turns_per_m, steps_per_m, steps, fi
             fields[row, echo] = complex(size * across, size * up)
 
 
-def follow_echoes_reference(first, cycles, looks, turns_per_m, steps_per_m):
-    """The same steps and fields of some cycles, by NumPy."""
-    at, cycle_s, range_m, rate_mps, power_m2 = looks
-    cycle = first + np.arange(cycles)[:, None]
-    before = np.clip(np.searchsorted(at, cycle[:, 0], side="right"), 1, len(at) - 1) - 1
-    apart = np.maximum(np.diff(at), 1)[before, None]
-    t, apart_s = (cycle - at[before, None]) / apart, apart * cycle_s
-    p0, p1 = power_m2[before], power_m2[before + 1]
-    (r0, r1), (v0, v1) = ((own[before], own[before + 1]) for own in (range_m, rate_mps))
-    q0, u0 = np.where(p0 == 0, (r1 - apart_s * v1, v1), (r0, v0))
-    q1, u1 = np.where(p1 == 0, (r0 + apart_s * v0, v0), (r1, v1))
-    place = q0 * (1 + 2 * t) * (1 - t) ** 2 + apart_s * u0 * t * (1 - t) ** 2
-    place += q1 * t**2 * (3 - 2 * t) + apart_s * u1 * t**2 * (t - 1)
-    fields = np.sqrt((1 - t) * p0 + t * p1) * np.exp(2j * np.pi * turns_per_m * place)
-    return np.rint(steps_per_m * place), fields
-
-
 @compiled()
 def fields_in_bins(echo, away, steps, fields, spread, out):
     """Fill ``out (cycle, n)`` with the fields of some ``echo (n,)`` in a bin each.
@@ -84,10 +67,3 @@ def fields_in_bins(echo, away, steps, fields, spread, out):
             step = away[n] - steps[row, echo[n]]
             inside = 0 <= step < len(spread)
             out[row, n] = fields[row, echo[n]] * spread[step] if inside else 0
-
-
-def fields_in_bins_reference(echo, away, steps, fields, spread):
-    """The same by NumPy."""
-    step = away - steps[:, echo]
-    inside = (step >= 0) & (step < len(spread))
-    return np.where(inside, spread.take(step, mode="clip") * fields[:, echo], 0)

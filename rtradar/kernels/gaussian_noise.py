@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -65,15 +64,3 @@ def add_noise(streams, rows, sigma, out):
                     samples[sample] += complex(
                         radius * (_ONE - _TWO * sine * sine), radius * _TWO * sine * cosine
                     )
-
-
-def noise_reference(streams, rows, sigma, shape):
-    """The numbers (chirp, rx, sample) that `add_noise` adds, by NumPy's SFC64."""
-    generator, found = np.random.SFC64(), []
-    for stream in streams:
-        state: Any = generator.state
-        generator.state = state | {"state": {"state": stream}}
-        bits = generator.random_raw(rows * shape[1] * shape[2]).reshape(rows, *shape[1:])
-        u, turns = ((bits >> 33) + 0.5) / 2**31, bits.astype(np.uint32).view(np.int32) / 2.0**32
-        found.append(sigma * np.sqrt(-2 * np.log(u)) * np.exp(2j * np.pi * turns))
-    return np.concatenate(found)[: shape[0]]

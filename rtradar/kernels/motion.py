@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from rtradar.kernels.jit import compiled
 
 
@@ -55,21 +52,6 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
                 place[joint, 2] = parent[2] + c + w * s + x * v - y * u
 
 
-def pose_reference(times, knots, root, rotation, offsets, parents):
-    """Positions (time, joint, 3) and quaternions (time, joint, 4) of `pose`, by SciPy."""
-    interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
-    powers = (times - knots[interval]) ** np.arange(3, -1, -1)[:, None]
-    quaternions = np.einsum("pt,pti->ti", powers, rotation[:, interval])
-    quaternions = quaternions.reshape(len(times), -1, 4)
-    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
-    rotations = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix()
-    positions = (rotations.reshape(len(times), -1, 3, 3) @ offsets[:, :, None])[..., 0]
-    positions[:, 0] = np.einsum("pt,pti->ti", powers, root[:, interval])
-    for joint in range(1, len(parents)):
-        positions[:, joint] += positions[:, parents[joint]]
-    return positions, quaternions
-
-
 @compiled(fastmath={"contract"})
 def pose_ellipsoids(positions, quaternions, parents, rest, centres, frames):
     """Fill centres (time, part, 3) and frames (time, part, 3, 3) from joints (time, joint, 3).
@@ -93,10 +75,3 @@ def pose_ellipsoids(positions, quaternions, parents, rest, centres, frames):
                 rotated[0, column] = a * u + b * v + c * s
                 rotated[1, column] = d * u + e * v + f * s
                 rotated[2, column] = g * u + h * v + k * s
-
-
-def pose_ellipsoids_reference(positions, quaternions, parents, rest):
-    """Centres (time, part, 3) and frames (time, part, 3, 3) of `pose_ellipsoids`, by SciPy."""
-    centres = (positions[:, 1:] + positions[:, parents[1:]]) / 2
-    rotations = Rotation.from_quat(quaternions[:, 1:].reshape(-1, 4)).as_matrix()
-    return centres, rotations.reshape(len(positions), -1, 3, 3) @ rest

@@ -15,7 +15,6 @@ from math import gcd
 from typing import NamedTuple
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined, on_cache_lines
@@ -100,12 +99,6 @@ def add_doppler_power(
     )
 
 
-def doppler_power_reference(spectra, channels, weights):
-    """The power that `add_doppler_power` adds, by SciPy."""
-    chosen = spectra[:, channels.start : channels.stop] * weights[:, None, None]
-    return (np.abs(scipy.fft.fft(chosen, axis=0, overwrite_x=True)) ** 2).sum(axis=1)
-
-
 def pick_cells(
     spectra: NDArray[np.complex64],
     channels: range,
@@ -129,13 +122,6 @@ def pick_cells(
     _transform(
         _read_only(spectra), channels.start, channels.stop, weights, dft, power, place, values
     )
-
-
-def pick_cells_reference(spectra, weights, cells):
-    """The values of `pick_cells` in all channels, by SciPy."""
-    turns, at, bins = cells
-    transformed = scipy.fft.fft(spectra * weights[:, None, None], axis=0, overwrite_x=True)
-    return transformed[turns[:, None], :, bins[at]]
 
 
 def _read_only(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:

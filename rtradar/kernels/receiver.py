@@ -29,11 +29,6 @@ def turn_by_noise(phase, out):
                 own[i] = complex(z.real - small[i] * z.imag, z.imag + small[i] * z.real)
 
 
-def turn_by_noise_reference(phase, given):
-    """`turn_by_noise` of what is given."""
-    return given * (1 + 1j * phase[:, None])
-
-
 @compiled(fastmath={"contract"})
 def add_still(tx, still, phase, fields, gain, out):
     """Add to ``out (chirp, rx, sample)`` what is still, with its phase noise, and multiply by gain.
@@ -54,12 +49,6 @@ def add_still(tx, still, phase, fields, gain, out):
             if factor != np.complex64(1):
                 for i in range(len(own)):
                     own[i] *= factor
-
-
-def add_still_reference(tx, still, phase, fields, gain, given):
-    """`add_still` to what is given."""
-    noise = 1j * np.einsum("cpn,crpn->crn", phase, fields[tx])
-    return gain[tx][:, :, None] * (given + still[tx] + noise)
 
 
 @compiled(fastmath={"contract"})
@@ -123,21 +112,6 @@ def _settle(corner, n_samples, weight):
         weight[i] -= kept * left / (ahead + 1)
 
 
-def high_pass_reference(corners, given):
-    """`high_pass` of what is given, by SciPy's filter."""
-    from scipy.signal import lfilter
-
-    samples = given.astype(np.complex128)
-    for corner in corners:
-        ahead = min(given.shape[2] - 1, int(4 / corner) + 1)
-        longer = np.concatenate([samples[..., ahead:0:-1], samples], axis=-1)
-        ratio = np.array([1, -1]) / (1 + corner), np.array([1, -(1 - corner) / (1 + corner)])
-        start = longer[..., :1] - longer[..., : ahead + 1].mean(axis=-1, keepdims=True)
-        filtered, _ = lfilter(*ratio, longer - longer[..., :1], axis=-1, zi=start)
-        samples = filtered[..., ahead:]
-    return samples
-
-
 @compiled(fastmath={"contract"})
 def mirror(own, image, out):
     """Make own z + image conj(z) of each z of ``out (row, rx, sample)``."""
@@ -146,11 +120,6 @@ def mirror(own, image, out):
             samples = out[row, receiver]
             for i in range(len(samples)):
                 samples[i] = own * samples[i] + image * samples[i].conjugate()
-
-
-def mirror_reference(own, image, given):
-    """`mirror` of what is given."""
-    return own * given + image * given.conj()
 
 
 @compiled(fastmath={"contract"})
@@ -172,15 +141,6 @@ def convert(dc, step, limit, out):
                 samples[i] = complex(
                     min(max(real, -limit), limit - step), min(max(imaginary, -limit), limit - step)
                 )
-
-
-def convert_reference(dc, step, limit, given):
-    """`convert` of what is given."""
-    parts = np.stack([(given + dc).real, (given + dc).imag])
-    if step > 0:
-        parts = step * np.floor(parts / step + 0.5)
-    parts = np.clip(parts, -limit, limit - step)
-    return parts[0] + 1j * parts[1]
 
 
 @compiled(fastmath={"contract"})
@@ -209,16 +169,3 @@ def add_ramps(starts, frequency, tx, slope, rate, ramps, steering, out):
                     wave = complex(real, imaginary)
                     for receiver in range(out.shape[1]):
                         out[row, receiver, i] += steering[tx[row], receiver] * wave
-
-
-def add_ramps_reference(starts, frequency, tx, slope, rate, ramps, steering, shape):
-    """`add_ramps` to zeros, for ramps that do not overlap."""
-    other, other_slope, ramp_s, period_s, first_s = ramps
-    t = np.arange(shape[2]) / rate
-    since = starts[:, None] + t - first_s
-    late = since - np.floor(since / period_s) * period_s
-    theirs = other * late + other_slope / 2 * late**2
-    beat = frequency[:, None] + slope * t - other - other_slope * late
-    inside = (since >= 0) & (late < ramp_s) & (beat >= 0) & (beat < rate)
-    turns = frequency[:, None] * t + slope / 2 * t**2 - theirs
-    return (inside * np.exp(2j * np.pi * turns))[:, None] * steering[tx][:, :, None]

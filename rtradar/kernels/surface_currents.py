@@ -99,31 +99,3 @@ def fill_moments(triangles, edge_of, rules, equation, antennas, out):
                     jump = magnetic * (u * n_moment - m * n_unit)
                     out[0, antenna, edge_of[t, i]] += shape * field
                     out[1, antenna, edge_of[t, i]] += shape * (electric * field + jump)
-
-
-def moments_reference(triangles, edge_of, rules, equation, antennas):
-    """Products of `fill_moments`, antenna by antenna in plain NumPy."""
-    electric = equation.electric
-    out = np.zeros((2, len(antennas), int(edge_of.max()) + 1), dtype=np.complex128)
-    points = np.einsum("pc,tcx->tpx", rules.places, triangles.corners)
-    currents = (points[:, None] - triangles.corners[:, :, None]) * triangles.scales[..., None, None]
-    for antenna, (position, moment) in enumerate(antennas):
-        field, magnetic = _dipole_reference(points, position, moment, equation.wavenumber)
-        jump = np.cross(triangles.normals[:, None], magnetic)
-        both = np.stack([field, electric * field + (1 - electric) * jump])
-        products = np.einsum("tipx,ftpx,p,t->fti", currents, both, rules.weights, triangles.areas)
-        for side in range(2):
-            np.add.at(out[side, antenna], edge_of, products[side])
-    return out
-
-
-def _dipole_reference(points, position, moment, k):
-    """Electric field of a dipole, and magnetic field times the impedance of free space."""
-    ray = points - position
-    distance = np.linalg.norm(ray, axis=-1, keepdims=True)
-    ray, j_by_kr = ray / distance, 1j / (k * distance)
-    wave = np.exp(-1j * k * (distance - np.linalg.norm(position)))
-    wave = wave * np.linalg.norm(position) / distance
-    along = (ray @ moment)[..., None] * ray
-    field = (1 - j_by_kr + j_by_kr**2) * moment - (1 - 3 * j_by_kr + 3 * j_by_kr**2) * along
-    return wave * field, wave * (1 - j_by_kr) * np.cross(ray, moment)

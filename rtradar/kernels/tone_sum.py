@@ -77,18 +77,6 @@ def tone_tables(kind: type[np.floating]) -> ToneTables:
     return ToneTables(first, middles.astype(kind), sines, cosines)
 
 
-def tone_sum_reference(tones, samples, origin):
-    """The sum of `add_tones`, by NumPy; powers of the sample number count from ``origin``."""
-    time, fraction = np.arange(samples) / tones.sample_rate, np.arange(samples) / samples - origin
-    delay = tones.length[..., None] / SPEED_OF_LIGHT_MPS
-    beat = tones.slope * delay
-    turns = tones.start_frequency * delay + beat * time - beat * delay / 2
-    weights = tones.powers.T @ fraction ** np.arange(len(tones.powers))[:, None]
-    amplitude = np.einsum("jcre,jn->cren", tones.amplitude, weights, optimize=True)
-    received = (beat >= 0) & (beat < tones.sample_rate)
-    return np.sum(np.where(received, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2)
-
-
 class _Store(NamedTuple):
     """Arrays that one thread works on, of the tones of one chirp at one receiver.
 

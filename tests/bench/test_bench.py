@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import rtradar.bench
-from rtradar.bench import kernels, runs
+from rtradar.bench import runs
 from rtradar.bench.floors import Rates
 from rtradar.bench.plan import Case
 from rtradar.bench.runs import Baseline, Run, RunError, Runner, Spread
@@ -80,7 +80,7 @@ def test_all_that_is_measured_is_in_the_json(
         main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
     )
     found = json.loads((tmp_path / "b.json").read_text())
-    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth", "kernels"]
+    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
     assert found["settings"]["repeats"] == 2
     assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
     rows = found["models"]
@@ -244,16 +244,3 @@ def test_a_process_that_fails_says_its_last_line(
     )
     with pytest.raises(RunError, match=r"^bench: specular, radar mine.toml: rtradar: no$"):
         Runner(tmp_path).run(Case("mine.toml", "specular", 0.5))
-
-
-def test_kernels_beside_their_references(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(
-        kernels, "CASES", {"elementary.fill_phasors": kernels.CASES["elementary.fill_phasors"]}
-    )
-    assert main(["bench", "--only", "kernels", "--json", str(tmp_path / "b.json")]) == 0
-    (row,) = json.loads((tmp_path / "b.json").read_text())["kernels"]
-    assert row["difference"] < 1e-15
-    assert row["ratio"] == row["reference_s"] / row["kernel_s"]
-    assert "| `elementary.fill_phasors` | unit phasors" in capsys.readouterr().out

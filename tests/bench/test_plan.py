@@ -56,7 +56,7 @@ def test_every_model_with_every_radar() -> None:
         ),
         (
             ["--only", "floors"],
-            "--only floors: there is no such part; allowed: models, growth, kernels",
+            "--only floors: there is no such part; allowed: models, growth",
         ),
         (["--json", "nowhere/b.json"], "--json nowhere/b.json: there is no folder"),
         (["--figure", "nowhere/b.png"], "--figure nowhere/b.png: there is no folder"),

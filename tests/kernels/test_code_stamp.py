@@ -20,7 +20,7 @@ from numba.core.caching import NullCache
 from numba.extending import is_jitted
 
 import rtradar
-from rtradar.bench.kernels import CASES
+from references import CASES
 from rtradar.kernels.code_stamp import UnknownCodeError, _code_digest, stamp_of
 from rtradar.kernels.gaussian_noise import add_noise
 from rtradar.kernels.jit import _CodeOnDisk, compiled

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
+from references.double_reflections import solve_double_reference
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.double_reflections import solve_double_reference
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter import build_model
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart, solve_doubles

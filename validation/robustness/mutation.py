@@ -318,22 +318,22 @@ class Tree:
 
     @cached_property
     def imports(self) -> dict[str, set[str]]:
-        """Modules of rtradar that each file imports, by file."""
+        """Modules of rtradar, and of the references of kernels, that each file imports, by file."""
+        packages = "rtradar", "references"
         found = {}
         for path in [*self._root.glob("rtradar/**/*.py"), *self._root.glob("tests/**/*.py")]:
             names = set()
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rtradar"):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(packages):
                     names |= {
                         node.module or "",
                         *(f"{node.module}.{alias.name}" for alias in node.names),
                     }
                 elif isinstance(node, ast.Import):
-                    names |= {
-                        alias.name for alias in node.names if alias.name.startswith("rtradar")
-                    }
+                    names |= {alias.name for alias in node.names if alias.name.startswith(packages)}
             own = path.relative_to(self._root).as_posix()
             paths = {name.replace(".", "/") for name in names}
+            paths |= {f"tests/kernels/{path}" for path in paths if path.startswith("references")}
             found[own] = {
                 each
                 for name in paths

@@ -17,7 +17,9 @@ from types import CodeType, FrameType
 import pytest
 from numba.core import event
 
-ROOT = str(Path.cwd() / "rtradar") + os.sep
+ROOT = str(Path.cwd()) + os.sep
+# Cases of kernels call what cannot be traced.
+TRACED = tuple(f"{ROOT}{name}{os.sep}" for name in ("rtradar", "tests/kernels/references"))
 _seen: set[CodeType] = set()
 _found: dict[str, dict[str, object]] = {}
 
@@ -48,9 +50,9 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     sys.settrace(None)
     threading.settrace(None)
     names = {
-        f"{code.co_filename[len(ROOT) :]}::{code.co_qualname}"
+        f"{code.co_filename.removeprefix(ROOT).removeprefix('rtradar/')}::{code.co_qualname}"
         for code in _seen
-        if code.co_filename.startswith(ROOT)
+        if code.co_filename.startswith(TRACED)
     }
     _found.setdefault(item.nodeid, {})["calls"] = sorted(
         name.replace(".<locals>", "") for name in names

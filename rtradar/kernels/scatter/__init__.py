@@ -1,1 +1,1 @@
-"""Compiled loops of the echo models, each with a reference in plain NumPy."""
+"""Compiled loops of the echo models."""

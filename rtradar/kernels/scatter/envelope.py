@@ -118,37 +118,3 @@ def fill_envelope(chirps, fraction, tx, weights, course, strength, amplitude):
                     weight, out = own[receiver, pair], amplitude[node, chirp, receiver]
                     for part in range(parts):
                         out[part] += weight * value[part] * strength[chirp, receiver, part]
-
-
-def find_slopes_reference(before, here, after):
-    """Slopes (place, node, pair, part) of `find_slopes` inside a capture, 0 where unknown."""
-    slope = np.zeros_like(here[0])
-    parts, intervals = slope.shape[3], (before, here, after)
-    for part in range(parts):
-        # Both intervals that meet at a keyframe have it.
-        places = [np.flatnonzero(known[:, part]) for _, known in intervals]
-        at = np.concatenate([places[0][:-1] - PLACES, places[1], places[2][1:] + PLACES])
-        values = [ratio[own, ..., part] for (ratio, _), own in zip(intervals, places, strict=True)]
-        y = np.concatenate([values[0][:-1], values[1], values[2][1:]])
-        gaps = np.diff(at)[:, None, None]
-        rises = np.diff(y, axis=0) / gaps
-        through = (rises[:-1] * gaps[1:] + rises[1:] * gaps[:-1]) / (gaps[:-1] + gaps[1:])
-        slope[places[1], ..., part] = through[(at[1:-1] >= 0) & (at[1:-1] <= PLACES)]
-    return slope
-
-
-def fill_envelope_reference(chirps, fraction, tx, weights, course, strength):
-    """Amplitude of `fill_envelope`, in plain NumPy."""
-    ratio, slope, known = course
-    amplitude = np.zeros((ratio.shape[1], *strength.shape), dtype=complex)
-    for chirp, place in zip(chirps, fraction * PLACES, strict=True):
-        for part in range(strength.shape[2]):
-            places = np.flatnonzero(known[:, part])
-            left = places[min(np.searchsorted(places, place, side="right"), len(places) - 1) - 1]
-            right = places[places > left][0]
-            h = hermite_weights((place - left) / (right - left), right - left)
-            y, d = ratio[..., part], slope[..., part]
-            value = h[0] * y[left] + h[1] * y[right] + h[2] * d[left] + h[3] * d[right]
-            own = weights[tx[chirp]]
-            amplitude[:, chirp, :, part] = value @ own.T * strength[chirp, :, part]
-    return amplitude

@@ -13,7 +13,7 @@ import numpy as np
 
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.facet_shadows import into_ball
-from rtradar.kernels.scatter.near_rays import NEAR, longest_axes, near_lines_reference
+from rtradar.kernels.scatter.near_rays import NEAR, longest_axes
 
 
 @inlined(fastmath=True)
@@ -200,28 +200,3 @@ def first_occluders(met, fraction, whose, occluder):
         vertex = whose[0, ray]
         if met[ray] and fraction[ray] < first[vertex]:
             first[vertex], occluder[vertex] = fraction[ray], whose[1, ray]
-
-
-def facet_rays_reference(antennas, parts, centres, frames, semi_axes, vertices):
-    """Number of rays (antenna, n, vertex) of `facet_rays` to vertices on ellipsoids, margin 0."""
-    out = np.empty((len(antennas), len(parts), vertices.shape[2]), dtype=np.int64)
-    for a, antenna in enumerate(antennas):
-        for n, part in enumerate(parts):
-            local = vertices[part].T
-            world = centres[part] + local @ frames[part].T
-            normals = local / semi_axes[part] ** 2 @ frames[part].T
-            lines = np.broadcast_to(antenna, world.shape), world, np.full(len(world), part)
-            near = near_lines_reference(*lines, centres, frames, semi_axes)
-            facing = np.einsum("vi,vi->v", normals, antenna - world) >= 0
-            out[a, n] = near.sum(axis=1) * facing
-    return out
-
-
-def first_occluders_reference(met, fraction, whose, vertices):
-    """Part (vertex,) that is met first, -1 for none."""
-    occluder = np.full(vertices, -1, dtype=np.int16)
-    hits = np.flatnonzero(met)
-    farthest_first = hits[np.argsort(-fraction[hits], kind="stable")]
-    for ray in farthest_first:
-        occluder[whose[0, ray]] = whose[1, ray]
-    return occluder

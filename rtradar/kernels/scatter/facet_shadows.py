@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.scatter.triangles import midpoints, positive_fraction
+from rtradar.kernels.scatter.triangles import positive_fraction
 
 
 class _Room(NamedTuple):
@@ -143,23 +143,3 @@ def shade(hidden_by, antennas, parts, pose, vertices, corners, row, out):
                 row[a, n] = count
                 count += 1
     return count
-
-
-def shade_reference(hidden_by, antennas, parts, pose, vertices, corners):
-    """Fractions (antenna, n, facet) of `shade`, by many points of each facet, in plain NumPy."""
-    (centres, frames, axes), faces = pose, corners.T
-    out = np.empty((*hidden_by.shape[:2], len(faces)))
-    for a, n in np.ndindex(hidden_by.shape[:2]):
-        occluder = hidden_by[a, n][faces]
-        world = centres[parts[n]] + vertices[parts[n]] @ frames[parts[n]].T
-        least = np.full(faces.shape, np.inf)
-        for other in set(occluder.ravel()) - {-1}:
-            place = antennas[a], world
-            start, end = ((p - centres[other]) @ frames[other] / axes[other] for p in place)
-            along = np.clip(-((end - start) @ start) / ((end - start) ** 2).sum(axis=1), 0, 1)
-            clear = np.linalg.norm(start + along[:, None] * (end - start), axis=1) - 1
-            own = (occluder == other).any(axis=1)
-            least[own] = np.minimum(least[own], clear[faces[own]])
-        cut = (np.where(np.isinf(least), 1e9, least) @ midpoints(40).T > 0).mean(axis=1)
-        out[a, n] = np.where((occluder >= 0).all(axis=1), 0.0, cut)
-    return out

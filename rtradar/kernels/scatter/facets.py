@@ -23,7 +23,6 @@ from rtradar.kernels.scatter.triangles import (
     FAST,
     SERIES,
     largest_spread,
-    midpoints,
     sum_large,
     sum_small,
 )
@@ -264,23 +263,3 @@ def integrate(begin, end, facets, views, waves, out):
                 else:
                     total = sum_large(mean, u, v, strength, k)
                 out[task, pair, node] = total * complex(0.0, k / math.sqrt(math.pi))
-
-
-def integrate_reference(facets, views, waves):
-    """`integrate` without currents over facets that are lit, by middles of small triangles."""
-    corners = facets.vertices[:, facets.faces]
-    out = np.empty((*waves.carrier.shape, waves.wavenumber.shape[1]), dtype=complex)
-    for task, part in enumerate(views.part):
-        away = views.antennas[task][:, None, None] - corners[part]
-        ranges = np.linalg.norm(away, axis=-1)
-        middle = ranges.mean(axis=2)
-        facing = np.einsum("afx,fx->af", away[:, :, 0], facets.normals[part]) / middle
-        size = views.seen[views.row[task]] * facets.areas[part]
-        for pair, (t, r) in enumerate(waves.pairs):
-            path = (ranges[t] + ranges[r]) @ midpoints(16).T - waves.carrier[task, pair]
-            strength = (facing[t] + facing[r]) / 2 * np.minimum(size[t], size[r])
-            strength /= middle[t] * middle[r] if waves.spreading else 1.0
-            for node, k in enumerate(waves.wavenumber[task]):
-                total = strength @ np.exp(-1j * k * path).mean(axis=1)
-                out[task, pair, node] = 1j * k / math.sqrt(math.pi) * total
-    return out

@@ -26,7 +26,6 @@ from rtradar.kernels.scatter.triangles import (
     SERIES,
     by_series,
     mean_of_phasor,
-    midpoints,
 )
 
 Array = NDArray[np.float64]
@@ -236,23 +235,3 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
                 u, v = first_path - mean, second_path - mean
                 own = factor[f]
                 _put_facet(out[task, r], mean + bow, u, v, grid, size, own, field, value)
-
-
-def facets_by_length_reference(facets, views, grid, spreading):
-    """Field (task, rx, node) of facets all seen, by middles of small triangles and not shared."""
-    corners, out = facets.vertices.T[facets.faces], []
-    points = np.einsum("mc,fcx->fmx", midpoints(48), corners)
-    for tx, receivers, pose in zip(views.tx, views.rx, views.before, strict=True):
-        for rx in receivers:
-            path, along, size = 0.0, [], facets.areas
-            for antenna in (tx, rx):
-                path = path + np.linalg.norm(points - antenna, axis=-1) - np.linalg.norm(antenna)
-                middle = np.linalg.norm(corners.mean(axis=1) - antenna, axis=-1)
-                along.append((facets.normals @ antenna - facets.planes) / middle)
-                size = size / (middle if spreading else 1.0)
-            size = size * (np.min(along, axis=0) > 0) * np.mean(along, axis=0)
-            k = grid.wavenumber[:, None, None]
-            phases = np.exp(-1j * k * path).mean(axis=2)
-            field = (phases * views.factor[pose]) @ size
-            out.append(np.conj(1j * grid.wavenumber / np.sqrt(np.pi) * field))
-    return np.reshape(out, (*views.rx.shape[:2], -1))

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from rtradar.kernels.jit import compiled
-from rtradar.kernels.scatter.specular_point import in_part_axes
 
 _NO_BISECTOR = 1e-24
 """Square of the sum of two opposite unit vectors, as rounding leaves it."""
@@ -80,18 +79,3 @@ def far_field(start, stop, at, spreading, length, amplitude):
                 for k in range(count):
                     length[chirp, first + k, part] = lanes[3, k]
                     amplitude[chirp, first + k, part] = lanes[4, k]
-
-
-def far_field_reference(at, spreading):
-    """Length and amplitude of `far_field`, in plain NumPy."""
-    to_tx, to_rx = in_part_axes(at)
-    norms = [np.linalg.norm(way, axis=-1) for way in (to_tx, to_rx)]
-    normal = to_tx / norms[0][..., None] + to_rx / norms[1][..., None]
-    square = np.sum(normal**2, axis=-1)
-    there = square >= _NO_BISECTOR
-    support = np.where(there, np.linalg.norm(at.semi_axes * normal, axis=-1), 1.0)
-    point = at.semi_axes**2 * normal / support[..., None]
-    ranges = [np.linalg.norm(way - point, axis=-1) for way in (to_tx, to_rx)]
-    root = math.sqrt(math.pi) * np.prod(at.semi_axes, axis=1) * square / support**2
-    root = root / (ranges[0] * ranges[1]) if spreading else root
-    return np.where(there, sum(ranges), sum(norms)), np.where(there, root, 0.0)

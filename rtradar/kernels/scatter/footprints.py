@@ -111,31 +111,3 @@ def radiate_tubes(
                 out[chunk, node, receiver, own] += weight * complex(
                     real * cosine + imaginary * sine, imaginary * cosine - real * sine
                 )
-
-
-def amplitudes_reference(tubes, rx):
-    """Amplitudes (tube,) of `_amplitude` over the distance, not tapered, for v and one Rx (3,)."""
-    corners, d, e = tubes.places[:, :3], tubes.direction, tubes.field
-    n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    n *= np.sign(np.sum(n * tubes.normal, axis=1))[:, None]
-    s = rx - tubes.places[:, 3]
-    leg = np.linalg.norm(s, axis=1, keepdims=True)
-    s = s / leg
-    p = np.cross(s, np.cross([0.0, 0.0, 1.0], s))
-    p /= np.linalg.norm(p, axis=1, keepdims=True)
-    ahead, across = np.sum(n * (s - d), axis=1), np.sum(d * p, axis=1) * np.sum(n * e, axis=1)
-    aside = np.sum(e * s, axis=1) * np.sum(n * p, axis=1)
-    return (np.sum(e * p, axis=1) * ahead + across - aside) / 2 / leg[:, 0]
-
-
-def radiate_tubes_reference(tubes, rx, wavenumber, length):
-    """What visible tubes send to one receiver (3,), not tapered, for v, by sums over triangles."""
-    legs, count = np.linalg.norm(rx - tubes.places, axis=2), 50
-    path = tubes.path + legs - length
-    corners = path[:, :3]
-    bow = 0.75 * (path[:, 3:] - corners.mean(axis=1, keepdims=True))
-    i, j = (np.indices((count, count)).reshape(2, -1) + 0.5) / count
-    root = np.sqrt(i)  # an even spread over the triangle
-    phase = corners @ np.stack([1 - root, root * (1 - j), root * j]) + bow
-    mean = np.exp(-1j * wavenumber * phase).mean(axis=1)
-    return np.sum(amplitudes_reference(tubes, rx) * mean)

@@ -121,28 +121,6 @@ def slab_fields(field, ways, slab, out):
                 out[node, wave, i] = te * across[i] + tm * up_after[i]
 
 
-def slab_fields_reference(field, ways, slab):
-    """Fields (node, wave, 3) of `slab_fields`, in plain NumPy, for slabs that let waves in."""
-    against, odd, k = ways @ slab.normal, slab.passes % 2, slab.wavenumber[:, None]
-    cosine, eta = np.abs(against), slab.eta[:, None]
-    inner = np.sqrt(eta - 1 + cosine**2)
-    within = slab.passes * np.sqrt(np.maximum(slab.index_squared - 1 + cosine**2, 0))
-    extra = slab.thickness * (within if slab.index_squared else odd * cosine)
-    once = np.exp(-1j * k * slab.thickness * inner)
-    out, leaving = 0, ways - 2 * (1 - odd) * against[:, None] * slab.normal
-    across = np.cross(ways, slab.normal)
-    across /= np.linalg.norm(across, axis=-1, keepdims=True)
-    pairs = ((1, across, across), (eta, np.cross(across, ways), np.cross(across, leaving)))
-    for ratio, before, after in pairs:
-        face, number = (ratio * cosine - inner) / (ratio * cosine + inner), slab.passes or 2
-        term = (1 - face**2) * (-face) ** (number - 1) * once**number
-        term = term / (1 - (face * once) ** 2) if slab.rest else (slab.passes > 0) * term
-        term = (term + (slab.passes == 0) * face) * np.exp(1j * k * extra)
-        term *= np.exp(-2 * (1 - odd) * (k * slab.roughness * cosine) ** 2)
-        out = out + (term * (field * before).sum(axis=-1))[..., None] * after
-    return out
-
-
 @compiled()
 def received_from_conductors(start, stop, sent, received, to_tx, to_rx, out):
     """Fill ``out (node, keyframe, line, tx_end, rx_end, echo)`` with what conductors send back.
@@ -173,12 +151,3 @@ def received_from_conductors(start, stop, sent, received, to_tx, to_rx, out):
                             of_f = f[0] * normal[0] + f[1] * normal[1] + f[2] * normal[2]
                             value = scale * of_e * of_f - straight
                             out[node, keyframe, line, one, other, echo] = value
-
-
-def received_from_conductors_reference(sent, received, to_tx, to_rx):
-    """What `received_from_conductors` fills, in plain NumPy."""
-    normals = to_tx[:, :, :, None] + to_rx[:, :, None]
-    normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-    straight = np.einsum("nkltec,nklrec->nkltre", sent, received)
-    of_sent = np.einsum("nkltec,kltrec->nkltre", sent, normals)
-    return 2 * of_sent * np.einsum("nklrec,kltrec->nkltre", received, normals) - straight

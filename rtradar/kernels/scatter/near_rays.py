@@ -142,12 +142,3 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
             rays[6, count], whose[count] = (1 - ahead) * span * scale, line
             count += 1
     return rays[:, :count].copy(), whose[:count].copy()
-
-
-def near_lines_reference(origins, targets, own, centres, frames, semi_axes):
-    """Pairs (line, part) bool of `near_rays` for one pose: the line enters the volume `NEAR`."""
-    starts = np.einsum("pji,lpj->lpi", frames, origins[:, None] - centres) / semi_axes
-    lines = np.einsum("pji,lj->lpi", frames, targets - origins) / semi_axes
-    nearest = np.clip(-np.sum(starts * lines, axis=2) / np.sum(lines * lines, axis=2), 0, 1)
-    distance = np.linalg.norm(starts + nearest[..., None] * lines, axis=2)
-    return (distance <= NEAR) & (np.arange(len(semi_axes)) != own[:, None])

@@ -19,7 +19,6 @@ from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.specular_point import (
     ROOT_PI,
     Array,
-    Geometry,
     Options,
     Plane,
     dot,
@@ -29,7 +28,6 @@ from rtradar.kernels.scatter.specular_point import (
     newton,
     on_surface,
     search_all,
-    solve_reference,
 )
 
 _NEARBY_STEPS = 6
@@ -238,14 +236,3 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
             for i in range(receivers):
                 length[chirp, i, echo], amplitude[chirp, i, echo] = room[0, i], room[1, i]
     return searched
-
-
-def nearby_echoes_reference(images, tx_index, ellipsoids):
-    """Lengths and returns of `nearby_echoes`, all of them wanted, in plain NumPy."""
-    found = []
-    centres, frames, axes = ellipsoids
-    for out, back, part in zip(images.out, images.back, images.part, strict=True):
-        antennas = images.tx[out, tx_index], np.swapaxes(images.rx[back, tx_index], 1, 2)
-        found.append((*antennas, centres[:, [part]], frames[:, [part]], axes[[part]]))
-    results = [solve_reference(Geometry(*at)) for at in found]
-    return tuple(np.concatenate([result[i] for result in results], axis=2) for i in range(2))

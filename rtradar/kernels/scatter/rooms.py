@@ -96,19 +96,6 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
                             target[echo] += complex(kept * re[echo], -kept * im[echo])
 
 
-def path_amplitudes_reference(bare, before, after, at):
-    """Amplitudes (node, chirp, rx, echo) of `path_amplitudes`, in plain NumPy."""
-    which, line = at.interval, at.line
-    fraction = at.fraction[:, None, None, None]
-    smooth = smoothstep(fraction)
-    seen = (1 - smooth) * before.seen[which, line] + smooth * after.seen[which, line]
-    visible = np.einsum("cs,cre,cset->crt", at.tx_weight, at.rx_weight, seen)
-    first, last = (np.moveaxis(end.factor, 1, -1)[which, line] for end in (before, after))
-    factor = (1 - fraction[..., None]) * first + fraction[..., None] * last
-    factor = np.einsum("cs,cre,csetn->ncrt", at.tx_weight, at.rx_weight, factor)
-    return bare * visible * np.conj(factor)
-
-
 class LegAntennas(NamedTuple):
     """Images of the antennas over each leg: ``tx (leg, tx, 3)``, ``rx (leg, tx, rx, 3)`` [m]."""
 
@@ -198,24 +185,3 @@ def delayed_lengths(start, stop, antennas, tx_index, points, bodies, delays, len
                     antenna = antennas.rx[leg, transmitter, receiver]
                     whole += _delay(antenna, place, first, last, delays)
                 out[chirp, receiver, column] = whole
-
-
-def delayed_lengths_reference(antennas, tx_index, points, bodies, delays, length):
-    """Lengths (chirp, rx, column) of `delayed_lengths`, in plain NumPy."""
-    part = points.part
-    size = np.linalg.norm(points.local / bodies.semi_axes[part], axis=-1, keepdims=True)
-    places = np.einsum("ceij,cej->cei", bodies.frames[:, part], points.local / size)
-    places += bodies.centres[:, part]
-    out = length[..., delays.echo].copy()
-    for column, legs in enumerate(delays.legs):
-        for own, (leg, first, last) in zip(
-            (antennas.tx[:, :, None], antennas.rx), legs, strict=True
-        ):
-            way = places[:, None, delays.echo[column]] - own[leg, tx_index]
-            for passes, slab in zip(
-                delays.passes[first:last], delays.slabs[first:last], strict=True
-            ):
-                cosine = np.abs(way @ slab[:3]) / np.linalg.norm(way, axis=-1)
-                inside = passes * np.sqrt(slab[4] - 1 + cosine**2)
-                out[..., column] += slab[3] * (inside - passes % 2 * cosine)
-    return out

@@ -139,11 +139,3 @@ def largest_spread(u, v, room):
         largest = max(largest, bits[i])
     bits[len(u)] = largest
     return room[len(u)]
-
-
-def midpoints(cuts):
-    """Barycentric middles (cuts^2, 3) of small triangles that one is cut into, for references."""
-    i, j = (index.ravel() for index in np.indices((cuts, cuts)))
-    both = np.concatenate([np.stack([i + t, j + t], axis=1) for t in (1 / 3, 2 / 3)])
-    places = np.column_stack([both, cuts - both.sum(axis=1)]) / cuts
-    return places[places[:, 2] > 0]

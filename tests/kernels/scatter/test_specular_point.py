@@ -8,15 +8,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from rtradar.kernels.scatter.nearby_points import (
-    Ellipsoids,
-    Images,
-    Nearby,
-    nearby_echoes,
-    nearby_echoes_reference,
-)
-from rtradar.kernels.scatter.specular_point import Geometry, Options, solve, solve_reference
-from rtradar.scatter.common.polarization import copolar
+from references.specular_point import nearby_echoes_reference
+from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
 
 Array = NDArray[np.float64]
 
@@ -91,30 +84,3 @@ def test_what_does_not_settle_is_searched_for_and_what_is_not_wanted_returns_not
     over_centre = np.linalg.norm(TX - CENTRE) + np.linalg.norm(RX.mean(axis=0) - CENTRE)
     np.testing.assert_allclose(length[..., 1], over_centre, rtol=1e-13)
     assert not amplitude[..., 1].any()
-
-
-@pytest.mark.parametrize("horizontal", [False, True])
-@pytest.mark.parametrize("receivers", [1, 8, 11])
-def test_exact_points_are_those_of_the_reference(receivers: int, horizontal: bool) -> None:
-    rng = np.random.default_rng(receivers)
-    at = Geometry.of(
-        Geometry(
-            np.array([0.0, 0.0, 1.0]) + rng.normal(0, 0.2, (5, 3)),
-            np.array([0.0, 0.5, 1.0]) + rng.normal(0, 0.2, (5, receivers, 3)),
-            np.array([4.0, 0.0, 1.0]) + rng.normal(0, 0.4, (5, 6, 3)),
-            Rotation.random(30, random_state=1).as_matrix().reshape(5, 6, 3, 3),
-            rng.uniform(0.06, 0.2, (6, 3)),
-        )
-    )
-    length, amplitude = np.empty((2, 5, receivers, 6))
-    point, start = np.empty((5, receivers, 6, 3)), np.full((5, 6, 3), np.nan)
-    expected = solve_reference(at)
-    for polarized in (False, True):
-        options = Options(polarized, horizontal, spreading=True)
-        solve(0, 5, at, start, options, length, amplitude, point)
-        # The last step is at most 1e-7 of the least semi-axis.
-        np.testing.assert_allclose(length, expected[0], rtol=1e-13)
-        np.testing.assert_allclose(point, expected[2], rtol=0, atol=1e-7)
-        away = [a - point for a in (at.tx[:, None, None], at.rx[:, :, None])]
-        factor = copolar(*away, "h" if horizontal else "v") if polarized else 1.0
-        np.testing.assert_allclose(amplitude, expected[1] * factor, rtol=1e-6)

@@ -12,7 +12,7 @@ import numpy as np
 from rtradar.kernels.elementary import apply, dot, subtract
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.near_rays import longest_axes, unit_sphere_maps
-from rtradar.kernels.scatter.zones.fresnel_zones import zone_point, zone_points_reference
+from rtradar.kernels.scatter.zones.fresnel_zones import zone_point
 
 
 @inlined()
@@ -85,13 +85,3 @@ def expected_edges(
             if not blocked:
                 low += step
         out[side] = low
-
-
-def expected_edges_reference(maps, zone, start, way, hidden, bisections):
-    """Pieces (side,) of `expected_edges`, where ``hidden`` says it of points seen on a side."""
-    pieces, found = np.arange(1 << bisections) / (1 << bisections), []
-    for side, (z, first, along) in enumerate(zip(zone, start, way, strict=True)):
-        x, y = (first + pieces[:, None] * along).T
-        seen = ~hidden(side, zone_points_reference(maps, np.full(len(x), z), x, y))
-        found.append(np.flatnonzero(seen)[-1])
-    return np.array(found)

@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from rtradar.kernels.elementary import (
     apply,
@@ -177,25 +176,6 @@ def lay_zones(tx, rx, centres, frames, semi_axes, points, wavenumber, maps):
             _, maps.rim[zone, m] = _meridian(m * 2 * math.pi / MERIDIANS, pole, along, caps, step)
 
 
-def lay_zones_reference(tx, rx, centre, frame, axes, point, wavenumber):
-    """Tangents (2, 3) of one zone on the ellipsoid [m], whose Gram matrix is 2 / k H^-1."""
-    normal = frame @ ((point - centre) @ frame / axes**2)
-    size = np.linalg.norm(normal)
-    normal /= size
-    e = np.array([-normal[1], normal[0], 0.0]) / np.hypot(normal[0], normal[1])
-    tangents = np.stack([e, np.cross(normal, e)])
-    hessian = np.zeros((2, 2))
-    for antenna in (tx, rx):
-        distance = np.linalg.norm(antenna - point)
-        way = (antenna - point) / distance
-        ahead = tangents @ way
-        curved = tangents @ frame / axes
-        hessian += (np.eye(2) - np.outer(ahead, ahead)) / distance
-        hessian += way @ normal / size * curved @ curved.T
-    values, vectors = np.linalg.eigh(hessian)
-    return (vectors / np.sqrt(wavenumber / 2 * values) @ vectors.T) @ tangents
-
-
 @inlined()
 def zone_point(maps, zone, x, y, u, out):
     """Fill in the point (3,) on the ellipsoid at a place of a zone; ``u (3,)`` is overwritten."""
@@ -217,14 +197,6 @@ def zone_points(maps, zone, x, y, out):
     u = np.empty(3)
     for n in range(len(zone)):
         zone_point(maps, zone[n], x[n], y[n], u, out[n])
-
-
-def zone_points_reference(maps, zone, x, y):
-    """Points (n, 3) of `zone_points` along great circles."""
-    tangent = np.einsum("nk,nki->ni", np.stack([x, y], axis=1), maps.along[zone])
-    turn = np.linalg.norm(tangent, axis=1)[:, None]
-    u = np.cos(turn) * maps.pole[zone] + np.sinc(turn / np.pi) * tangent
-    return maps.centre[zone] + np.einsum("nij,nj->ni", maps.stretch[zone], u)
 
 
 @inlined(fastmath={"reassoc", "contract", "nsz"})
@@ -355,33 +327,6 @@ def zone_sums(maps, points, antennas, pairs, wavenumber, fractions, out):
                     out[zone, f, pair] = left / max(1.0, abs(left) / _MOST)
 
 
-def meridians_reference(maps, zone):
-    """Directions (meridian, 3) between corners, paces and rims (meridian, 1) of `_meridian`."""
-    angle = (np.arange(MERIDIANS)[:, None] + 0.5) * 2 * np.pi / MERIDIANS
-    step = np.cos(angle) * maps.along[zone, 0] + np.sin(angle) * maps.along[zone, 1]
-    pace = np.linalg.norm(step, axis=1, keepdims=True)
-    ahead, aside = maps.caps[zone] @ maps.pole[zone], step / pace @ maps.caps[zone].T
-    ends = np.arctan2(aside, ahead) + np.arccos(np.minimum(1, 1 / np.hypot(ahead, aside)))
-    return step / pace, pace, np.minimum(RIM, ends.min(axis=1, keepdims=True) / pace)
-
-
-def zone_sums_reference(maps, zone, antennas, pairs, wavenumber, fractions):
-    """V (pair,) of one zone at one wavenumber, for ``fractions (antenna, meridian, cell)``."""
-    step, pace, rim = meridians_reference(maps, zone)
-    part = (np.arange(CELLS) + 0.5) / CELLS
-    turn = (part * rim * pace)[..., None]
-    u = np.cos(turn) * maps.pole[zone] + np.sin(turn) * step[:, None]
-    window = np.cos(np.pi / 2 * np.maximum(part - _TAPER, 0) / (1 - _TAPER)) ** 2
-    legs = antennas[:, None, None] - maps.centre[zone] - u @ maps.stretch[zone].T
-    length = np.linalg.norm(legs, axis=-1)
-    facing = (legs * (u @ maps.back[zone])).sum(axis=-1) / length
-    wave = np.where(facing > 0, np.exp(-1j * wavenumber * length) / length, 0)
-    t, r = pairs.T
-    field = np.sin(turn[..., 0]) * rim / pace * window * (facing[t] + facing[r]) * wave[t] * wave[r]
-    left = (np.minimum(fractions[t], fractions[r]) * field).sum(axis=(1, 2))
-    return left / field.sum(axis=(1, 2))
-
-
 @compiled()
 def blend_fractions(nodes, slopes, fine, where, spread, inside, out):
     """Interpolate fractions by cubics in time, then by the polynomials over the array.
@@ -422,14 +367,3 @@ def blend_fractions(nodes, slopes, fine, where, spread, inside, out):
                         if spread[i, receiver, pair] != 0:
                             total += spread[i, receiver, pair] * value[pair]
                     out[f, inside[i], receiver, part] = total
-
-
-def blend_fractions_reference(nodes, slopes, fine, where, spread):
-    """Fractions (frequency, chirp, rx, part) of `blend_fractions`, by SciPy's cubics."""
-    last = len(nodes) - 1
-    out = np.empty((nodes.shape[1], *spread.shape[:2], nodes.shape[3]), dtype=np.complex128)
-    for part in range(nodes.shape[3]):
-        used = np.arange(last + 1) if fine[part] else np.array([0, last])
-        cubic = CubicHermiteSpline(used, nodes[used, ..., part], slopes[used, ..., part])
-        out[..., part] = np.einsum("crp,cfp->fcr", spread, cubic(where))
-    return out

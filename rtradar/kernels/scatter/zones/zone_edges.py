@@ -129,34 +129,3 @@ def open_fractions(maps, edges, bounds, out):
                             more = _open_cell(line, begin + j, here, there, cosine, sine)
                             both = cells[j] + more
                             cells[j] = max(both - 1, 0.0) if b00 else min(both, 1.0)
-
-
-def open_fractions_reference(rim, line, samples=64):
-    """Fractions (meridian, cell) of one zone on the positive side of a x + b y + c, by counting."""
-    a, b, c = line
-    part = (np.arange(samples) + 0.5) / samples
-    t, j = part[:, None], np.arange(CELLS)[:, None, None] + part
-    out = np.empty((MERIDIANS, CELLS))
-    for m in range(MERIDIANS):
-        ends = [rim[k % MERIDIANS] * np.exp(2j * np.pi * k / MERIDIANS) / CELLS for k in (m, m + 1)]
-        # Chords from one meridian to the next.
-        place = j * ((1 - t) * ends[0] + t * ends[1])
-        inside = a * place.real + b * place.imag + c > 0
-        weight = np.broadcast_to(j, inside.shape)
-        out[m] = (inside * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
-    return out
-
-
-def straight_edge(maps, line, bounds):
-    """Make the `Edges` of one zone and antenna along a x + b y + c = 0, blocked where negative."""
-    angle = 2j * np.pi * np.arange(MERIDIANS)[:, None] / MERIDIANS
-    corners = maps.rim[0, :, None] * bounds / CELLS * np.exp(angle)
-    value = line[0] * corners.real + line[1] * corners.imag + line[2]
-    found = [value < 0]
-    # Sides along meridians, and from each meridian to the next.
-    pairs = [((a[:, :-1], a[:, 1:]), (a, np.roll(a, -1, axis=0))) for a in (corners, value)]
-    for (first, last), (low, high) in zip(*pairs, strict=True):
-        rise = np.where(low == high, 1.0, low - high)
-        place = first + (last - first) * low / rise
-        found.append(np.stack([place.real, place.imag], axis=-1))
-    return Edges._make(array[None, None] for array in found)
