@@ -219,7 +219,7 @@ def _draw(
     parameters = results[reference].summary["parameters"]
     spreading, title = parameters["spreading"], f"{parameters['motion']}, {radar.name}"
     drawn = {name: folder / file for name, file in _PICTURES.items()}
-    paths = iter(drawn.values())
+    paths = iter(list(drawn.values()))
 
     def unit_of(powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
         strongest = max(float(power.max()) for power in powers)
@@ -257,12 +257,16 @@ def _draw(
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
     label, seen = by_range.label("mean of channels"), np.any(shown, axis=0)
     comparison.draw_maps(next(paths), levels, label, across, up, frame_title, seen)
-    unit = unit_of(spectrograms.values())
-    levels = {name: unit.level(power) for name, power in spectrograms.items()}
-    across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
-    seen = above_floor(np.sum(list(spectrograms.values()), axis=0))
-    label = unit.label("one channel")
-    comparison.draw_maps(next(paths), levels, label, across, up, slow_title, seen)
+    path = next(paths)
+    if times.size:
+        unit = unit_of(spectrograms.values())
+        levels = {name: unit.level(power) for name, power in spectrograms.items()}
+        across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
+        seen = above_floor(np.sum(list(spectrograms.values()), axis=0))
+        label = unit.label("one channel")
+        comparison.draw_maps(path, levels, label, across, up, slow_title, seen)
+    else:  # the capture is too short for one
+        del drawn["Spectrogram"]
     comparison.draw_rdt_clouds(
         next(paths), {name: result.points for name, result in results.items()}, title
     )
@@ -306,6 +310,8 @@ def level_agreement(
 def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
     """Mark cells 10 dB above the median, which is noise, and at most 60 dB below the peak."""
     values = np.asarray(power)
+    if not values.size:  # a capture too short for a spectrogram
+        return np.zeros(values.shape, dtype=np.bool_)
     floor = max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0)))
     return np.asarray(values > floor)
 
