@@ -10,14 +10,11 @@ beside, against miepython, as the ratio of mean powers over 20 degrees.
 
 from __future__ import annotations
 
-import os
 import sys
 import warnings
 from collections.abc import Iterator
 from functools import partial
 from typing import Literal
-
-os.environ["MIEPYTHON_USE_JIT"] = "1"  # read when it is imported
 
 import miepython
 import numpy as np
