@@ -1,5 +1,6 @@
 # make demo    a 3 s synthetic walk by two models side by side, in out/demo/
-# make test    the tests
+# make test    the tests, in minutes
+# make test-all    these, and what takes minutes for one answer: browsers, gallery, slow levels, kills
 # make test-fresh    the property tests alone, on new random examples each time (TESTS=tests/motion: those of one folder)
 # make lint    ruff, mypy and the import contract
 # make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
@@ -12,7 +13,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-fresh lint docs clean
+# Python keeps what it parsed: without that, each process would parse all modules and tests anew.
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: demo test test-all test-fresh lint docs clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
@@ -24,7 +28,10 @@ demo: $(VENV)/.installed
 	@echo "Open out/demo/compare.html for both side by side, and out/demo/specular/report.html for one run with all it found."
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m 'not slow'
+
+test-all: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -q -n auto --dist worksteal
 
 TESTS ?= tests
 test-fresh: $(VENV)/.installed-test

@@ -6,7 +6,6 @@ import gc
 import io
 import math
 import os
-from collections import Counter
 from collections.abc import Iterator
 from functools import cache, wraps
 from pathlib import Path
@@ -30,14 +29,23 @@ hypothesis.settings.load_profile(os.environ.get("RTRADAR_HYPOTHESIS", "rtradar")
 _MORE = float(os.environ.get("RTRADAR_EXAMPLES", "1"))
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files of the slowest tests, and give property tests the examples asked for.
+SLOW_LEVELS = {"auto", "rays", "reference"}
+"""Levels by which ``make test`` makes whole runs alone, and ``make test-all`` all else, too."""
 
-    Two workers then end at nearly the same time (``--dist loadfile --no-loadscope-reorder``). Every
-    property test gets ``RTRADAR_EXAMPLES`` times as many examples as it asks for.
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` chooses by the marks
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave the slow levels and the slow backend to ``make test-all``, and property tests go on.
+
+    The fixtures' names say what a test is about: ``fidelity`` a level, ``backend`` a backend of
+    Mitsuba. Of the backends `tests/trace` tries each. Every property test gets
+    ``RTRADAR_EXAMPLES`` times as many examples as it asks for.
     """
-    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: -slow[item.path])
+    for item in items:
+        given = item.callspec.params if hasattr(item, "callspec") else {}
+        slow_backend = given.get("backend") == "scalar" and "trace" not in item.path.parts
+        if given.get("fidelity") in SLOW_LEVELS or slow_backend:
+            item.add_marker(pytest.mark.slow)
     if _MORE == 1:
         return
     tests = {id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)}
@@ -48,6 +56,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             examples = math.ceil(_MORE * own.max_examples)
             more = hypothesis.settings(own, max_examples=examples)
             test._hypothesis_internal_use_settings = more
+
+
+def pytest_collection_finish() -> None:
+    """Keep what was imported out of every later search for garbage, which took 0.3 to 0.7 s."""
+    gc.collect()
+    gc.freeze()
 
 
 class _Pictures:
@@ -139,19 +153,38 @@ def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     threads._pool.cache_clear()
 
 
+SMALL = """
+tx_y = 2
+tx_z = 0
+rx_y = 4
+rx_z = 0
+chirp_duration_s = 250e-6
+samples_per_chirp = 128
+frame_duration_s = 0.05
+"""
+
+
 @pytest.fixture(scope="session")
-def small() -> rt.Radar:
-    """A radar of few samples, with a line of antennas along y."""
-    return rt.Radar(
-        name="small",
-        tx_y=2,
-        tx_z=0,
-        rx_y=4,
-        rx_z=0,
-        chirp_duration_s=250e-6,
-        samples_per_chirp=128,
-        frame_duration_s=0.05,
-    )
+def small_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a radar of few samples, with a line of antennas along y."""
+    path = tmp_path_factory.mktemp("radar") / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="session")
+def small(small_file: Path) -> rt.Radar:
+    """The radar of `small_file`."""
+    return rt.Radar.load(small_file)
+
+
+@pytest.fixture(scope="session")
+def small_run(small: rt.Radar, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small run, with its IF samples, for all who only read one."""
+    out = tmp_path_factory.mktemp("run") / "out"
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
+    rt.run(motion, small, out=out, fidelity="analytic", save_if=True)
+    return out
 
 
 @pytest.fixture(scope="session")

@@ -45,16 +45,19 @@ def test_it_has_ten_cells_and_no_outputs(stored: Any) -> None:
     assert not any(cell.outputs for cell in code)
 
 
+@pytest.mark.slow
 def test_nothing_is_printed_to_stderr(outputs: list[list[dict[str, Any]]]) -> None:
     told = [one["text"] for shown in outputs for one in shown if one.get("name") == "stderr"]
     assert not told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cell", [0, 1, 2, 3, 5, 6, 8])
 def test_a_cell_shows_a_card(outputs: list[list[dict[str, Any]]], cell: int) -> None:
     assert any("text/html" in output.get("data", {}) for output in outputs[cell])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cell", "count"), [(1, 1), (2, 1), (7, 3)])
 def test_a_cell_draws(outputs: list[list[dict[str, Any]]], cell: int, count: int) -> None:
     drawn = pictures(outputs[cell])
@@ -63,6 +66,7 @@ def test_a_cell_draws(outputs: list[list[dict[str, Any]]], cell: int, count: int
         assert (np.ptp(np.asarray(picture, dtype=int), axis=-1) > 40).mean() > 1 / 500
 
 
+@pytest.mark.slow
 def test_the_network_learns(outputs: list[list[dict[str, Any]]]) -> None:
     lines = "".join(one["text"] for one in outputs[9]).splitlines()
     losses = [float(line.split()[-1]) for line in lines]

@@ -213,7 +213,7 @@ def test_a_given_path_that_no_file_has(
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folders(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Everything that commands read: a run, a scene, a data set, clouds and trainings."""
     pytest.importorskip("torch")
     from rtradar.classify.outcomes import HISTORY, Outcome, save_outcome
@@ -224,22 +224,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from rtradar.clouds.sample_index import write_index
 
     root = tmp_path_factory.mktemp("folders")
-    radar = rt.Radar(
-        tx_y=2,
-        tx_z=0,
-        rx_y=2,
-        rx_z=0,
-        chirp_duration_s=250e-6,
-        samples_per_chirp=128,
-        frame_duration_s=0.05,
-    )
-    rt.run(
-        rt.synthetic_motion("walk", seed=0, duration_s=0.2),
-        radar,
-        out=root / "run",
-        fidelity="analytic",
-        save_if=True,
-    )
+    shutil.copytree(small_run, root / "run")
     (root / "scene").mkdir()
     for ending in ("obj", "stl", "ply", "glb"):
         trimesh.creation.box((1, 1, 1)).export(root / "scene" / f"box.{ending}")

@@ -7,9 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 def test_a_program_of_a_user_has_types_throughout() -> None:
     assert (ROOT / "rtradar" / "py.typed").is_file()
     # From cold, mypy reads the packages below for 20 s.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -55,14 +56,16 @@ def test_copies_never_reach_beyond_the_recording() -> None:
 
 
 def test_a_data_set_has_the_copies_beside_the_recording(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, small_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     walker = synthetic_motion("walk", seed=2, duration_s=1.5)
     monkeypatch.setattr("rtradar.campaign.samples.load_motion", lambda path, skeleton: walker)
     (tmp_path / "walk.bvh").touch()
+    shutil.copy(small_file, tmp_path)
     text = (
         "[windows]\nduration_s = 0.5\nstart_s = 0.5\n[augmented]\ncopies = 3\n[each]\n"
-        'fidelity = ["analytic"]\n[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\n'
+        'fidelity = ["analytic"]\nradar = ["small.toml"]\n'
+        '[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\n'
     )
     (tmp_path / "set.toml").write_text(text)
     plans = plan_samples(read_spec(tmp_path / "set.toml"))

@@ -44,12 +44,12 @@ def test_amc_in_pieces(
 def test_actors_in_pieces(
     activity: str, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]
 ) -> None:
-    whole = synthetic_motion(activity, seed=3, duration_s=6.0)
+    whole = synthetic_motion(activity, seed=3, duration_s=2.0)
     placed = place(whole, start_s=0.5, heading_deg=20.0)
     times = np.linspace(0.0, placed.duration_s, 40)
     poses = placed.at(times)
     in_pieces()
-    again = synthetic_motion(activity, seed=3, duration_s=6.0)
+    again = synthetic_motion(activity, seed=3, duration_s=2.0)
     same(again, whole)
     assert not again.rotations.flags.writeable  # it does wait in a file
     placed_again = place(again, start_s=0.5, heading_deg=20.0)
@@ -103,6 +103,7 @@ def test_other_units_of_angles_after_the_first_frame_are_refused(
         load_motion(path, skeleton)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the unit of ru_maxrss differs")
 def test_memory_does_not_grow_with_the_recording() -> None:
     # Ten minutes: rotations alone are 51 MB, as made, turned and placed.

@@ -15,7 +15,9 @@ from rtradar.system.threads import THREADS_VARIABLE
 from rtradar.trace.backends.backend import Backend
 
 # Frames a quarter as long as those of the preset, each of which still spans a keyframe.
-RADAR = dataclasses.replace(rt.Radar.preset("paper-12ghz"), frame_duration_s=0.025)
+RADAR = dataclasses.replace(
+    rt.Radar.preset("paper-12ghz"), frame_duration_s=0.025, tx_y=2, tx_z=1, rx_y=2, rx_z=2
+)
 
 
 @pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])

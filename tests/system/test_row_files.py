@@ -30,6 +30,7 @@ def pieces(rows: NDArray[np.float64], size: int) -> list[NDArray[np.float64]]:
 def test_rows_come_back(monkeypatch: pytest.MonkeyPatch, size: int, most: int) -> None:
     monkeypatch.setattr(row_files, "_MOST_IN_MEMORY", most)
     gc.collect()  # what other tests left
+    gc.freeze()  # and what they keep is not searched again
     before = len(row_files._mapped)
     rows = file_backed(pieces(ROWS, size))
     np.testing.assert_array_equal(rows, ROWS)

@@ -272,15 +272,15 @@ def test_what_is_kept_does_not_grow_with_the_capture() -> None:
     tracemalloc.start()
     try:
         for _ in range(2):  # power, then the signal
-            for begin in range(0, 100_000, 800):  # 1 ms each
+            for begin in range(0, 64_000, 800):  # 1 ms each
                 model.echoes(np.array([begin]))
-                if begin in (30_400, 99_200):
+                if begin in (30_400, 63_200):
                     gc.collect()
                     held.append(_bytes_of_arrays())
             first_pass = first_pass or model.account()
     finally:
         tracemalloc.stop()
-    # 69 s more, and all of it again: not a byte. To keep every chunk that was looked ahead would
+    # 33 s more, and all of it again: not a byte. To keep every chunk that was looked ahead would
     # double it.
     assert held[1:] == held[:1] * 3
     # Nothing counts twice.

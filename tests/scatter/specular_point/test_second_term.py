@@ -31,6 +31,7 @@ def fields(
     ]
 
 
+@pytest.mark.slow  # solves Maxwell's equations at 12 GHz
 @pytest.mark.parametrize("polarization", ["v", "h"])
 def test_half_of_the_error_of_a_torso_goes(polarization: Literal["v", "h"]) -> None:
     angle = np.radians([10.0, 30.0, 50.0, 70.0, 90.0])
