@@ -183,7 +183,7 @@ def small_run(small: rt.Radar, tmp_path_factory: pytest.TempPathFactory) -> Path
     """The folder of a small run, with its IF samples, for all who only read one."""
     out = tmp_path_factory.mktemp("run") / "out"
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
-    rt.run(motion, small, out=out, fidelity="analytic", save_if=True)
+    rt.run(motion, small, out=out, fidelity="analytic", save_if=True, pictures=False)
     return out
 
 

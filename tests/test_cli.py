@@ -169,7 +169,8 @@ def test_if_samples_are_kept_whole(walked: Path) -> None:
 def test_the_same_seed_gives_the_same_files_and_replaces_them(walked: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
     for _ in range(2):
-        assert run("synthetic:walk", *SHORT, "--fidelity", "specular", "--out", tmp_path) == 0
+        words = [*SHORT, "--fidelity", "specular", "--no-pictures", "--out", tmp_path]
+        assert run("synthetic:walk", *words) == 0
     assert (tmp_path / "mine.txt").read_text() == "keep"
     with h5py.File(walked / "maps.h5") as first, h5py.File(tmp_path / "maps.h5") as second:
         assert np.array_equal(first["range_doppler"][:], second["range_doppler"][:])
@@ -205,8 +206,9 @@ def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: ob
     assert (name, type(read), read) == ("shadow_rays", type(value), value)
 
 
-def test_a_model_option_reaches_the_model(tmp_path: Path) -> None:
+def test_a_model_option_reaches_the_model(small_file: Path, tmp_path: Path) -> None:
     words = ["--fidelity", "fresnel", "--model-option", "shadow_rays=8", "--out", tmp_path / "out"]
+    words += ["--radar", small_file, "--no-pictures"]
     assert run("synthetic:punch", *SHORT, *words) == 0
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"][
         "model_options"
@@ -412,18 +414,14 @@ def test_an_empty_name_is_not_the_current_folder(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 @pytest.mark.parametrize("buffered", [True, False])
-def test_what_cannot_be_printed_is_said_in_one_line(
-    walked: Path, tmp_path: Path, buffered: bool
-) -> None:
+def test_what_cannot_be_printed_is_said_in_one_line(buffered: bool) -> None:
     words = [
         sys.executable,
         *([] if buffered else ["-u"]),
         "-m",
         "rtradar",
-        "view",
-        walked,
-        "--out",
-        tmp_path / "page.html",
+        "list",
+        "scenes",
     ]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:

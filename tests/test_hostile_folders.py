@@ -64,8 +64,8 @@ def run_into(small_file: Path) -> Runner:
     """Runs a small simulation into a folder, with more words, and gives the exit status."""
 
     def run_into(out: Path, *more: str) -> int:
-        words = ["synthetic:kick", "--duration", "0.2", "--fidelity", "analytic", *more]
-        return main(["run", *words, "--radar", str(small_file), "--out", str(out)])
+        words = ["synthetic:kick", "--duration", "0.2", "--fidelity", "analytic", "--no-pictures"]
+        return main(["run", *words, *more, "--radar", str(small_file), "--out", str(out)])
 
     return run_into
 

@@ -54,6 +54,7 @@ def test_both_sets_of_the_transfer_have_the_same_motions() -> None:
         assert differs <= {"person_position_m"}  # which is where the room says, and the same offset
 
 
+@pytest.mark.slow  # reads all of them
 def test_real_recordings_are_of_all_activities(
     mocap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

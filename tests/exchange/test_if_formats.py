@@ -236,6 +236,7 @@ def test_the_same_samples_give_the_same_file(
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
+@pytest.mark.slow
 def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
     make_run(tmp_path / "short", 3000, chunk=600)
     make_run(tmp_path / "long", 90_000, chunk=600)  # 46 MB

@@ -31,7 +31,6 @@ def compared(
     )
 
 
-@pytest.mark.drawn
 def test_the_reference_differs_in_nothing_from_itself(compared: rt.Comparison) -> None:
     found = compared.summary["fidelities"]["specular"]
     assert compared.summary["reference"] == "specular"
@@ -86,7 +85,6 @@ def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
     assert np.quantile(difference, 0.95) < 1e-2
 
 
-@pytest.mark.drawn
 def test_files_and_table(compared: rt.Comparison) -> None:
     pictures = {
         f"compare_{name}.png"
@@ -125,10 +123,14 @@ def test_models_that_cannot_be_compared(
     assert not (tmp_path / "out").exists()
 
 
-def test_the_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_the_table(
+    small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = [
         "compare",
         "synthetic:punch",
+        "--radar",
+        str(small_file),
         "--duration",
         "0.2",
         "--fidelities",

@@ -27,7 +27,8 @@ RADAR = rt.Radar(
 
 
 def maps(out: Path, **options: Any) -> dict[str, np.ndarray]:
-    rt.run(MOTION, RADAR, out=out, fidelity="analytic", clutter_removal="mean", **options)
+    given = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
+    rt.run(MOTION, RADAR, out=out, **given, **options)
     with h5py.File(out / "maps.h5") as file:
         names = [name for name in file if file[name].ndim > 1 and file[name].dtype.kind == "f"]
         return {name: file[name][()] for name in names}

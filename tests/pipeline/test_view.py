@@ -21,8 +21,6 @@ from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import COLOURS
 from rtradar.system import figure_style
 
-pytestmark = pytest.mark.drawn
-
 
 @pytest.fixture(scope="module")
 def made(
@@ -30,7 +28,8 @@ def made(
 ) -> Path:
     out = tmp_path_factory.mktemp("made")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
-    rt.run(motion, *beside_a_wall, out=out, fidelity="analytic", clutter_removal="mean")
+    options = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
+    rt.run(motion, *beside_a_wall, out=out, **options)
     return out
 
 
@@ -115,7 +114,14 @@ def test_points_are_of_who_returned_them(made: Path, tmp_path: Path) -> None:
         load_run_view(tmp_path / "run")
 
 
-@pytest.mark.parametrize("colour", COLOURS)
+@pytest.mark.drawn
+@pytest.mark.parametrize(
+    "colour",
+    [
+        pytest.param(colour, marks=[] if colour == "velocity" else [pytest.mark.slow])
+        for colour in COLOURS
+    ],
+)
 def test_a_still_shows_the_moment_in_those_colours(made: Path, tmp_path: Path, colour: str) -> None:
     told = view(made, still=tmp_path / "a.png", time_s=0.1, colour=colour)
     view(made, still=tmp_path / "b.png", time_s=0.3, colour=colour)

@@ -28,7 +28,10 @@ def power(samples: NDArray[np.complexfloating]) -> float:
     return float((np.abs(samples) ** 2).mean())
 
 
-@pytest.mark.parametrize("multiplexing", ["tdm", "fdm", "ddm"])
+@pytest.mark.parametrize(
+    "multiplexing",
+    ["tdm", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("fdm", "ddm"))],
+)
 def test_error_is_below_the_tolerance(multiplexing: Any) -> None:
     radar = replace(RADAR, multiplexing=multiplexing)
     exact, free = simulated(radar, path_tolerance_db=None), simulated(radar, rt.Scene())

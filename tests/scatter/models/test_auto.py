@@ -266,6 +266,7 @@ def _bytes_of_arrays() -> int:
     return sum(trace.size for trace in traces)
 
 
+@pytest.mark.slow
 def test_what_is_kept_does_not_grow_with_the_capture() -> None:
     model = Auto(passing_radar(), Swinging(), tolerance_db=10.0)  # type: ignore[arg-type]
     held, first_pass = [], {}

@@ -38,7 +38,7 @@ def field(echoes, radar=RADAR):
 
 
 @needs_anny
-@pytest.mark.parametrize("aside", [0.0, 1.0])
+@pytest.mark.parametrize("aside", [pytest.param(0.0, marks=pytest.mark.slow), 1.0])
 def test_the_sum_over_the_skin_is_that_of_the_mesh_at_rest(aside):
     # With the receivers aside it is the currents that radiate. Polarisation goes by the middle of a
     # part here, and by that of the whole mesh there: farther aside that would tell.
