@@ -140,6 +140,7 @@ def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
     import drjit as dr  # not before the libLLVM is chosen
 
     gc.collect()
+    gc.freeze()  # what is left stays, and is not searched again
     dr.sync_thread()
     dr.flush_malloc_cache()
 

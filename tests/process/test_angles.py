@@ -131,7 +131,9 @@ def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
         assert find_peaks(seen.sines, seen.y).sine[0, 0] == pytest.approx(sine, abs=5e-5)
 
 
-@pytest.mark.parametrize(("radar", "beside"), [(LOW, 1.02), (HIGH, 1.16)])
+@pytest.mark.parametrize(
+    ("radar", "beside"), [(LOW, 1.02), pytest.param(HIGH, 1.16, marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("side", [1, -1])
 def test_an_echo_that_is_folded_shows_beside_its_direction(
     radar: Radar, beside: float, side: int

@@ -110,7 +110,9 @@ def test_spheres_that_touch_are_no_pair(apart: float, number: int) -> None:
     assert len(pairs_apart(target.centres, target.frames, target.semi_axes)) == number
 
 
-@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
+@pytest.mark.parametrize(
+    "fidelity", ["specular", pytest.param("fresnel", marks=pytest.mark.slow), "physical-optics"]
+)
 def test_on_a_walker_they_are_listed_and_each_has_an_echo(fidelity: str) -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.3))
     chirps = np.array([100, 400])

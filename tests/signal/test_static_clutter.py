@@ -97,7 +97,7 @@ def left_of(
     return out
 
 
-@pytest.mark.parametrize("blocks", [1, 3])
+@pytest.mark.parametrize("blocks", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: int) -> None:
     # Mirrors that the amplitude's polynomial follows with the shadow in it: at seven nodes.
     ball, objects = Ball(), list(clutter.cycle())

@@ -66,6 +66,7 @@ def test_the_sum_over_the_skin_is_that_of_the_mesh_at_rest(aside):
     assert np.linalg.norm(found - expected) < 0.05 * np.linalg.norm(expected)
 
 
+@pytest.mark.slow
 @needs_anny
 def test_keyframes_follow_what_is_summed_at_every_chirp():
     body, chirps = person(), np.array([350, 410])
