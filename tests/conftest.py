@@ -29,18 +29,36 @@ hypothesis.settings.load_profile(os.environ.get("RTRADAR_HYPOTHESIS", "rtradar")
 _MORE = float(os.environ.get("RTRADAR_EXAMPLES", "1"))
 
 
+SMALL = """
+tx_y = 2
+tx_z = 0
+rx_y = 4
+rx_z = 0
+chirp_duration_s = 250e-6
+samples_per_chirp = 128
+frame_duration_s = 0.05
+"""
+
 SLOW_LEVELS = {"auto", "rays", "reference"}
 """Levels by which ``make test`` makes whole runs alone, and ``make test-all`` all else, too."""
 
 
+def _place(item: pytest.Item) -> int:
+    return (item.path.parent.name == "doctor") - (item.path.name == "test_whole_runs.py")
+
+
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses by the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave the slow levels and the slow backend to ``make test-all``, and property tests go on.
+    """Order the tests, mark the slow ones, and give property tests the examples asked for.
+
+    Whole runs come first, for they compile what most others need, and the doctor comes last, for it
+    would compile the same at the same time.
 
     The fixtures' names say what a test is about: ``fidelity`` a level, ``backend`` a backend of
     Mitsuba. Of the backends `tests/trace` tries each. Every property test gets
     ``RTRADAR_EXAMPLES`` times as many examples as it asks for.
     """
+    items.sort(key=_place)
     for item in items:
         given = item.callspec.params if hasattr(item, "callspec") else {}
         slow_backend = given.get("backend") == "scalar" and "trace" not in item.path.parts
@@ -152,17 +170,6 @@ def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     threads._pool.cache_clear()
     yield
     threads._pool.cache_clear()
-
-
-SMALL = """
-tx_y = 2
-tx_z = 0
-rx_y = 4
-rx_z = 0
-chirp_duration_s = 250e-6
-samples_per_chirp = 128
-frame_duration_s = 0.05
-"""
 
 
 @pytest.fixture(scope="session")

@@ -126,7 +126,7 @@ ON_A_RUN = {
     "bench": ["bench", "--quick", "--only", "models", "--fidelity", "analytic"],
     "paper": ["paper", "--quick"],
 }
-LONG = {"bench", "paper"}  # half a minute and minutes
+LONG = {"bench", "doctor", "paper"}  # half a minute, compiling of all levels, and minutes
 HERE = {"run", "dataset", "train", "evaluate", "predict"}  # commands of the tests above
 
 

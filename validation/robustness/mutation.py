@@ -8,10 +8,11 @@ clouds, scatter and rcs, the same for the same seed; those of a smaller --count 
 larger one.
 
 Each runs against the tests that call the changed function, from the nearest test files and the
-fastest first, up to a limit of time, until one fails; recordings are not used. Which test calls
-what is traced once for each test file, on the unchanged copy. Numba's functions cannot be traced:
-their tests are those that call any function of their module, or of the modules that import it.
-Tests that fail without a change are not used.
+fastest first, up to a limit of time, until one fails; recordings are not used. Tests that `make
+test` leaves to `make test-all` come last, so that who notices a mutant says whether both do.
+Which test calls what is traced once for each test file, on the unchanged copy. Numba's functions
+cannot be traced: their tests are those that call any function of their module, or of the modules
+that import it. Tests that fail without a change are not used.
 
 Compiled code comes from a cache that the unchanged copy filled. For a mutant whose function Numba
 compiles or inlines, the modules that import its module, however indirectly, begin without a cache,
@@ -399,7 +400,7 @@ class Tree:
         return self._traced[test_file]
 
     def tests(self, mutant: Mutant, test_file: str) -> list[str]:
-        """Tests of a file that are to be run, the fastest first."""
+        """Tests of a file that are to be run: the fastest first, and slow ones after all others."""
         own = mutant.file.removeprefix("rtradar/")
         near = tuple(
             f"{name.removeprefix('rtradar/')}::"
@@ -417,9 +418,10 @@ class Tree:
             }
             if seconds:
                 break
-        spent = itertools.accumulate(sorted(seconds.values()))
+        ordered = sorted(seconds, key=lambda name: (bool(found[name].get("slow")), seconds[name]))
+        spent = itertools.accumulate(seconds[name] for name in ordered)
         fits = max(1, sum(so_far <= MOST_SECONDS for so_far in spent))
-        return sorted(seconds, key=lambda name: seconds[name])[:fits]
+        return ordered[:fits]
 
     def is_compiled(self, mutant: Mutant) -> bool:
         """Whether Numba compiles its function, or uses the constants of its module."""
@@ -439,7 +441,8 @@ class Tree:
     def run(self, mutant: Mutant) -> tuple[str, str, int]:
         """Outcome, the test that noticed it, and the number of tests.
 
-        Outcomes are ``noticed``, ``timeout``, ``survived`` and ``untested``.
+        Outcomes are ``noticed``, ``noticed slowly`` by a test that `make test` leaves out,
+        ``timeout``, ``survived`` and ``untested``.
         """
         path = self._root / mutant.file
         source = path.read_text(encoding="utf-8")
@@ -473,8 +476,13 @@ class Tree:
                 return "timeout", test_file, count
             if status != 0:
                 failed = re.search(r"^(?:FAILED|ERROR) (.*)$", said, re.MULTILINE)
+                slow = failed and any(
+                    self.traced(test_file)[name].get("slow")
+                    for name in tests
+                    if failed[1].split(" - ")[0] == name
+                )
                 return (
-                    "noticed",
+                    "noticed slowly" if slow else "noticed",
                     failed[1][:200] if failed else f"status {status} of {test_file}",
                     count,
                 )
@@ -495,8 +503,6 @@ class Tree:
             "-m",
             "pytest",
             "-q",
-            "-m",
-            "not slow",
             "-p",
             "no:cacheprovider",
             *arguments,
@@ -570,7 +576,7 @@ def main() -> int:
         )
         return 0
     reasons = {each["key"]: each["reason"] for each in json.loads(EQUIVALENT.read_text())}
-    survivors = []
+    survivors, slowly = [], 0
     with tempfile.TemporaryDirectory() as temporary:
         tree = Tree((options.folder or Path(temporary)).resolve())
         for number, (mutant, result) in enumerate(outcomes(mutants, tree, options.json), 1):
@@ -579,6 +585,7 @@ def main() -> int:
                 if mutant.key in reasons and result["outcome"] == "survived"
                 else result["outcome"]
             )
+            slowly += outcome == "noticed slowly"
             print(
                 f"{number:3d} {outcome:22s} {result['seconds']:6.1f} s {result['tests']:4d} tests  "
                 f"{mutant.file}:{mutant.line}",
@@ -589,7 +596,10 @@ def main() -> int:
                 print(
                     f"    in {mutant.function}\n    - {mutant.old}\n    + {mutant.new}", flush=True
                 )
-    print(f"{len(mutants)} mutants, {len(survivors)} that no test notices and no reason excuses")
+    print(
+        f"{len(mutants)} mutants, {len(survivors)} that no test notices and no reason excuses, "
+        f"{slowly} that make test-all notices and make test does not"
+    )
     return 1 if survivors else 0
 
 

@@ -1,4 +1,4 @@
-"""Plug-in of pytest for `mutation.py`: the functions of rtradar that each test calls, and its time.
+"""Plug-in of pytest for `mutation.py`: what each test calls, its time, and whether it is slow.
 
 Only calls are traced, not lines, and not while Numba compiles, so a run is hardly slower. Functions
 that Numba compiled are not seen.
@@ -54,9 +54,8 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
         for code in _seen
         if code.co_filename.startswith(TRACED)
     }
-    _found.setdefault(item.nodeid, {})["calls"] = sorted(
-        name.replace(".<locals>", "") for name in names
-    )
+    _found.setdefault(item.nodeid, {})["slow"] = item.get_closest_marker("slow") is not None
+    _found[item.nodeid]["calls"] = sorted(name.replace(".<locals>", "") for name in names)
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
