@@ -167,7 +167,7 @@ def mirror_rows(quick: bool, folder: Path) -> Iterator[Row]:
         eta = complex(piece.material.eta(FREQUENCY))
         scene = rt.Scene(name=thing, furniture=(piece,))
         ours, theirs, endless = [], [], []
-        for x in np.linspace(-2.2, 2.6, 7 if quick else 25):
+        for x in np.linspace(-2.2, 2.6, 5 if quick else 25):
             centre = np.array([x, 0.3, 1.8])
             theirs.append(over_face(centre, face, np.array([0.0, -1.0, 0.0]), eta))
             ours.append(simulated(scene, centre, piece.name))
@@ -207,7 +207,7 @@ def door_rows(quick: bool) -> Iterator[Row]:
     first = np.linalg.norm(places - PLACE, axis=1)
     scene, free = rt.Scene(name="door", walls=(wall,)), rt.Scene()
     error = []
-    for place in np.linspace(-2.6, -0.4, 7 if quick else 23):
+    for place in np.linspace(-2.6, -0.4, 5 if quick else 23):
         centre = np.array([0.0, place, 1.2])
         # By reciprocity both legs lose alike: Kirchhoff's sum over the opening, squared. The leg
         # ends at the point of the sphere that looks at the radar.

@@ -233,7 +233,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
     duration_s = 0.1 if quick else 0.6
     motion = rt.synthetic_motion("walk", duration_s=duration_s)
     body = Body.from_motion(place(motion, heading_deg=scene.heading_deg))
-    chirps = np.arange(0, int(duration_s / radar.chirp_interval_s), 401 if quick else 801)
+    chirps = np.arange(0, int(duration_s / radar.chirp_interval_s), 801)
     sweep = radar.start_frequency_hz + radar.bandwidth_hz * np.linspace(0, 1, 5)
     middle = body.at(np.array([duration_s / 2])).centres[0].mean(axis=0)
     powers: dict[str, dict[str, float]] = {}

@@ -269,7 +269,8 @@ def room_rows(quick: bool) -> Iterator[Row]:
         motion = rt.synthetic_motion(activity, duration_s=3.0)
         body = rt.Body.from_motion(motion.shifted([*scene.person_position_m, 0.0]))
         moments = [
-            round(start_s / radar.cycle_duration_s) + np.arange(0, radar.cycles_per_frame, 16)
+            round(start_s / radar.cycle_duration_s)
+            + np.arange(0, radar.cycles_per_frame, 32 if quick else 16)
             for start_s in (WINDOW_S[:1] if quick else WINDOW_S)
         ]
         person = person_power(radar, body)
@@ -277,7 +278,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
             allowed: RoomIf(
                 radar, clutter.cycle(), body_shadow.ClutterShadow(clutter, body, (), allowed)
             )
-            for allowed in (0.0, person * 10 ** (LEAST_DB / 10))
+            for allowed in (person * 10 ** (LEAST_DB / 10), *(() if quick else (0.0,)))
         }
         wrong, changed = dict.fromkeys(rooms, 0.0), 0.0
         still = RoomIf(radar, clutter.cycle())
@@ -293,10 +294,11 @@ def room_rows(quick: bool) -> Iterator[Row]:
                 ours = ours[:, rx].reshape(len(cycles), len(tx), len(rx), -1).astype(np.complex128)
                 ours = ours - ours.mean(axis=0)
                 wrong[allowed] += float((np.abs(ours - expected) ** 2).mean()) / len(moments)
-        exact, default = wrong.values()
+        default, *exact = wrong.values()
         claim = f"shadow of a person in a room, {activity}"
         quantity = "error of the samples over their change in 0.1 s"
-        yield reported(claim, f"{quantity}, tolerance off", "dB", power_db(exact / changed))
+        for error in exact:
+            yield reported(claim, f"{quantity}, tolerance off", "dB", power_db(error / changed))
         yield reported(claim, f"{quantity}, default tolerance", "dB", power_db(default / changed))
         says = "shadow of people in a room's clutter, default tolerance, over the person's power"
         quantity = "error of the samples over the person's power, default tolerance"
@@ -368,7 +370,7 @@ def walker_rows(quick: bool) -> Iterator[Row]:
         motion = rt.synthetic_motion(activity, duration_s=3.0)
         body = rt.Body.from_motion(motion.shifted([*scene.person_position_m, 0.0]))
         wrong = changed = 0.0
-        for start_s in (1.25, 2.25):
+        for start_s in (1.25,) if quick else (1.25, 2.25):
             first = round(start_s / radar.cycle_duration_s) * radar.n_tx
             chirps = np.arange(first, first + radar.chirps_per_frame)
             fields = []
@@ -386,7 +388,9 @@ def walker_rows(quick: bool) -> Iterator[Row]:
         error, quantity = power_db(wrong / changed), f"{activity}, over the change in 0.1 s"
         claim = f"shadow at keyframes {shadow.step * radar.chirp_interval_s * 1e3:.3g} ms apart"
         says = f"shadow in the clutter between keyframes, {activity}, over its change"
-        yield judged(claim, quantity, "dB", error, MOST_ERROR_DB, says=says, cases=2)
+        yield judged(
+            claim, quantity, "dB", error, MOST_ERROR_DB, says=says, cases=1 if quick else 2
+        )
 
 
 def measure(quick: bool) -> list[Row]:
