@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / "docs" / "style.md"
+PAGE = ROOT / "docs" / "glossary.md"
 
 
 def banned() -> list[str]:
@@ -18,7 +18,7 @@ def banned() -> list[str]:
     return [word for line in lines for word in line.rstrip(" |").rpartition("| ")[2].split(", ")]
 
 
-EXEMPT = {"CHANGELOG.md", "docs/style.md", "tests/test_words.py"}
+EXEMPT = {"CHANGELOG.md", "docs/glossary.md", "tests/test_words.py"}
 WORDS = "|".join(word.replace(" ", "[_ -]") for word in banned())
 PATTERN = re.compile(rf"(?<![A-Za-z])(?:{WORDS})(?:s|es)?(?![A-Za-z])", re.IGNORECASE)
 
@@ -48,7 +48,9 @@ def test_no_text_has_a_banned_word() -> None:
         for path in texts()
         for line in found_in(path.read_text(encoding="utf-8"))
     ]
-    assert not wrong, "words that the field does not use, see docs/style.md:\n" + "\n".join(wrong)
+    assert not wrong, "words that the field does not use, see docs/glossary.md:\n" + "\n".join(
+        wrong
+    )
 
 
 def test_the_page_bans_words() -> None:

@@ -219,7 +219,7 @@ def _draw(
     parameters = results[reference].summary["parameters"]
     spreading, title = parameters["spreading"], f"{parameters['motion']}, {radar.name}"
     drawn = {name: folder / file for name, file in _PICTURES.items()}
-    paths = iter(list(drawn.values()))
+    paths = iter(drawn.values())
 
     def unit_of(powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
         strongest = max(float(power.max()) for power in powers)
@@ -265,12 +265,11 @@ def _draw(
         seen = above_floor(np.sum(list(spectrograms.values()), axis=0))
         label = unit.label("one channel")
         comparison.draw_maps(path, levels, label, across, up, slow_title, seen)
-    else:  # the capture is too short for one
-        del drawn["Spectrogram"]
     comparison.draw_rdt_clouds(
         next(paths), {name: result.points for name, result in results.items()}, title
     )
-    return drawn, part_unit
+    # A capture may be too short for a spectrogram.
+    return {name: path for name, path in drawn.items() if path.exists()}, part_unit
 
 
 # -- agreement of maps and clouds ------------------------------------------------------------------

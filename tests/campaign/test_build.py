@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -41,15 +42,6 @@ fidelity = ["analytic"]
 [[synthetic]]
 label = "walk"
 count = 2
-"""
-RADAR = """
-tx_y = 2
-tx_z = 0
-rx_y = 4
-rx_z = 0
-chirp_duration_s = 250e-6
-samples_per_chirp = 128
-frame_duration_s = 0.05
 """
 
 
@@ -164,8 +156,10 @@ def test_a_worker_of_another_version_makes_nothing(tmp_path: Path) -> None:
     assert not contents(tmp_path)
 
 
-def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
+def test_a_data_set_from_its_file_to_its_clouds(
+    here: None, tmp_path: Path, small_file: Path
+) -> None:
+    shutil.copy(small_file, tmp_path)
     (tmp_path / "set.toml").write_text(TINY)
     out = tmp_path / "new" / "out"
     planned = build_dataset(tmp_path / "set.toml", out, plan_only=True)
@@ -196,8 +190,9 @@ def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> N
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
 def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_first(
     tmp_path: Path,
+    small_file: Path,
 ) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
+    shutil.copy(small_file, tmp_path)
     (tmp_path / "set.toml").write_text(TINY)
     out = tmp_path / "out"
     out.mkdir()
@@ -210,8 +205,10 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
-def test_half_samples_of_own_workers_go_as_the_process_has_to_end(tmp_path: Path) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
+def test_half_samples_of_own_workers_go_as_the_process_has_to_end(
+    tmp_path: Path, small_file: Path
+) -> None:
+    shutil.copy(small_file, tmp_path)
     (tmp_path / "set.toml").write_text(TINY)
     program = f"""
 import contextlib, os
@@ -239,9 +236,9 @@ for scheduler in (None, "another"):
 
 
 def test_a_plan_estimates_what_it_does_not_make(
-    here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    here: None, tmp_path: Path, small_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
+    shutil.copy(small_file, tmp_path)
     text = TINY.replace("count = 2", "count = 7").replace(
         '["analytic"]', '["analytic", "specular"]'
     )
@@ -264,9 +261,9 @@ def test_a_plan_estimates_what_it_does_not_make(
 
 
 def test_samples_that_cannot_be_made_are_told_in_one_line(
-    here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    here: None, tmp_path: Path, small_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
+    shutil.copy(small_file, tmp_path)
     (tmp_path / "set.toml").write_text(
         TINY + "[drawn]\noffset_x_m = [-4.0, -4.0]\noffset_y_m = [1.0, 1.0]"
     )

@@ -144,3 +144,16 @@ def test_the_command_prints_the_table(
     assert said.count("\n") == 1
     assert "perfect" in said
     assert not (tmp_path / "no").exists()
+
+
+def test_a_capture_too_short_for_a_spectrogram_is_compared_without(
+    kick: rt.Motion, small: rt.Radar, tmp_path: Path
+) -> None:
+    models = MODELS[:2]
+    found = rt.compare(kick, small, out=tmp_path / "out", fidelities=models, duration_s=0.06)
+    assert not (tmp_path / "out" / "compare_spectrogram.png").exists()
+    assert "compare_spectrogram.png" not in found.summary["files"]
+    assert found.summary["fidelities"]["analytic-paper"]["spectrogram_correlation"] is None
+    page = (tmp_path / "out" / "compare.html").read_text()
+    assert "Range-Doppler" in page
+    assert page.count('src="data:image/png;base64,') == 4
