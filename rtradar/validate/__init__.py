@@ -30,6 +30,7 @@ from rtradar.validate.rows import worst
 __all__ = ["claims", "validate", "validation_folder"]
 
 _LINE = "{:<14} {:<18} {:>5} {:>6} {:>6} {:>11} {:>8}"
+_COSTLIEST = 15
 _HEAD = _LINE.format("key", "script", "rows", "judged", "failed", "error/limit", "seconds")
 
 
@@ -44,6 +45,10 @@ def _lines(outcome: Outcome) -> Iterator[str]:
         used = "-" if nearest is None else f"{nearest.used:.3g}"
         yield _LINE.format(key, name, len(rows), judged, failed, used, seconds)
         seconds = ""
+    if not outcome.keys:
+        yield _LINE.format("-", name, 0, 0, 0, "-", seconds)
+    for what in outcome.left_out:
+        yield f"  not measured: {what}"
     for row in outcome.failed:
         limit = "must be a number" if row.tolerance is None else f"limit {row.tolerance:.4g}"
         yield f"  FAILED  {row.claim}: {row.quantity}: {row.error:.4g} {row.unit}, {limit}"
@@ -141,11 +146,25 @@ def validate(
         f"judged figures within their limits, {len(rows) - len(judged)} reported; "
         f"{len(outcomes)} scripts, {sum(outcome.seconds for outcome in outcomes):.0f} s"
     )
+    print(_costs(outcomes))
     if json_path is not None:
         _write_json(json_path, outcomes, passed, quick)
     if readme is not None:
         write_readme(readme, markdown(outcomes))
     return 0 if passed else 1
+
+
+def _costs(outcomes: Sequence[Outcome]) -> str:
+    """What the costliest scripts take for how many judged figures."""
+    lines = [f"{'script':<26} {'processor':>10} {'share':>6} {'judged':>6} {'a figure':>9}"]
+    whole = sum(outcome.cpu_seconds for outcome in outcomes) or 1.0
+    for outcome in sorted(outcomes, key=lambda each: -each.cpu_seconds)[:_COSTLIEST]:
+        seconds, count = outcome.cpu_seconds, sum(r.tolerance is not None for r in outcome.rows)
+        each = f"{seconds / count:.2f} s" if count else "-"
+        lines.append(
+            f"{outcome.claim.name:<26} {seconds:8.1f} s {seconds / whole:6.1%} {count:6d} {each:>9}"
+        )
+    return "\n".join(lines)
 
 
 def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bool) -> None:
@@ -164,7 +183,9 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
                 "keys": outcome.keys,
                 "seconds": round(outcome.seconds, 2),
                 "cpu_seconds": round(outcome.cpu_seconds, 2),
+                "judged": sum(row.tolerance is not None for row in outcome.rows),
                 "failed": len(outcome.failed),
+                "left_out": outcome.left_out,
                 "trouble": outcome.trouble,
             }
             for outcome in outcomes

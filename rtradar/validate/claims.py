@@ -43,19 +43,24 @@ class Claim:
 
     @property
     def alone(self) -> bool:
-        """Whether it measures times or memory, which other scripts beside it would spoil."""
+        """Whether it measures times, which other scripts beside it would spoil."""
         return self.script.parent.name == "cost"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a script: rows with the chosen key, elapsed time and CPU time of all cores [s]."""
+    """Result of a script: rows with the chosen key, elapsed time and CPU time of all cores [s].
+
+    ``trouble`` is the reason why it did not finish, in one line, or empty; ``left_out`` says what
+    it could not measure here, and why.
+    """
 
     claim: Claim
     rows: list[Row]
     seconds: float
     cpu_seconds: float
-    trouble: str  # reason why it did not finish, in one line; empty if it did
+    trouble: str
+    left_out: tuple[str, ...] = ()
 
     @property
     def failed(self) -> list[Row]:
@@ -124,14 +129,15 @@ def run_claim(
         hung = [place for place, line in enumerate(said) if line.startswith("Timeout (")]
         last = " ".join(said[hung[0] :][:_FRAMES]) if hung else said[-1]
         rows, trouble = [], f"ended with status {done.returncode} and left no rows: {last}"
-        cpu_seconds = 0.0
+        cpu_seconds, left_out = 0.0, tuple[str, ...]()
         with suppress(OSError, ValueError, KeyError, TypeError):
             content = json.loads(written.read_text(encoding="utf-8"))
             rows = [Row(**row) for row in content["rows"]]
             cpu_seconds = float(content["cpu_seconds"])
-            trouble = "" if rows else "gave no rows"
+            left_out = tuple(content["left_out"])
+            trouble = "" if rows or left_out else "gave no rows"
     if rows and done.returncode not in (0, int(not all(row.passed for row in rows))):
         trouble = f"ended with status {done.returncode}: {last}"
     kept = [row for row in rows if key is None or row.key == key]
     seconds = time.perf_counter() - began
-    return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()))
+    return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()), left_out)

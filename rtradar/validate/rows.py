@@ -17,11 +17,17 @@ QUICK_LIMIT_S = 900.0
 """A script that takes longer with ``--quick`` hangs: the slowest takes four minutes."""
 
 _MOST_DRAWN = 40
+_left_out: list[str] = []
 
 
 def script_name() -> str:
     """Name of the script that runs, which is the key of rows that name no other."""
     return Path(sys.argv[0]).stem
+
+
+def leave_out(what: str, needs: str) -> None:
+    """Note figures that this script cannot measure here, and what they need: no failure."""
+    _left_out.append(f"{what}: needs {needs}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,11 +159,15 @@ def main(
         rows = measure(options.quick)
     finally:
         faulthandler.cancel_dump_traceback_later()
-    print(table(rows))
+    print("\n".join([table(rows), *(f"not measured: {what}" for what in _left_out)]))
     if options.json:
         # What this process and its children used, whatever runs beside it.
         spent = sum(os.times()[:4])
-        content = {"rows": [asdict(row) for row in rows], "cpu_seconds": spent}
+        content = {
+            "rows": [asdict(row) for row in rows],
+            "left_out": _left_out,
+            "cpu_seconds": spent,
+        }
         options.json.write_text(json.dumps(content, indent=1, default=float) + "\n")
     if options.figure:
         options.figure.mkdir(parents=True, exist_ok=True)

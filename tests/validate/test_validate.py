@@ -53,6 +53,13 @@ def measure(quick): ...
 if __name__ == "__main__":
     raise RuntimeError("no measurement")
 """
+ELSEWHERE = """
+from rtradar.validate.rows import leave_out, main
+def measure(quick):
+    leave_out("recorded walks", "RTRADAR_MOCAP, the folder of them")
+    return []
+raise SystemExit(main("Recordings.", measure))
+"""
 HELPER = "def measure(quick): ...\n"  # takes no `main` of rtradar.validate.rows: not a claim
 
 
@@ -141,6 +148,31 @@ def test_a_script_that_breaks_fails(folder: Path, capsys: pytest.CaptureFixture[
         "FAILED  zz ended with status 1 and left no rows: RuntimeError: no measurement"
         in capsys.readouterr().out
     )
+
+
+def test_what_cannot_be_measured_here_is_said_and_fails_nothing(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "walks.py").write_text(ELSEWHERE)
+    assert main(["validate", "--json", str(tmp_path / "v.json")]) == 0
+    needed = "recorded walks: needs RTRADAR_MOCAP, the folder of them"
+    said = capsys.readouterr().out
+    assert f"not measured: {needed}" in said
+    assert "passed: 1 of 1 judged figures" in said
+    scripts = json.loads((tmp_path / "v.json").read_text())["scripts"]
+    assert {each["script"]: each["left_out"] for each in scripts} == {
+        "balls.py": [], "walks.py": [needed],
+    }  # fmt: skip
+
+
+def test_the_costliest_scripts_are_said_with_what_they_judge(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "floors.py").write_text(BAD)
+    main(["validate"])
+    _, _, costs = capsys.readouterr().out.partition("a figure\n")
+    judged = {line.split()[0]: line.split()[-3] for line in costs.splitlines()}
+    assert judged == {"balls": "1", "floors": "2"}
 
 
 def test_a_script_that_hangs_ends_and_says_where(

@@ -44,7 +44,7 @@ from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram
 from rtradar.scatter import build_model
 from rtradar.scatter.link_budget import link_budget
 from rtradar.signal import Noise, synthesize
-from rtradar.validate.rows import Row, judged, main, reported
+from rtradar.validate.rows import Row, judged, leave_out, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
@@ -310,7 +310,7 @@ def measure(quick: bool) -> list[Row]:
     rows = [row for preset in presets for row in pendulum_rows(rt.Radar.preset(preset))]
     folder = os.environ.get("RTRADAR_MOCAP")
     if not folder:
-        print("the walk is skipped: RTRADAR_MOCAP names no folder of recordings", file=sys.stderr)
+        leave_out("a recorded walk", "RTRADAR_MOCAP, the folder of recordings")
         return rows
     body = walk(Path(folder))
     for preset in presets:

@@ -32,7 +32,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion.formats import load_motion
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
-from rtradar.validate.rows import Row, main, reported
+from rtradar.validate.rows import Row, leave_out, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
@@ -223,6 +223,8 @@ def measure(quick: bool) -> list[Row]:
     folder = os.environ.get("RTRADAR_MOCAP")
     if folder:
         rows += recorded_rows(Path(folder), quick)
+    else:
+        leave_out("recordings", "RTRADAR_MOCAP, the folder of them")
     return rows
 
 

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.validate.rows import Row, judged, main, reported
+from rtradar.validate.rows import Row, judged, leave_out, main, reported
 
 Array = NDArray[np.float64]
 
@@ -306,8 +306,9 @@ def recordings(folder: Path, quick: bool) -> list[Row]:
 def measure(quick: bool) -> list[Row]:
     rows: list[Row] = []
     mocap, joints = os.environ.get("RTRADAR_MOCAP"), os.environ.get("RTRADAR_JOINTS")
-    if not mocap and not joints:
-        raise SystemExit("RTRADAR_MOCAP or RTRADAR_JOINTS must name a folder of real recordings")
+    for variable, folder in (("RTRADAR_MOCAP", mocap), ("RTRADAR_JOINTS", joints)):
+        if not folder:
+            leave_out("recordings", f"{variable}, the folder of real ones")
     if mocap:
         take = Path(mocap) / "cmu/135_02.amc"
         asf = rt.load_motion(take, skeleton=take.with_name("135.asf"))

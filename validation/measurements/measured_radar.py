@@ -40,7 +40,7 @@ from scipy.optimize import isotonic_regression
 
 import rtradar as rt
 from rtradar.scatter import MODELS, register_model
-from rtradar.validate.rows import Row, judged, main, reported
+from rtradar.validate.rows import Row, judged, leave_out, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parent))
 
@@ -287,7 +287,8 @@ def longest(person: int, most: int | None = None) -> list[Take]:
 def measure(quick: bool) -> list[Row]:
     warnings.simplefilter("ignore", rt.ValidityWarning)
     if not at_hand():
-        return [reported("MARS", "frames at hand (RTRADAR_MEASURED is not set)", "1", 0.0)]
+        leave_out("MARS", "RTRADAR_MEASURED, the folder of mars/")
+        return []
     learnt = Person(takes_of(1), 1)
     if quick:
         asked = Person(longest(3, 60), 2)

@@ -1,7 +1,7 @@
 """Levels of fidelity in rooms: a wall's bounce by brute force, and the living room path by path.
 
 Brute force: a person beside a conducting sheet, by vector physical optics of both, without images.
-The antenna's wave drives currents on the sheet, sampled four or five times a wavelength and
+The antenna's wave drives currents on the sheet, sampled up to five times a wavelength and
 tapered to its edges; these radiate to every point of the body, where they drive the currents of
 physical optics on what faces both ways and is not behind another ellipsoid; and those are received
 by reciprocity, directly or over the sheet. `physical-optics` over its wall must give the same.
@@ -204,7 +204,7 @@ def bounce_rows(quick: bool) -> Iterator[Row]:
         found = field_of(echoes, np.array([frequency]))[0, 0, 0]
         at = body.at(np.array([0.5 * radar.chirp_interval_s]))
         bodies = rt.Ellipsoids(at.centres[0], at.frames[0], at.semi_axes)
-        points = (6.0, 4.0) if quick else (8.0, 5.0)
+        points = (6.0, 2.5) if quick else (8.0, 5.0)
         truth = brute_force(bodies, 2 * pi * frequency / SPEED_OF_LIGHT, *points)
         for name, expected in truth.items():
             ratio = found[names == name].sum() / np.conj(expected)

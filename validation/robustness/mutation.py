@@ -34,7 +34,9 @@ import json
 import os
 import random
 import re
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -51,8 +53,9 @@ EQUIVALENT = Path(__file__).with_name("mutation_equivalent.json")
 MOST_FILES, MOST_SECONDS = 4, 25.0
 """Test files for one module, nearest first, and the time for a mutant's tests of one file [s]."""
 
-LIMIT_S, COMPILING_S = 60.0, 120.0
-"""A mutant that takes longer counts as noticed; one that must compile first has more time [s]."""
+LIMIT_S, COMPILING_S, HANGING_S = 90, 180, 1200
+"""A mutant whose tests take more processor time counts as noticed; one that must compile first has
+more. Time by the clock is hardly limited, so that what runs beside notices no mutant [s]."""
 
 OPERATORS = {
     ast.Add: ("+", "-"),
@@ -390,7 +393,10 @@ class Tree:
             out = self._root.parent / "trace.json"
             out.unlink(missing_ok=True)
             self._pytest(
-                [test_file, "-p", "mutation_trace"], self._cache, 600, {"MUTATION_TRACE": str(out)}
+                [test_file, "-p", "validation.robustness.mutation_trace"],
+                self._cache,
+                1800,
+                {"MUTATION_TRACE": str(out)},
             )
             found = json.loads(out.read_text()) if out.exists() else {}
             self._traced[test_file] = {
@@ -489,7 +495,7 @@ class Tree:
         return "survived" if count else "untested", "", count
 
     def _pytest(
-        self, arguments: list[str], cache: Path, limit_s: float, more: dict[str, str]
+        self, arguments: list[str], cache: Path, limit_s: int, more: dict[str, str]
     ) -> tuple[int | None, str]:
         environment = {
             name: value
@@ -516,14 +522,15 @@ class Tree:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s)),
         )
         try:
-            said, _ = run.communicate(timeout=limit_s)
+            said, _ = run.communicate(timeout=HANGING_S)
         except subprocess.TimeoutExpired:
             os.killpg(run.pid, 9)
             run.communicate()
             return None, ""
-        return run.returncode, said
+        return None if run.returncode == -signal.SIGKILL else run.returncode, said
 
 
 def outcomes(

@@ -4,7 +4,7 @@ Each run has a process of its own: short ones, long ones, and one whose threads 
 Memory must stay below 3 GB at 77 GHz and must not grow with the recording. Seconds are reported,
 because they depend on the machine.
 
-    python validation/cost/memory.py [--quick] [--json FILE]
+    python validation/robustness/memory.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -251,7 +251,7 @@ def measure(quick: bool) -> list[Row]:
             )
     rows += long_runs(*((6.0, 30.0) if quick else (30.0, 300.0)))
     rows += starved(1.5 if quick else 3.0)
-    rows += reading(60.0, 600.0 if quick else 3600.0)
+    rows += reading(60.0, 300.0 if quick else 3600.0)
     return rows
 
 
