@@ -440,7 +440,8 @@ def test_what_the_fuzzer_found_in_asf_and_bvh(tmp_path: Path) -> None:
         load_motion(tmp_path / "x.amc", tmp_path / "x.asf")
     (tmp_path / "x.bvh").write_text(BVH.replace("0.01", "1e-320"))
     with pytest.raises(
-        InputError, match="Frame Time: needs a positive number of seconds, 1e-06 to 10"
+        InputError,
+        match=r"Frame Time: is .*; it needs the positive seconds of a frame, 1e-06 to 10",
     ):
         load_motion(tmp_path / "x.bvh")
 

@@ -134,7 +134,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     read = cache(load_motion)  # a recording of two activities is given twice
     hide = None if spec.recordings else True
     for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
-        motion = read(recorded.path, skeleton=recorded.skeleton)
+        motion = read(recorded.path, skeleton=recorded.skeleton, **recorded.said)
         copies = 1 + (spec.augmented.copies if spec.augmented else 0)
         count = len(intervals) + copies * recorded.intervals.most(motion.duration_s)
         check_samples(count, len(spec.combinations))
@@ -207,6 +207,7 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
         seed = _seed(spec.run.seed, content, start_s)
         parameters = {
             "recording": recorded.name,
+            **recorded.said,
             "recording_digest": content,
             "source": "recorded",
             "subject": recorded.subject,

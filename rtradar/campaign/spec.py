@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rtradar.campaign.augmentation import Augmented
@@ -51,7 +52,10 @@ class Actor(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """One recording: ``name`` as in the file, ``path`` and ``skeleton`` as absolute paths."""
+    """One recording: ``name`` as in the file, ``path`` and ``skeleton`` as absolute paths.
+
+    ``said`` is what the specification says of unit, axis and rate.
+    """
 
     name: str
     path: Path
@@ -60,6 +64,7 @@ class Recorded(NamedTuple):
     subject: str
     licence: str
     intervals: Intervals
+    said: Mapping[str, Any] = MappingProxyType({})
 
 
 class Combination(NamedTuple):

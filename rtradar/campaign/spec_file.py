@@ -40,6 +40,7 @@ from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
 from rtradar.process import WindowFunctions
 from rtradar.radar import Radar
+from rtradar.recordings import SAID, said_of
 from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
@@ -89,7 +90,10 @@ _TOP = (
     "recordings",
 )
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
-_RECORDING = ("file",), ("label", "subject", "licence", "skeleton", *INTERVAL_KEYS)
+_RECORDING = (
+    ("file",),
+    ("label", "subject", "licence", "skeleton", *SAID, *INTERVAL_KEYS),
+)
 _MOST = 1_000_000
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
@@ -424,12 +428,14 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Re
         if key in table
     }
     own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
+    said = wrong.of(said_of, place, table)
     intervals = wrong.of(Intervals.read, place, {**windows, **own})
     if "label" not in texts and "{label}" not in texts["file"]:
         wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
     matches = wrong.of(matching_files, where, texts["file"], folder) if texts["file"] else None
     wrong.check()
     assert intervals is not None  # for else there are complaints
+    assert said is not None
     found = []
     for name, fields in matches or ():
         values = {"subject": UNKNOWN, "licence": UNKNOWN, **texts, **fields}
@@ -440,7 +446,8 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Re
         about = {key: values[key] for key in ("label", "subject", "licence")}
         for key in fields:
             wrong.of(check_text, place, key, fields[key])
-        found.append(Recorded(name, folder / name, skeleton, intervals=intervals, **about))
+        path = folder / name
+        found.append(Recorded(name, path, skeleton, intervals=intervals, said=said, **about))
     wrong.check()
     return found
 

@@ -16,20 +16,24 @@ from rtradar.cli.values import (
     QUIET_HELP,
     add_command,
     add_files,
+    axis,
     breathing,
     decibels,
     decibels_below,
     number,
     path,
     place_at,
+    rate,
     say,
     seconds,
     setting,
     show_page,
+    unit,
     whole,
     window,
 )
 from rtradar.errors import InputError
+from rtradar.recordings import UNITS_M, UPWARD
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
@@ -168,6 +172,25 @@ def _add_capture(command: OneLineParser) -> None:
         type=path,
         action="append",
         default=[],
+    )
+    command.option(
+        "--up",
+        "AXIS",
+        f"axis of recordings that is up: {', '.join(UPWARD)} (default: found from who stands)",
+        type=axis,
+    )
+    command.option(
+        "--unit",
+        "NAME|X",
+        f"length unit of recordings: {', '.join(UNITS_M)}, or metres (default: the file's, or "
+        "found from the person's stature)",
+        type=unit,
+    )
+    command.option(
+        "--rate",
+        "HZ",
+        "frames a second of recordings (default: the file's; 120 of an .amc)",
+        type=rate,
     )
     command.option(
         "--radar",
@@ -404,7 +427,13 @@ def _people(options: argparse.Namespace, skeletons: Mapping[str, Path]) -> list[
                 duration_s=options.start_s + duration_s,
             )
         else:
-            motion = load_motion(name, skeleton=skeletons.get(name))
+            motion = load_motion(
+                name,
+                skeleton=skeletons.get(name),
+                up=options.up or "auto",
+                unit=options.unit,
+                rate_hz=options.rate,
+            )
         motions.append(motion)
     if not options.at:
         return [*motions]

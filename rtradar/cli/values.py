@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from rtradar.errors import InputError
+from rtradar.recordings import UNITS_M, UPWARD, check_rate, check_unit, check_up
 
 if TYPE_CHECKING:
     from rtradar.settings import Breathing
@@ -193,6 +194,24 @@ def place_at(text: str) -> dict[str, Any]:
     if len(heading) > 1:
         raise ValueError
     return {"position_m": (x, y)} | ({"heading_deg": heading[0]} if heading else {})
+
+
+@_named(f"axis: {', '.join(UPWARD)}")
+def axis(text: str) -> str | None:
+    """Read the axis of a file that is up."""
+    return check_up("--up", text)
+
+
+@_named(f"unit: {', '.join(UNITS_M)}, or the metres of one")
+def unit(text: str) -> float | None:
+    """Read a length unit [m]."""
+    return check_unit("--unit", text)
+
+
+@_named("number of frames a second, 1 to 100000")
+def rate(text: str) -> float | None:
+    """Read the rate of a recording [Hz]."""
+    return check_rate("--rate", float(text))
 
 
 @_named("amplitude [mm] and rate [Hz], such as 3,0.25")

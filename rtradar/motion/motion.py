@@ -68,6 +68,8 @@ class Motion:
         Duration, where the motion ends before its last frame [s].
     girth : float
         Thickness of the subject relative to the nominal body.
+    notes : tuple of str
+        What was found of the recording, or assumed: unit, up, rate, largest speed.
 
     Raises
     ------
@@ -102,6 +104,7 @@ class Motion:
     first_frame_s: float = 0.0
     length_s: float | None = None
     girth: float = 1.0
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.errors import InputError
+from rtradar.recordings import SAID, said_of
 from rtradar.settings import Breathing
 from rtradar.system.checks import (
     Table,
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.motion import Motion
 
-KEYS = "skeleton position_m heading_deg start_s body material breathing seed duration_s"
+KEYS = "skeleton up unit rate_hz position_m heading_deg start_s body material breathing seed"
+KEYS += " duration_s"
 """Keys that a person may have beside ``motion``."""
 
 SYNTHETIC = "synthetic:"
@@ -77,7 +79,7 @@ def people_of(table: Table, folder: Path) -> tuple[Person, ...]:
         own = {
             key: value
             for key, value in entry.items()
-            if key not in ("motion", "skeleton", "breathing", *_OF_ACTORS)
+            if key not in ("motion", "skeleton", "breathing", *SAID, *_OF_ACTORS)
         }
         try:
             if "breathing" in entry:
@@ -95,8 +97,9 @@ def _motion(entry: Table, folder: Path) -> Motion:
 
     name = check_text("person", "motion", entry["motion"])
     if name.startswith(SYNTHETIC):
-        if "skeleton" in entry:
-            raise InputError(f"{name}: a synthetic actor has its own skeleton; leave skeleton out")
+        for key in ("skeleton", *SAID):
+            if key in entry:
+                raise InputError(f"{name}: only a recording has it; leave {key} out")
         asked = entry.get("duration_s", _ACTOR_S)
         duration_s = check_number("person", "duration_s", asked, 0.0, _LONGEST_S)
         activity = name.removeprefix(SYNTHETIC)
@@ -114,4 +117,5 @@ def _motion(entry: Table, folder: Path) -> Motion:
                     "recording beside it or below"
                 )
             paths[key] = folder / text
-    return load_motion(paths["motion"], skeleton=paths.get("skeleton"))
+    said = said_of("people", entry)
+    return load_motion(paths["motion"], skeleton=paths.get("skeleton"), **said)

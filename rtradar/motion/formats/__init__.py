@@ -7,45 +7,67 @@ from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
+from rtradar.recordings import check_rate, check_unit, check_up
 from rtradar.system.registries import READERS, reader_of
 
 register_reader = READERS.register
 
 
 def load_motion(
-    path: str | Path, skeleton: str | Path | None = None, *, unit_m: float | None = None
+    path: str | Path,
+    skeleton: str | Path | None = None,
+    *,
+    up: str = "auto",
+    unit: str | float | None = None,
+    rate_hz: float | None = None,
+    unit_m: float | None = None,
 ) -> Motion:
     """Read a motion-capture recording.
+
+    What its file does not say is found from the person: the unit by the stature, up by who stands
+    on a floor. What contradicts the format is warned of.
 
     Parameters
     ----------
     path : path
-        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and
-        HDM05, ``.npz`` and ``.csv`` with joint positions, or an ending of `READERS`.
+        ``.amc`` (with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and HDM05,
+        ``.npz`` and ``.csv`` with joint positions, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
+    up : {"auto", "x", "y", "z", "-x", "-y", "-z"}
+        Axis of the file that is up.
+    unit : {"m", "cm", "mm", "in", "cmu"} or float, optional
+        Length unit of the file, or the metres of one; an ``.asf`` says it itself.
+    rate_hz : float, optional
+        Frames a second, in place of those that the file says; an ``.amc`` does not say them, and is
+        taken for 120 Hz [Hz].
     unit_m : float, optional
-        Metres in one length unit of a ``.bvh``, which does not say; found from the person's size
-        where not given. A ``.c3d`` needs it only where it does not say, joint positions only where
-        they are not in metres.
+        Another name of ``unit`` [m].
 
     Returns
     -------
     Motion
         World axes (y-up mocap (z, x, y) becomes (x, y, z)), metres, not yet placed before a radar.
+        Its ``notes`` say what was found.
 
     Raises
     ------
     InputError
-        One line that names the file and, inside it, the line.
+        One line that names the file and, inside it, the line; and the option that tells, where two
+        readings are as good as each other.
     ExtensionError
         Where the reader comes from another package, and fails.
     """
     file, name = Path(path), reader_of(path, skeleton)
-    read = READERS[name]
+    read, where = READERS[name], str(file)
+    given = {
+        "skeleton": None if skeleton is None else Path(skeleton),
+        "unit_m": check_unit(where, unit if unit_m is None else unit_m),
+        "up": check_up(where, up),
+        "rate_hz": check_rate(where, rate_hz),
+    }
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters
-        given = {"skeleton": None if skeleton is None else Path(skeleton), "unit_m": unit_m}
         for option, value in given.items():
             if value is not None and option not in taken:
                 raise InputError(f"{file}: {name.upper()} files take no {option}; leave it out")

@@ -22,6 +22,7 @@ from rtradar.errors import InputError
 from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, TextFile
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternions_to_world, to_world
+from rtradar.motion.reading import settled
 from rtradar.motion.skeleton import ASF_JOINTS
 from rtradar.system.row_files import FileBackedRows
 
@@ -203,7 +204,7 @@ def _parents_first(bones: dict[str, _Bone], text: TextFile) -> tuple[_Bone, ...]
     return tuple(done.values())
 
 
-def load_amc(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: str | None) -> Motion:
     """Read an AMC file and pose its skeleton; an `InputError` names the file, line and bone.
 
     The joints of the motion are the root and the end of each bone.
@@ -212,8 +213,6 @@ def load_amc(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
         raise InputError(
             f"{path}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)"
         )
-    if unit_m is not None:
-        raise InputError(f"{path}: unit_m belongs to BVH files; an ASF skeleton states its unit")
     known = load_skeleton(skeleton)
     roots, rotations = FileBackedRows(), FileBackedRows()
     with TextFile(path, "AMC motion") as text:
@@ -229,15 +228,16 @@ def load_amc(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
             rotations.append(quaternions_to_world(quaternions))
     index = {bone.name: j for j, bone in enumerate(known.bones)}
     offsets = np.array([bone.direction * bone.length * known.unit_m for bone in known.bones])
-    return Motion(
+    motion = Motion(
         name=path.stem,
         joints=tuple(index),
         parents=tuple(-1 if bone.parent is None else index[bone.parent] for bone in known.bones),
         offsets=to_world(offsets),
         root_positions=roots.rows(),
         rotations=rotations.rows(),
-        rate_hz=_RATE_HZ,
+        rate_hz=_RATE_HZ if rate_hz is None else rate_hz,
     )
+    return settled(str(path), motion, unit_m=1.0, up=up)
 
 
 def _posed(

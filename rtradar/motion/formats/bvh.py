@@ -1,4 +1,4 @@
-"""BVH motions: any channel order, positions on any joint, y up.
+"""BVH motions: any channel order, positions on any joint.
 
 The global rotation of a joint applies to the offsets of its children, so joint j of the `Motion`
 carries the rotation of its parent. End sites become joints named ``<parent>_end``, so that the
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import warnings
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,25 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, TextFile
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate, quaternions_to_world, to_world
+from rtradar.motion.reading import longest_chain, settled
 from rtradar.system.row_files import FileBackedRows, column, in_blocks
-
-UNITS_M = {
-    "metre": 1.0,
-    "CMU unit (0.45 inch)": 0.0254 / 0.45,
-    "inch": 0.0254,
-    "centimetre": 0.01,
-    "millimetre": 0.001,
-}
-"""Length units that BVH files use; the format itself has none."""
-
-_SIZE_M = (0.7, 1.5)
-"""Limits of the length of a person's bones from the root to the farthest end [m].
-
-It is 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
 
 _SHORTEST_S, _LONGEST_S = 1e-6, 10.0
 """Limits of the duration of a frame [s]."""
@@ -54,7 +43,14 @@ class _Joint:
     """Index of the joint's first channel among those of all joints."""
 
 
-def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+def load_bvh(
+    path: Path,
+    *,
+    skeleton: Path | None,
+    unit_m: float | None,
+    up: str | None,
+    rate_hz: float | None,
+) -> Motion:
     """Read a BVH file; an `InputError` names the file and the line.
 
     Position channels below the root replace the joint's offset and must be constant, but for the
@@ -64,7 +60,7 @@ def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
         raise InputError(f"{path}: a BVH file holds its own skeleton; leave {skeleton} out")
     with TextFile(path, "BVH motion") as text:
         joints = _read_hierarchy(text)
-        n_frames, rate_hz = _read_header(text)
+        n_frames, rate_hz = _read_header(text, rate_hz)
         values = _read_frames(text, n_frames, joints)
 
     top = _carrier(joints, values)
@@ -75,16 +71,6 @@ def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
         places = _places(joints[j], values)
         offsets[k] = np.median(places, axis=0)
         spreads[k] = np.linalg.norm(places - offsets[k], axis=1).max()
-    scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
-    if not 0 < scale < np.inf:
-        raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
-    for j, stretch in zip(kept, spreads * scale, strict=True):
-        if stretch > _STRETCH_M:
-            raise text.fail(
-                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be "
-                "rigid",
-                joints[j].line,
-            )
     carriers = [kept[0], *(joints[j].parent for j in kept[1:])]
     roots, rotations = FileBackedRows(), FileBackedRows()
     for (frames,) in in_blocks(values):
@@ -94,80 +80,124 @@ def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
         for ancestor in _chain(joints, top):
             parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
             places += own if parent < 0 else quaternion_rotate(quaternions[:, parent], own)
-        roots.append(to_world(places * scale))
+        roots.append(to_world(places))
         rotations.append(quaternions_to_world(quaternions[:, carriers]))
-    return Motion(
+    raw = Motion(
         name=path.stem,
         joints=tuple(joints[j].name for j in kept),
         parents=(-1, *(renumber[joints[j].parent] for j in kept[1:])),
-        offsets=to_world(offsets * scale),
+        offsets=to_world(offsets),
         root_positions=roots.rows(),
         rotations=rotations.rows(),
         rate_hz=rate_hz,
     )
+    motion = settled(str(path), raw, unit_m=unit_m, up=up)
+    scale = longest_chain(motion) / longest_chain(raw)
+    for j, stretch in zip(kept, spreads * scale, strict=True):
+        if stretch > _STRETCH_M:
+            raise text.fail(
+                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be "
+                "rigid",
+                joints[j].line,
+            )
+    return motion
+
+
+class _Words:
+    """Words of the text one after the other, wherever its lines end; braces stand alone."""
+
+    def __init__(self, text: TextFile) -> None:
+        self._text = text
+        self._words = self._read()
+        self._next: list[tuple[str, int]] = []
+        self.line = 0
+
+    def _read(self) -> Iterator[tuple[str, int]]:
+        for raw in self._text:
+            for word in raw.replace("{", " { ").replace("}", " } ").split():
+                yield word, self._text.line
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        word, self.line = self._next.pop() if self._next else next(self._words)
+        return word
+
+    def until(self, ends: Container[str]) -> list[str]:
+        """Take the words before one of these, in capitals, or all that are left."""
+        found = list[str]()
+        for word in self:
+            if word.upper() in ends:
+                self._next.append((word, self.line))
+                break
+            found.append(word)
+        return found
+
+
+_KEYS = frozenset(("ROOT", "JOINT", "END", "OFFSET", "CHANNELS", "MOTION", "{", "}"))
 
 
 def _read_hierarchy(text: TextFile) -> list[_Joint]:
     """Joints in the file's order (parents first), up to MOTION."""
     joints: list[_Joint] = []
     stack: list[int] = []
-    pending, begun = -1, False
-    for raw in text:
-        words = raw.split()
-        if not words or words[0] == "HIERARCHY":
-            begun |= bool(words)
-            continue
-        if not begun:
-            raise text.fail("no HIERARCHY before it; this is not a BVH file")
-        key = words[0].upper()
+    words = _Words(text)
+    if next(words, "").upper() != "HIERARCHY":
+        raise text.fail("no HIERARCHY at the beginning; this is not a BVH file")
+    for word in words:
+        key, line = word.upper(), words.line
         if key == "MOTION":
             if stack or not joints:
-                raise text.fail("MOTION before the hierarchy ends; a brace is missing")
+                raise text.fail("MOTION before the hierarchy ends; a brace is missing", line)
             for before, joint in itertools.pairwise(joints):
                 joint.column = before.column + len(before.channels)
             return joints
         if key in ("ROOT", "JOINT", "END"):
             if (key == "ROOT") == bool(joints):
-                raise text.fail("a BVH file must have exactly one ROOT, first")
+                raise text.fail("a BVH file must have exactly one ROOT, first", line)
             if key != "ROOT" and not stack:
-                raise text.fail(f"{words[0]} outside the braces of the root")
-            parent = stack[-1] if stack else -1
-            name = f"{joints[parent].name}_end" if key == "END" else " ".join(words[1:])
-            if not name or any(joint.name == name for joint in joints):
-                raise text.fail(f"joint {name!r}: every joint needs a name of its own")
-            joints.append(_Joint(name, parent, text.line))
+                raise text.fail(f"{word} outside the braces of the root", line)
+            name = " ".join(words.until("{"))
+            if next(words, "") != "{":
+                raise text.fail(f"{word} {name[:40]} without an opening brace", line)
+            parent, taken = stack[-1] if stack else -1, {joint.name for joint in joints}
+            if key == "END":
+                name = f"{joints[parent].name}_end"
+                # Another one is of no use to a body, but its channels would be counted.
+                while name in taken:
+                    name += "_"
+            if not name or name in taken:
+                raise text.fail(f"joint {name!r}: every joint needs a name of its own", line)
+            joints.append(_Joint(name, parent, line))
             text.check_size(len(joints))
-            pending = len(joints) - 1
-        elif key == "{":
-            if pending < 0:
-                raise text.fail("an opening brace without a joint before it")
-            stack.append(pending)
-            pending = -1
+            stack.append(len(joints) - 1)
         elif key == "}":
             if not stack:
-                raise text.fail("a closing brace too many")
+                raise text.fail("a closing brace too many", line)
             stack.pop()
         elif key == "OFFSET" and stack:
-            offset = text.numbers(words[1:])
+            offset = text.numbers(words.until(_KEYS), line)
             if len(offset) != 3:
-                raise text.fail(f"OFFSET has {len(offset)} values; it needs three")
+                raise text.fail(f"OFFSET has {len(offset)} values; it needs three", line)
             joints[stack[-1]].offset = np.array(offset)
         elif key == "CHANNELS" and stack:
-            names = tuple(word.lower() for word in words[2:])
-            whole = words[1:2] == [str(len(names))] and len(set(names)) == len(names)
+            count, *given = words.until(_KEYS) or [""]
+            names = tuple(name.lower() for name in given)
+            whole = count == str(len(names)) and len(set(names)) == len(names)
             if not whole or not all(
                 re.fullmatch("[xyz](position|rotation)", name) for name in names
             ):
                 raise text.fail(
-                    "CHANNELS needs a count and as many different Xposition ... Zrotation"
+                    "CHANNELS needs a count and as many different Xposition ... Zrotation", line
                 )
             joints[stack[-1]].channels = names
         else:
-            raise text.fail(f"{words[0][:40]!r} is not expected in a BVH hierarchy")
+            raise text.fail(f"{word[:40]!r} is not expected in a BVH hierarchy", line)
     raise text.fail("no MOTION; the file may be cut off")
 
 
-def _read_header(text: TextFile) -> tuple[int, float]:
+def _read_header(text: TextFile, rate_hz: float | None) -> tuple[int, float]:
     """Number of frames, and frames per second."""
     frames, interval = 0, 0.0
     for raw in text:
@@ -181,44 +211,64 @@ def _read_header(text: TextFile) -> tuple[int, float]:
             frames = int(count[0])
         elif [word.lower() for word in words[:2]] == ["frame", "time:"]:
             time = text.numbers(words[2:3])
-            if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
+            if rate_hz is not None:
+                interval = 1 / rate_hz
+            elif not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
+                said = f"{time[0]:g}" if time else "nothing"
                 raise text.fail(
-                    f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to "
-                    f"{_LONGEST_S:g}"
+                    f"Frame Time: is {said}; it needs the positive seconds of a frame, "
+                    f"{_SHORTEST_S:g} to {_LONGEST_S:g}, or give the frames a second (rate_hz, "
+                    "--rate)"
                 )
-            interval = time[0]
+            else:
+                interval = time[0]
         else:
             raise text.fail("Frames: and Frame Time: must come before the values")
         if frames and interval:
-            rate_hz, whole = 1 / interval, round(1 / interval)
+            found, whole = 1 / interval, round(1 / interval)
             # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
-            return frames, whole if abs(rate_hz - whole) < 1e-3 * rate_hz else rate_hz
+            return frames, whole if abs(found - whole) < 1e-3 * found else found
     raise text.fail("no Frames: or Frame Time:; the file may be cut off")
 
 
 def _read_frames(text: TextFile, n_frames: int, joints: list[_Joint]) -> NDArray[np.float64]:
-    """Values (frame, channel)."""
+    """Values (frame, channel), each frame on one line or on several."""
     width, read = joints[-1].column + len(joints[-1].channels), 0
-    values, rows = FileBackedRows(), list[list[float]]()
+    values, rows, begun = FileBackedRows(), list[list[float]](), list[float]()
+
+    def wrong(count: int, line: int | None = None) -> InputError:
+        return text.fail(
+            f"frame {read + 1} has {count} values where the hierarchy has {width} channels", line
+        )
+
     for raw in text:
-        words = raw.split()
-        if not words:
+        row = text.numbers(raw.split())
+        if begun and len(row) >= width:
+            raise wrong(len(begun), text.line - 1)
+        begun += row
+        if len(begun) < width or not row:
             continue
-        row = text.numbers(words)
-        if len(row) != width:
-            raise text.fail(
-                f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels"
-            )
-        rows.append(row)
+        if len(begun) > width:
+            raise wrong(len(begun))
+        rows.append(begun)
+        begun = []
         read += 1
         text.check_size(len(joints), read)
         if len(rows) == FRAMES_AT_ONCE:
             values.append(np.array(rows))
             rows.clear()
-    if read != n_frames:
+    if begun:
+        raise wrong(len(begun))
+    if read < n_frames:
         raise InputError(
             f"{text.path}: {read} frames where the header promises {n_frames}; the file may be "
             "cut off"
+        )
+    if read > n_frames:
+        warnings.warn(
+            f"{text.path}: {read} frames where the header promises {n_frames}; all are taken",
+            ValidityWarning,
+            stacklevel=3,
         )
     values.append(np.array(rows).reshape(-1, width))
     return values.rows()
@@ -268,17 +318,3 @@ def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
         least = 1e-6 * (1 + np.abs(joints[top].offset).max())
         if np.ptp(_places(joints[top], values), axis=0).max() > least:
             carrier = top
-
-
-def _unit(joints: list[_Joint], kept: list[int], offsets: NDArray[np.float64], path: Path) -> float:
-    distance = {kept[0]: 0.0}
-    for j, offset in zip(kept[1:], offsets[1:], strict=True):
-        distance[j] = distance[joints[j].parent] + float(np.linalg.norm(offset))
-    longest = max(distance.values())
-    fitting = [unit for unit in UNITS_M.values() if _SIZE_M[0] <= longest * unit <= _SIZE_M[1]]
-    if len(fitting) != 1:
-        raise InputError(
-            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of "
-            f"{', '.join(UNITS_M)}; give unit_m (metres a unit)"
-        )
-    return fitting[0]

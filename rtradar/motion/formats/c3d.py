@@ -10,7 +10,7 @@ import io
 import os
 import re
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +21,8 @@ from scipy.interpolate import CubicSpline
 from rtradar.errors import InputError
 from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion, runs
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import to_world
+from rtradar.motion.reading import to_world_from, warn_of_speed
+from rtradar.recordings import UPWARD
 from rtradar.system.checks import brief
 from rtradar.system.files import open_regular
 
@@ -43,7 +44,7 @@ class Markers:
     """Positions (frame, marker, 3) of some markers, world [m], NaN where one was not seen.
 
     ``first_frame`` is the number of the first frame in the file, and ``says_up`` tells whether the
-    file says which axis is up.
+    file, or the user, says which axis is up.
     """
 
     path: Path
@@ -52,6 +53,7 @@ class Markers:
     rate_hz: float
     first_frame: int
     says_up: bool
+    notes: tuple[str, ...] = ()
 
 
 class _Content(NamedTuple):
@@ -65,7 +67,7 @@ class _Content(NamedTuple):
     upward: str
 
 
-def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None, up: str | None) -> Motion:
     """Read a C3D file, and find the 22 joints of a rigid skeleton from its markers (`markers`).
 
     An `InputError` names the marker and the frames, by the file's numbers.
@@ -74,15 +76,19 @@ def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
         raise InputError(
             f"{path}: a C3D file holds markers, from which joints are found; leave {skeleton} out"
         )
-    seen = read_markers(path, NEEDED, unit_m)
+    seen = read_markers(path, NEEDED, unit_m, up)
     positions = bridged(seen)
     markers = {name: positions[:, k] for k, name in enumerate(seen.names)}
     _check_person(seen, markers)
     centres, pelvis, thorax = joint_centres(markers)
-    return rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
+    motion = rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
+    speed = warn_of_speed(str(path), motion.joints, motion.positions, seen.rate_hz)
+    return replace(motion, notes=(*seen.notes, speed))
 
 
-def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None) -> Markers:
+def read_markers(
+    path: Path, names: tuple[str, ...], unit_m: float | None = None, up: str | None = None
+) -> Markers:
     """Read some markers of a C3D file, gaps and all."""
     try:
         with (
@@ -103,6 +109,7 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
             f"{path}: not a C3D file, or a damaged one ({reason}); export it again"
         ) from None
     scale = unit_m if unit_m is not None else _UNITS_M.get(read.unit.lower(), 0.0)
+    upward = up or read.upward.lower().removeprefix("+") or "z"
     unit = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {read.unit[:20]!r}"
     for wrong, what in (
         (
@@ -117,12 +124,13 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
             "file",
         ),
         (
-            read.upward not in ("", "+Z", "+Y"),
-            f"POINT:Y_SCREEN is {read.upward[:20]!r}; +Z and +Y are understood, turn the recording",
+            upward not in UPWARD,
+            f"POINT:Y_SCREEN is {read.upward[:20]!r}, and no axis; give up, one of "
+            f"{', '.join(UPWARD)} (--up)",
         ),
         (
             not 0 < scale < np.inf,
-            f"{unit}; {', '.join(_UNITS_M)} are understood, give unit_m (metres a unit, positive)",
+            f"{unit}; {', '.join(_UNITS_M)} are understood, give the unit (unit, --unit)",
         ),
     ):
         if wrong:
@@ -131,10 +139,14 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
     # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
     unseen = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
     places = chosen[..., :3].astype(np.float64) * scale
-    if read.upward == "+Y":
-        places = to_world(places)
+    places = places @ to_world_from(upward).T
     places[unseen] = np.nan
-    return Markers(path, names, places, read.rate_hz, read.first_frame, bool(read.upward))
+    said = bool(up or read.upward)
+    notes = (
+        f"unit: {scale:g} m, as {'given' if unit_m is not None else 'POINT:UNITS says'}",
+        f"up: {upward}, as {'given' if up else 'POINT:Y_SCREEN says' if said else 'usual'}",
+    )
+    return Markers(path, names, places, read.rate_hz, read.first_frame, said, notes)
 
 
 def bridged(seen: Markers) -> NDArray[np.float64]:
@@ -220,5 +232,5 @@ def _check_person(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> Non
     if above < _UPRIGHT_M and not seen.says_up:
         raise InputError(
             f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to "
-            "tell what is up, give one who stands, or POINT:Y_SCREEN (+Z or +Y)"
+            "tell what is up, give one who stands, or up (--up)"
         )

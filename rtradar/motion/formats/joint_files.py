@@ -21,13 +21,11 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.motion.formats.text_file import TextFile
 from rtradar.motion.skeleton import plain
+from rtradar.recordings import UPWARD
 from rtradar.system.checks import brief, check_number
 from rtradar.system.files import read_arrays
 
 Array = NDArray[np.float64]
-
-UPWARD = ("x", "y", "z", "-x", "-y", "-z")
-"""Values of ``up``."""
 
 LEAST_FRAMES = 5
 """Least number of frames, which the low-pass needs."""
@@ -36,13 +34,17 @@ _NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
 _MOST_JOINTS = 1000
 _FARTHEST_M, _LEAST_STEP_S = 1e6, 1e-6
 
+_LEAST_STEP = 0.1
+"""Least step of time over the median; a spline through places that are nearer in time would swing
+by metres."""
+
 
 @dataclass(frozen=True)
 class JointRecording:
     """Positions (frame, joint, 3) of named joints in the file's axes [m], NaN where not seen.
 
     ``times`` (frame,) ascend from 0 [s]. ``up`` is one of `UPWARD`, or empty where the file does
-    not say it.
+    not say it. ``joined`` frames were left out, for another is hardly a moment before them.
     """
 
     path: Path
@@ -50,6 +52,7 @@ class JointRecording:
     positions: Array
     times: Array
     up: str
+    joined: int = 0
 
 
 def read_npz(path: Path, unit_m: float) -> JointRecording:
@@ -166,7 +169,19 @@ def _checked(path: Path, arrays: Mapping[str, NDArray[Any]], unit_m: float) -> J
     up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
     if up and up not in UPWARD:
         raise InputError(f"{path}: up is {brief(up)}; it must be one of {', '.join(UPWARD)}")
-    return JointRecording(path, names, positions, _times(path, arrays, len(given)), up)
+    times = _times(path, arrays, len(given))
+    kept = _apart(times)
+    return JointRecording(path, names, positions[kept], times[kept], up, len(times) - kept.sum())
+
+
+def _apart(times: Array) -> NDArray[np.bool_]:
+    """Which frames (frame,) are to be kept: those a step after the last one that is kept."""
+    least = _LEAST_STEP * float(np.median(np.diff(times)))
+    kept, last = np.ones(len(times), dtype=bool), times[0]
+    for frame in range(1, len(times)):
+        kept[frame] = times[frame] - last >= least
+        last = times[frame] if kept[frame] else last
+    return kept
 
 
 def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array:

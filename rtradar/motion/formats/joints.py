@@ -30,7 +30,6 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from rtradar.errors import InputError
 from rtradar.motion.formats.joint_files import (
     LEAST_FRAMES,
-    UPWARD,
     JointRecording,
     read_csv,
     read_npz,
@@ -38,6 +37,7 @@ from rtradar.motion.formats.joint_files import (
 from rtradar.motion.formats.joint_sets import JointSet, node_positions, recognise
 from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
+from rtradar.motion.reading import found_up, stature_of, to_world_from, warn_of_speed
 from rtradar.motion.skeleton import HEAD_OF_THIGH, MINIMUM_PART_M, NODE_PARENTS, NODES
 
 Array = NDArray[np.float64]
@@ -61,15 +61,8 @@ _TIMES_TOO_LONG, _TIMES_TOO_SHORT = 1.6, 0.5
 _THIGH_M = (0.15, 0.8)
 """Limits of the length of people's thighs, children included [m]."""
 
-_UPRIGHT = 0.8
-"""Least cosine between an axis and the median direction from the ankles to the head, for that axis
-to be up."""
-
 _FOOT_OF_SHANK = 0.43
 """Ratio of the lengths from ankle to toe tip and from knee to ankle (HDM05, CMU)."""
-
-_ANKLE_OF_STATURE = 0.039
-"""Height of the ankle over that of the person (Drillis and Contini 1966)."""
 
 _NOMINAL_STATURE_M = 1.75
 """Stature of a person of girth 1."""
@@ -79,17 +72,17 @@ _TOE_HEIGHT_M, _ON_THE_FLOOR = 0.02, 0.1
 height of the lowest node, over all frames, that is a person's who stands."""
 
 
-def load_npz(path: Path, *, unit_m: float | None = None) -> Motion:
+def load_npz(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
     """Read joint positions from an archive of NumPy."""
-    return motion_of(read_npz(path, 1.0 if unit_m is None else unit_m))
+    return motion_of(read_npz(path, 1.0 if unit_m is None else unit_m), up)
 
 
-def load_csv(path: Path, *, unit_m: float | None = None) -> Motion:
+def load_csv(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
     """Read joint positions from a table with a header."""
-    return motion_of(read_csv(path, 1.0 if unit_m is None else unit_m))
+    return motion_of(read_csv(path, 1.0 if unit_m is None else unit_m), up)
 
 
-def motion_of(recording: JointRecording) -> Motion:
+def motion_of(recording: JointRecording, up: str | None = None) -> Motion:
     """Make the motion of a rigid skeleton of joints that were measured one by one."""
     where = str(recording.path)
     joint_set = recognise(where, recording.names)
@@ -99,7 +92,8 @@ def motion_of(recording: JointRecording) -> Motion:
             f"{where}: the joint of node {NODES[node]!r} is never seen; add it, or take another "
             "recording"
         )
-    nodes = nodes @ _to_world(where, nodes, recording.up).T
+    upward, how = found_up(where, nodes, given=up or recording.up)
+    nodes = nodes @ to_world_from(upward).T
     thigh = float(np.nanmedian(_length(nodes, "l_knee", "l_hip")))
     if not _THIGH_M[0] <= thigh <= _THIGH_M[1]:
         raise InputError(
@@ -114,11 +108,14 @@ def motion_of(recording: JointRecording) -> Motion:
     pelvis, thorax = (_axes(where, left, _trunk(nodes)) for left in (hips, shoulders))
     _complete(nodes, pelvis, joint_set)
     _keep_directions(where, nodes)
-    size = _stature(nodes) / _NOMINAL_STATURE_M
+    size = stature_of(nodes) / _NOMINAL_STATURE_M
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
     nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
     motion = rigid_motion(recording.path.stem, nodes, pelvis, thorax, rate_hz)
-    return dataclasses.replace(motion, girth=size)
+    notes = [how, warn_of_speed(where, NODES, motion.positions, rate_hz)]
+    if recording.joined:
+        notes.append(f"times: {recording.joined} frames hardly after another one left out")
+    return dataclasses.replace(motion, girth=size, notes=tuple(notes))
 
 
 _SIDES = ("hip", "shoulder")
@@ -136,23 +133,6 @@ def _trunk(nodes: Array) -> Array:
     """Vectors (frame, 3) from the middle of the hips to that of the shoulders."""
     hips, shoulders = (_node(nodes, f"l_{at}") + _node(nodes, f"r_{at}") for at in _SIDES)
     return np.asarray((shoulders - hips) / 2)
-
-
-def _to_world(where: str, nodes: Array, up: str) -> Array:
-    """Rotation (3, 3) from the axes of the file to the world's, whose z is up."""
-    if not up:
-        ankles = (_node(nodes, "l_ankle") + _node(nodes, "r_ankle")) / 2
-        upright = np.nanmedian(_node(nodes, "head") - ankles, axis=0)
-        upright /= max(float(np.linalg.norm(upright)), 1e-12)
-        axis = int(np.argmax(np.abs(upright)))
-        if abs(upright[axis]) < _UPRIGHT:
-            raise InputError(
-                f"{where}: up is unknown, for in the median the head is not above the ankles "
-                f"along an axis; give up, one of {', '.join(UPWARD)}"
-            )
-        up = ("-" if upright[axis] < 0 else "") + "xyz"[axis]
-    cyclic = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
-    return np.diag([1.0, -1.0, -1.0]) @ cyclic if up[0] == "-" else cyclic
 
 
 def _drop_lost(nodes: Array, times: Array) -> None:
@@ -297,17 +277,3 @@ def _lengthened(bone: Array, along: Array, wanted: Array | float) -> Array:
     """Add to bones (frame, 3) what they lack in length, along other directions."""
     lacking = wanted - np.linalg.norm(bone, axis=1, keepdims=True)
     return np.asarray(bone + np.maximum(lacking, 0) * along)
-
-
-def _stature(nodes: Array) -> float:
-    """Height of the person: what legs, trunk and head add up to, in medians."""
-    legs = [
-        np.median(_length(nodes, f"{side}_{first}", f"{side}_{last}"))
-        for side in "lr"
-        for first, last in (("hip", "knee"), ("knee", "ankle"))
-    ]
-    trunk = np.linalg.norm(_trunk(nodes), axis=1)
-    shoulders = (_node(nodes, "l_shoulder") + _node(nodes, "r_shoulder")) / 2
-    head = np.linalg.norm(_node(nodes, "head") - shoulders, axis=1)
-    whole = sum(legs) / 2 + np.median(trunk) + np.median(head)
-    return float(whole) / (1 - _ANKLE_OF_STATURE)

@@ -6,6 +6,7 @@ import codecs
 import io
 import math
 import os
+import re
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Self
@@ -53,7 +54,7 @@ class TextFile:
         """Make an error at a line, counted from 1; by default at the one that was read last."""
         return InputError(f"{self.path}, line {self.line if line is None else line}: {what}")
 
-    def numbers(self, words: list[str]) -> list[float]:
+    def numbers(self, words: list[str], line: int | None = None) -> list[float]:
         """Convert words to finite floats of a size that motion can have."""
         try:
             values = [float(word) for word in words]
@@ -61,7 +62,7 @@ class TextFile:
             values = [math.nan]
         if not sum(map(abs, values)) <= _LARGEST:  # which NaN and infinity are not, either
             for complaint in filter(None, map(_complaint, words)):
-                raise self.fail(complaint)
+                raise self.fail(complaint, line)
         return values
 
     def check_size(self, joints: int, frames: int = 1) -> None:
@@ -123,6 +124,8 @@ def _complaint(word: str) -> str:
     try:
         value = float(word)
     except ValueError:
+        if re.fullmatch(r"[-+]?\d*,\d+", word):
+            return f"{word[:40]!r} has a decimal comma; export the file with decimal points"
         return f"{word[:40]!r} is not a number"
     if not math.isfinite(value):
         return f"{word[:40]!r}: values must be finite; repair or cut this frame"

@@ -128,7 +128,7 @@ def test_unit_is_found(tmp_path: Path, unit_m: float) -> None:
         ),
         ("10 100 20", "10 nan 20", ["line 20", "finite"]),
         ("10 100 20", "10 x 20", ["line 20", "'x'"]),
-        ("-50", "-5000", ["unit_m"]),
+        ("-50", "-5000", ["--unit"]),
         (BVH[BVH.index("MOTION") :], "", ["cut off"]),
     ],
 )

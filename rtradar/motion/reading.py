@@ -1,0 +1,391 @@
+"""What a recording of a person means: its unit, which axis is up, and what no person can do.
+
+Files of motion rarely say it, and say it wrongly. All formats are looked at alike, by the 22 nodes
+of the person: a unit by the stature, up by who stands on a floor, frames by their speed. What is
+found is kept in ``Motion.notes`` and shown; what contradicts the format is warned of; and where two
+readings are as good as each other, an `InputError` names the option that tells.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import quaternion_multiply
+from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.recordings import UNITS_M, UPWARD
+from rtradar.system.row_files import file_backed, in_blocks
+
+Array = NDArray[np.float64]
+
+STATURE_M, _ADULT_M = (0.7, 2.2), (1.4, 2.05)
+"""Limits of the stature of people, small children included, and of adults [m]."""
+
+FASTEST_M_S = 30.0
+"""No joint of a person is faster: a boxer's fist and a kicker's foot reach 10 to 25 m/s [m/s]."""
+
+_ANKLE_OF_STATURE = 0.039
+"""Height of the ankle over that of the person (Drillis and Contini 1966)."""
+
+_CHAIN_OF_STATURE, _NOMINAL_STATURE_M = 0.64, 1.75
+"""Length of the bones from the root to the farthest end over the stature (0.56 to 0.72, more where
+that end is a finger's), and a stature [m]."""
+
+_LOOKED_AT = 400
+"""The most frames from which unit and up are found."""
+
+_UPRIGHT = 0.8
+"""Least cosine between an axis and the direction from the ankles to the head of who is upright."""
+
+_SOMETIMES, _MOSTLY = 0.1, 0.5
+"""Fractions of the frames."""
+
+_STEADY, _ON_ZERO = 0.25, 0.1
+"""Over the stature: how much the lowest joint may rise and fall on a floor, and how near to zero a
+floor is that the file's axes stand upon."""
+
+_FREE, _TRAVELS = 0.02, 0.3
+"""Range of the pelvis over the stature, along both level axes or along one, of who does not lie."""
+
+_ARMS_LEVEL = 0.94
+"""Least cosine between the arms and the line of the shoulders in a T-pose: 20 degrees."""
+
+_LONGEST_POSE_S, _T_POSE_M_S, _T_POSE_TIMES = 2.0, 10.0, 4.0
+"""A T-pose before the motion lasts at most so long [s]; the hands leave it faster than this [m/s],
+and so many times as fast as they move in nearly all frames after it."""
+
+
+def node(nodes: Array, name: str) -> Array:
+    """Positions (frame, 3) of a node among all (frame, node, 3)."""
+    return nodes[:, NODES.index(name)]
+
+
+def stature_of(nodes: Array) -> float:
+    """Height of the person: what legs, trunk and head add up to, in medians, NaN left out."""
+
+    def span(first: Array, last: Array) -> float:
+        return float(np.nanmedian(np.linalg.norm(first - last, axis=1)))
+
+    def middle(of: str) -> Array:
+        return (node(nodes, f"l_{of}") + node(nodes, f"r_{of}")) / 2
+
+    legs = [
+        span(node(nodes, f"{side}_{first}"), node(nodes, f"{side}_{last}"))
+        for side in "lr"
+        for first, last in (("hip", "knee"), ("knee", "ankle"))
+    ]
+    trunk = span(middle("shoulder"), middle("hip"))
+    head = span(node(nodes, "head"), middle("shoulder"))
+    return (sum(legs) / 2 + trunk + head) / (1 - _ANKLE_OF_STATURE)
+
+
+# -- the unit --------------------------------------------------------------------------------------
+
+
+def found_unit(where: str, stature: float) -> tuple[float, str]:
+    """Find the unit [m] in which a person has this stature, and say how.
+
+    Of the units that make a person, that of an adult counts; children of whom nothing else is known
+    are refused where another unit makes an adult of them, too.
+    """
+    for low, high in (_ADULT_M, STATURE_M):
+        fitting = {name: unit for name, unit in UNITS_M.items() if low <= stature * unit <= high}
+        if len(fitting) == 1:
+            ((name, unit),) = fitting.items()
+            return unit, f"unit: {name}, for the person is {stature * unit:.2f} m tall then"
+        if fitting:
+            break
+    tall = [f"{stature * unit:.3g} m in {name}" for name, unit in UNITS_M.items()]
+    raise InputError(
+        f"{where}: a person of {stature:.4g} units would be {', '.join(tall)} tall; give the unit "
+        "(unit, --unit: {', '.join(UNITS_M)}, or metres)"
+    )
+
+
+def check_unit(where: str, stature_m: float, unit_m: float) -> None:
+    """Warn where a given unit makes nobody's stature."""
+    if not STATURE_M[0] <= stature_m <= STATURE_M[1]:
+        warnings.warn(
+            f"{where}: with a unit of {unit_m:g} m the person is {stature_m:.3g} m tall",
+            ValidityWarning,
+            stacklevel=3,
+        )
+
+
+# -- up --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Stance:
+    """How a person stands if a direction is up: fractions of frames, and of the stature."""
+
+    up: str
+    upright: float
+    sway: float
+    floor: float
+    free: bool
+
+    @property
+    def steady(self) -> bool:
+        return self.sway < _STEADY
+
+    @property
+    def on_zero(self) -> bool:
+        return self.floor < _ON_ZERO
+
+
+def _stances(nodes: Array) -> dict[str, _Stance]:
+    size = stature_of(nodes)
+    ankles = (node(nodes, "l_ankle") + node(nodes, "r_ankle")) / 2
+    body = node(nodes, "head") - ankles
+    with np.errstate(invalid="ignore", divide="ignore"):
+        body = body / np.linalg.norm(body, axis=1, keepdims=True)
+    found = {}
+    for up in UPWARD:
+        axis, sign = "xyz".index(up[-1]), -1.0 if up[0] == "-" else 1.0
+        low = np.nanmin(sign * nodes[..., axis], axis=1)
+        least, middle, most = np.nanquantile(low, (0.1, 0.5, 0.9))
+        level = np.delete(nodes[:, 0], axis, axis=1)
+        free = np.nanquantile(level, 0.95, axis=0) - np.nanquantile(level, 0.05, axis=0)
+        upright = float(np.nanmean(sign * body[:, axis] > _UPRIGHT))
+        found[up] = _Stance(
+            up,
+            upright,
+            float(most - least) / size,
+            abs(float(middle)) / size,
+            bool((free > _FREE * size).all() or free.max() > _TRAVELS * size),
+        )
+    return found
+
+
+def found_up(where: str, nodes: Array, *, given: str = "", usual: str = "") -> tuple[str, str]:
+    """Find which axis of a file is up, and say how.
+
+    Parameters
+    ----------
+    where : str
+        The file, for messages.
+    nodes : (frame, node, 3) float64
+        Nodes of the person, in the axes of the file; NaN where not seen.
+    given : str
+        Axis that the file or the user says, one of `UPWARD`; believed, with a warning where the
+        person lies by it and would stand by another.
+    usual : str
+        Axis that the format has.
+
+    Returns
+    -------
+    up, how : str
+    """
+    seen = nodes[~np.isnan(nodes[..., 0]).all(axis=1)]
+    stances = _stances(seen[:: max(1, len(seen) // _LOOKED_AT)])
+    upright = max(stances.values(), key=lambda one: one.upright)
+    if given:
+        own = stances[given]
+        sure = upright.upright > _MOSTLY and upright.steady and (upright.on_zero or upright.free)
+        if own.upright < _SOMETIMES and sure and not own.steady:
+            warnings.warn(
+                f"{where}: with {given} up, as given, the person lies and drifts; with "
+                f"{upright.up} up they stand on a floor",
+                ValidityWarning,
+                stacklevel=3,
+            )
+        return given, f"up: {given}, as given"
+    if usual:
+        return _up_of_format(where, stances, upright, stances[usual])
+    standing = [one for one in stances.values() if one.upright >= _SOMETIMES]
+    for narrower in ("steady", "on_zero"):
+        if len(standing) > 1:
+            standing = [one for one in standing if getattr(one, narrower)]
+    if len(standing) == 1 and (standing[0].on_zero or standing[0].free):
+        up = standing[0].up
+        return up, f"up: {up}, for along it the person stands on a floor"
+    raise InputError(
+        f"{where}: up is unknown, for nobody who moves stands on a floor along one axis alone (who "
+        f"lies in bed looks like who stands); give up, one of {', '.join(UPWARD)} (--up)"
+    )
+
+
+def _up_of_format(
+    where: str, stances: Mapping[str, _Stance], upright: _Stance, own: _Stance
+) -> tuple[str, str]:
+    """Up where the format has an axis, which files of some programs do not keep to."""
+    if own.upright >= _MOSTLY or upright.upright < _MOSTLY:
+        return own.up, f"up: {own.up}, as the format has it"
+    good = [one for one in (own, upright) if one.steady]
+    if len(good) == 2:
+        good = [one for one in good if one.on_zero]
+    if len(good) != 1:
+        raise InputError(
+            f"{where}: the person lies if {own.up} is up, as the format has it, and stands if "
+            f"{upright.up} is, with a floor in neither or in both; give up (--up {own.up} or "
+            f"--up {upright.up})"
+        )
+    (best,) = good
+    if best is own:
+        return own.up, f"up: {own.up}, as the format has it; the person lies on a floor"
+    text = f"up: {best.up}, not {own.up} as the format has it, for along it the person stands"
+    warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=4)
+    return best.up, text
+
+
+def to_world_from(up: str) -> Array:
+    """Rotation (3, 3) from the axes of a file, one of which is up, to the world's."""
+    cyclic = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
+    return np.diag([1.0, -1.0, -1.0]) @ cyclic if up[0] == "-" else cyclic
+
+
+# -- frames ----------------------------------------------------------------------------------------
+
+
+def leading_t_pose(nodes: Array, rate_hz: float) -> int:
+    """Count the frames of a T-pose before the motion, from which the hands jump away [m]."""
+    hands = nodes[:, [NODES.index("l_wrist"), NODES.index("r_wrist")]]
+    speed = np.linalg.norm(np.diff(hands, axis=0), axis=2).max(axis=1) * rate_hz
+    jumps = np.flatnonzero(speed[: round(_LONGEST_POSE_S * rate_hz)] > _T_POSE_M_S)
+    if not len(jumps) or jumps[0] + 2 >= len(speed):
+        return 0
+    count, after = int(jumps[0]) + 1, speed[jumps[0] + 1 :]
+    sudden = speed[jumps[0]] > _T_POSE_TIMES * float(np.quantile(after, 0.99))
+    return count if sudden and _in_t_pose(nodes[:count]) else 0
+
+
+def _in_t_pose(nodes: Array) -> bool:
+    across = node(nodes, "l_shoulder") - node(nodes, "r_shoulder")
+    across = across / np.linalg.norm(across, axis=1, keepdims=True)
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        arm = node(nodes, f"{side}_wrist") - node(nodes, f"{side}_shoulder")
+        level = sign * np.sum(arm * across, axis=1) / np.linalg.norm(arm, axis=1)
+        if (level < _ARMS_LEVEL).any():
+            return False
+    return True
+
+
+def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: float) -> str:
+    """Say the largest speed of a joint, and warn where no person is so fast."""
+    fastest, joint, frame, first = 0.0, 0, 0, 0
+    before = positions[:0]
+    for (block,) in in_blocks(positions):
+        rows = np.concatenate([before, block])
+        speed = np.linalg.norm(np.diff(rows, axis=0), axis=2) * rate_hz
+        if speed.size and speed.max() > fastest:
+            at, joint = divmod(int(speed.argmax()), speed.shape[1])
+            fastest, frame = float(speed.max()), first - len(before) + at
+        before, first = rows[-1:], first + len(block)
+    text = f"largest speed: {fastest:.3g} m/s, of {names[joint]} after frame {frame + 1}"
+    if fastest > FASTEST_M_S:
+        warnings.warn(
+            f"{where}: {names[joint]} moves at {fastest:.3g} m/s after frame {frame + 1}, faster "
+            "than people do; cut or mend the recording, or check its rate and unit",
+            ValidityWarning,
+            stacklevel=3,
+        )
+    return text
+
+
+# -- motions of skeletons --------------------------------------------------------------------------
+
+
+def longest_chain(motion: Motion) -> float:
+    """Length of the bones from the root of a skeleton to its farthest end."""
+    lengths = np.linalg.norm(motion.offsets, axis=1)
+    ends = np.zeros(len(lengths))
+    for joint, parent in enumerate(motion.parents[1:], start=1):
+        ends[joint] = ends[parent] + lengths[joint]
+    return float(ends.max())
+
+
+def settled(
+    where: str, motion: Motion, *, unit_m: float | None, up: str | None, usual_up: str = "y"
+) -> Motion:
+    """Give a motion of a skeleton its unit and its world.
+
+    Parameters
+    ----------
+    where : str
+        The file, for messages.
+    motion : Motion
+        As read: lengths in units of the file, and axes as if y were up there.
+    unit_m, up : float, str, optional
+        What the user says; found where not given.
+    usual_up : str
+        Axis that the format has.
+    """
+    # Lengths that are nothing to a person are told from others at a person's size.
+    about = longest_chain(motion) / _CHAIN_OF_STATURE
+    if not about > 0:
+        raise InputError(f"{where}: no bone has a length; mend the skeleton")
+    try:
+        nodes = to_nodes(_some_frames(motion.scaled(_NOMINAL_STATURE_M / about))).positions
+    except InputError:  # names that are not known, which a body of its own may have
+        unit_m = found_unit(where, about)[0] if unit_m is None else unit_m
+        return replace(turned_up(motion.scaled(unit_m), up or usual_up), girth=motion.girth)
+    size, notes = stature_of(nodes) * about / _NOMINAL_STATURE_M, []
+    if unit_m is None:
+        unit_m, how = found_unit(where, size)
+        notes.append(how)
+    else:
+        check_unit(where, size * unit_m, unit_m)
+        notes.append(f"unit: {unit_m:g} m, as given; the person is {size * unit_m:.2f} m tall")
+    upward, how = found_up(where, nodes @ to_world_from("y"), given=up or "", usual=usual_up)
+    notes.append(how)
+    made = replace(turned_up(motion.scaled(unit_m), upward), girth=motion.girth)
+    first = to_nodes(_first_frames(made)).positions
+    dropped = leading_t_pose(first, made.rate_hz)
+    if dropped:
+        text = f"frame 1 is a T-pose: {dropped} frame{'s' * (dropped > 1)} dropped at the beginning"
+        warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=3)
+        notes.append(text)
+        made = replace(
+            made, root_positions=made.root_positions[dropped:], rotations=made.rotations[dropped:]
+        )
+    notes.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
+    return replace(made, notes=tuple(notes))
+
+
+def turned_up(motion: Motion, up: str) -> Motion:
+    """Turn a motion that was read as if y were up, where another axis is."""
+    turn = to_world_from(up) @ to_world_from("y").T
+    if (turn == np.eye(3)).all():
+        return motion
+    half = _quaternion(turn)
+    return replace(
+        motion,
+        root_positions=file_backed(roots @ turn.T for (roots,) in in_blocks(motion.root_positions)),
+        rotations=file_backed(
+            quaternion_multiply(np.broadcast_to(half, rows.shape), rows)
+            for (rows,) in in_blocks(motion.rotations)
+        ),
+    )
+
+
+def _quaternion(rotation: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(rotation).as_quat())
+
+
+def _some_frames(motion: Motion) -> Motion:
+    step = math.ceil(len(motion.root_positions) / _LOOKED_AT)
+    return replace(
+        motion,
+        root_positions=motion.root_positions[::step],
+        rotations=motion.rotations[::step],
+        length_s=None,
+    )
+
+
+def _first_frames(motion: Motion) -> Motion:
+    return replace(
+        motion,
+        root_positions=motion.root_positions[:_LOOKED_AT],
+        rotations=motion.rotations[:_LOOKED_AT],
+        length_s=None,
+    )

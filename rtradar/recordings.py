@@ -1,0 +1,63 @@
+"""What a user may say of a recording of motion whose file does not say it, or says it wrongly."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rtradar.errors import InputError
+from rtradar.system.checks import brief, check_number
+
+UNITS_M: Mapping[str, float] = {
+    "m": 1.0,
+    "cmu": 0.0254 / 0.45,
+    "in": 0.0254,
+    "cm": 0.01,
+    "mm": 0.001,
+}
+"""Length units of motion files [m]; ``cmu`` is the unit of the CMU database, 0.45 of which are an
+inch."""
+
+UPWARD = ("x", "y", "z", "-x", "-y", "-z")
+"""Axes of a file that may be up."""
+
+SAID = ("up", "unit", "rate_hz")
+"""Keys of what may be said, in TOML as in Python."""
+
+
+def check_up(where: str, value: object) -> str | None:
+    """Return the axis that is up; None where it is to be found."""
+    if value is None or value == "auto":
+        return None
+    if value not in UPWARD:
+        raise InputError(f"{where}: up = {brief(value)}; it must be one of {', '.join(UPWARD)}")
+    return str(value)
+
+
+def check_unit(where: str, value: object) -> float | None:
+    """Return the length unit [m], given by its name or its metres; None where it is to be found."""
+    if value is None or value == "auto":
+        return None
+    if isinstance(value, str):
+        if value in UNITS_M:
+            return UNITS_M[value]
+        try:
+            value = float(value)
+        except ValueError:
+            raise InputError(
+                f"{where}: unit = {brief(value)}; it must be one of {', '.join(UNITS_M)}, or the "
+                "metres of a unit"
+            ) from None
+    return check_number(where, "unit", value, 1e-6, 1e3)
+
+
+def check_rate(where: str, value: object) -> float | None:
+    """Return the frames a second [Hz]; None where the file says them."""
+    return None if value is None else check_number(where, "rate_hz", value, 1.0, 100_000.0)
+
+
+def said_of(where: str, table: Mapping[str, object]) -> dict[str, Any]:
+    """Return the keyword arguments of `load_motion` in a table of TOML, checked."""
+    for key, check in (("up", check_up), ("unit", check_unit), ("rate_hz", check_rate)):
+        check(where, table.get(key))
+    return {key: table[key] for key in SAID if key in table}
