@@ -189,6 +189,11 @@ def read_if(path: str | Path) -> IfCube:
             f"'{path}' does not tell of its radar; read it with rtradar.exchange.open_samples"
         )
     rows = found.radar.n_tx // chirps_together(found.radar)
+    if found.tx_per_cycle not in (None, rows):
+        raise InputError(
+            f"'{path}' has cycles of {found.tx_per_cycle} Tx, and its radar '{found.radar.name}' "
+            f"{rows}; read it with rtradar.exchange.open_samples, and give its radar"
+        )
     cycles = len(found) // rows
     samples = found[: cycles * rows].reshape(cycles, rows, *found.shape[1:])
     return IfCube(np.ascontiguousarray(samples), found.radar)

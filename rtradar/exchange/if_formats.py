@@ -119,7 +119,8 @@ def _rows(
     ``read`` takes the first and the last number along the first axis, ``text`` is that of a radar.
     Real samples, of a ``kind`` of numbers, become half as many complex ones.
     """
-    tx, real = shape[1] if len(shape) == 4 else 1, np.dtype(kind).kind in "iuf"
+    own, real = shape[1] if len(shape) == 4 else None, np.dtype(kind).kind in "iuf"
+    tx = own or 1
     if len(shape) not in (3, 4) or min(shape) < 1 or (real and shape[-1] % 2):
         whole = ", an even number of real samples" if real else ""
         raise ValueError(
@@ -134,7 +135,8 @@ def _rows(
         return complex_of_real(block) if real else block.astype(np.complex64)
 
     size = (shape[0] * tx, shape[-2], shape[-1] // 2 if real else shape[-1])
-    return SampleFile(path, radar_of(text) if text else None, size, rows, "m" if text else "count")
+    radar = radar_of(text) if text else None
+    return SampleFile(path, radar, size, rows, "m" if text else "count", own)
 
 
 def _put(place: Any, name: str, values: ArrayLike) -> None:
@@ -256,6 +258,7 @@ def write_zarr(path: Path, recording: IfRecording) -> dict[str, Any]:
             dtype="complex64",
             dimension_names=ROW_AXES,
             attributes={"units": IF_UNIT, "radar": recording.radar_text},
+            config={"write_empty_chunks": True},  # a chunk that is not there was lost
         )
         for first, block in recording.blocks("writing"):
             rows = block.reshape(-1, *shape[1:])

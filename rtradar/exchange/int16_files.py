@@ -158,7 +158,7 @@ def _open_plain(path: Path, radar: Radar, scale: float, shape: tuple[int, ...]) 
         parts = (words.astype(np.float64) * scale).astype(np.float32)
         return parts.view(np.complex64).reshape(last - first, *shape[2:4])
 
-    return SampleFile(path, radar, (shape[0] * shape[1], *shape[2:4]), read)
+    return SampleFile(path, radar, (shape[0] * shape[1], *shape[2:4]), read, tx_per_cycle=shape[1])
 
 
 def _words(path: Path, offset: int, count: int) -> NDArray[np.int16]:

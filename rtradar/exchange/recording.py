@@ -82,6 +82,8 @@ class SampleFile:
         Reads the chirps from a first one until before a last one, (chirp, rx, sample) complex64.
     unit : {"m", "count"}
         Unit of the samples; ``count``, the numbers of an ADC, where the file does not tell.
+    tx_per_cycle : int, optional
+        Number of the Tx in a cycle, where the file has an axis of them.
 
     Raises
     ------
@@ -94,6 +96,7 @@ class SampleFile:
     shape: tuple[int, int, int]
     read: Callable[[int, int], NDArray[np.complex64]]
     unit: Literal["m", "count"] = "m"
+    tx_per_cycle: int | None = None
     dtype = np.dtype(np.complex64)
     ndim = 3
 
@@ -259,6 +262,8 @@ def check_store(store: Path) -> Any:
     largest = _largest_file(store)
     try:
         array = zarr.open_array(store, mode="r")
+        if min((*array.chunks, *array.shape), default=0) < 1:
+            raise ValueError(f"shape {array.shape} in chunks {array.chunks}")
         chunk_bytes = math.prod(array.chunks) * np.dtype(array.dtype).itemsize
     except Exception as error:  # zarr fails in many ways on a damaged folder
         raise ValueError(in_short(error)) from None
@@ -269,6 +274,11 @@ def check_store(store: Path) -> Any:
     ):
         raise ValueError(
             f"it claims {array.nbytes:.2g} bytes in chunks {array.chunks}, as no run writes"
+        )
+    # Zarr gives zeros for what is not there.
+    if missing := array.nchunks - array.nchunks_initialized:
+        raise ValueError(
+            f"{missing} of its {array.nchunks} chunks are missing, as where a copy broke off"
         )
     return array
 

@@ -268,6 +268,12 @@ def _rows(samples: Any, radar: Radar) -> Any:
     if kind.kind != "c":
         raise InputError(f"IF samples are of type {kind}; they must be complex numbers")
     end = radar.n_rx, radar.samples_per_chirp
+    tx, own = getattr(samples, "tx_per_cycle", None), radar.n_tx // chirps_together(radar)
+    if tx not in (None, own):
+        raise InputError(
+            f"IF samples have cycles of {tx} Tx; radar '{radar.name}' has {own}: give the radar "
+            "that received them"
+        )
     if len(shape) == 4 and not sums and shape[1:] == (radar.n_tx, *end):
         return np.asarray(samples).reshape(-1, *end)
     if len(shape) != 3 or shape[1:] != end:

@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from rtradar.cli import main
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange import IF_FORMATS, export, open_samples, read_if
+from rtradar.pipeline import process_samples
 from rtradar.radar import Radar
 
 RADAR = Radar(
@@ -38,17 +39,20 @@ RADAR = Radar(
 CENTRES = (np.arange(30) + 0.5).reshape(10, 3) * 1e-4
 
 
-def make_run(folder: Path, chirps: int, seed: int = 0, chunk: int = 12) -> np.ndarray:
+def make_run(
+    folder: Path, chirps: int, seed: int = 0, chunk: int = 12, size: float = 1e-3
+) -> np.ndarray:
     """A folder with IF samples and a summary; the samples (chirp, rx, sample) are returned."""
     random = np.random.default_rng(seed)
     shape = (chirps, RADAR.n_rx, RADAR.samples_per_chirp)
     samples = (
-        (random.standard_normal((*shape, 2)) * 1e-3).astype(np.float32).view(np.complex64)[..., 0]
+        (random.standard_normal((*shape, 2)) * size).astype(np.float32).view(np.complex64)[..., 0]
     )
     folder.mkdir(parents=True, exist_ok=True)
     array = zarr.create_array(
-        folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64"
-    )
+        folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64",
+        config={"write_empty_chunks": True},
+    )  # fmt: skip
     array[:] = samples
     (folder / "summary.json").write_text(
         json.dumps({"parameters": {"radar": dataclasses.asdict(RADAR)}})
@@ -131,8 +135,7 @@ def test_int16_is_off_by_half_of_its_scale_at_most(
 
 
 def test_silence_stays_silence(tmp_path: Path) -> None:
-    make_run(tmp_path / "quiet", 6)
-    zarr.open_array(tmp_path / "quiet" / "if.zarr", mode="r+")[:] = 0
+    make_run(tmp_path / "quiet", 6, size=0.0)
     assert export(tmp_path / "quiet", tmp_path / "quiet.bin")["scale"] == 1.0
     assert not read_if(tmp_path / "quiet.bin").samples.any()
 
@@ -346,6 +349,60 @@ def test_a_file_of_something_else_is_refused(run: tuple[Path, np.ndarray], tmp_p
             read_if(tmp_path / name)
     with pytest.raises(InputError, match="are read from"):
         read_if(tmp_path / "cube.json")
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".mat", ".nc", ".zarr", ".bin"])
+def test_samples_of_other_tx_are_refused(
+    run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str
+) -> None:
+    # Four Rx a Tx and as many samples, but of three Tx where the radar that is given has two.
+    folder, cube = run
+    path = tmp_path / f"cube{suffix}"
+    if suffix == ".npy":
+        np.save(path, cube)
+    elif suffix == ".zarr":
+        zarr.create_array(path, data=cube, chunks=cube.shape)
+    else:
+        export(folder, path)
+    fewer = dataclasses.replace(RADAR, tx_y=1)
+    with pytest.raises(InputError, match="cycles of 3 Tx; radar 'small' has 2: give the radar"):
+        process_samples(open_samples(path, fewer), fewer)
+    with pytest.warns(ValidityWarning, match="nothing was detected"):
+        process_samples(open_samples(path, RADAR), RADAR)
+
+
+@pytest.mark.parametrize("place", ["run", "array"])
+def test_chunks_that_are_missing_are_no_zeros(
+    run: tuple[Path, np.ndarray], tmp_path: Path, place: str
+) -> None:
+    folder, _ = run
+    export(folder, tmp_path / "cube.zarr")
+    store = folder / "if.zarr" if place == "run" else tmp_path / "cube.zarr"
+    (store / "c" / "1" / "0" / "0").unlink()
+    with pytest.raises(InputError, match="1 of its 3 chunks are missing, as where a copy broke"):
+        open_samples(folder if place == "run" else store)
+
+
+def test_samples_that_are_zero_are_stored(tmp_path: Path) -> None:
+    make_run(tmp_path / "quiet", 24, size=0.0)
+    export(tmp_path / "quiet", tmp_path / "quiet.zarr")
+    assert not open_samples(tmp_path / "quiet.zarr")[:].any()
+
+
+def test_an_array_of_a_length_that_nobody_stored_is_refused(
+    run: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
+    path = tmp_path / "cube.zarr"
+    export(run[0], path)
+    about = json.loads((path / "zarr.json").read_text())
+    about["shape"][0] = 2**20
+    (path / "zarr.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match="chunks are missing"):
+        open_samples(path)
+    about["chunk_grid"]["configuration"]["chunk_shape"][0] = 0
+    (path / "zarr.json").write_text(json.dumps(about))
+    with pytest.raises(InputError, match="cannot read IF samples"):
+        open_samples(path)
 
 
 @given(data=st.data())

@@ -214,6 +214,7 @@ def if_array(path: Path, capture: Capture) -> Any:
         chunks=(block_chirps(radar) // together, *shape),
         dtype="complex64",
         dimension_names=("chirp", "rx", "sample"),
+        config={"write_empty_chunks": True},  # a chunk that is not there was lost
     )
     described = ("multiplexing", "chirp_duration_s", "sample_rate_hz")
     array.attrs.update({"units": "m"} | {name: getattr(radar, name) for name in described})
