@@ -35,7 +35,7 @@ from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
 from rtradar.signal.phase_noise import mean_delays
-from rtradar.signal.receiver import Expected, ReceiverStage
+from rtradar.signal.receiver import Expected, Mover, ReceiverStage
 from rtradar.system.checks import brief
 from rtradar.system.threads import one_blas_thread
 
@@ -98,6 +98,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
+    movers = _movers(radar, budget, model, echoes, n_chirps)
     inside, tones = None, model
     if radar.multiplexing == "bpm":
         tones = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
@@ -123,7 +124,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         link_budget=budget,
         warned=tuple(str(warning.message) for warning in caught),
         noise=noise,
-        receiver=_receiver(radar, budget, noise, echoes, inside, n_chirps, settings),
+        receiver=_receiver(radar, movers, noise, inside, n_chirps, settings),
         n_chirps=n_chirps,
         frame_starts=frame_starts,
         warmup_s=warmup_s,
@@ -192,26 +193,43 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
     )
 
 
+def _movers(
+    radar: Radar, budget: LinkBudget, model: EchoModel, echoes: Echoes, n_chirps: int
+) -> tuple[Mover, ...]:
+    """Power and delay of people, by the link budget and some echoes, and of each moving object."""
+    if radar.receiver is None:
+        return ()
+    objects = model.movers(n_chirps) if isinstance(model, World) else ()
+    own = np.flatnonzero(echoes.part < len(budget.part_power))
+    of_people = replace(
+        echoes,
+        length=echoes.length[..., own],
+        amplitude=echoes.amplitude[..., own],
+        part=echoes.part[own],
+        bounces=echoes.bounces[own],
+    )
+    people = Mover(sum(budget.person_power), float(mean_delays(of_people).mean()))
+    return people, *(Mover(*one) for one in objects)
+
+
 def _receiver(
     radar: Radar,
-    budget: LinkBudget,
+    movers: tuple[Mover, ...],
     noise: Noise,
-    echoes: Echoes,
     inside: Indoors | None,
     n_chirps: int,
     settings: RunSettings,
 ) -> ReceiverStage | None:
-    """Return what the receiver adds, by some echoes of people and the noise of a map's cell."""
+    """Return what the receiver adds, by what moves and the noise of a map's cell."""
     if radar.receiver is None:
         return None
     gain = 1.0
     lengths = radar.samples_per_chirp, radar.cycles_per_frame
     for window, n in zip((settings.range_window, settings.doppler_window), lengths, strict=True):
         gain *= float((weights(window, n) ** 2).sum())
-    moving_s = float(mean_delays(echoes).mean())
     return ReceiverStage(
         radar,
-        Expected(budget.power, moving_s, noise.power, noise.power * gain),
+        Expected(movers, noise.power, noise.power * gain),
         n_chirps=n_chirps,
         seed=settings.seed,
         room=inside.room if inside else None,

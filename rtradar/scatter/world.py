@@ -33,6 +33,9 @@ from rtradar.trace.room_tracer import RoomTracer
 _INSTANTS = 8
 """Chirps of a capture at which the power of an object over a wall is looked at."""
 
+_GLANCES = 64
+"""Chirps of a capture at which the largest power of an object is looked for."""
+
 LEAST_GHOST_DB = -25.0
 """Power of a ghost over that of the object's direct echoes, below which it is left out: each takes
 as long as these."""
@@ -75,6 +78,20 @@ class World:
                 found.append(replace(echoes, part=echoes.part + number))
         return together(found)
 
+    def movers(self, n_chirps: int) -> list[tuple[float, float]]:
+        """Largest power of each object over some instants [m^2], and its delay then [s].
+
+        A corner or a sheet of metal that turns towards the radar answers far above its mean.
+        """
+        chirps = np.unique(np.linspace(0, n_chirps - 1, _GLANCES).astype(np.int64))
+        found = []
+        for direct, *_ in self.objects:
+            powers = _powers(direct, chirps)
+            at = int(powers.argmax())
+            length = direct.echoes(chirps[at : at + 1]).length
+            found.append((float(powers[at]), float(length.mean()) / SPEED_OF_LIGHT_MPS))
+        return found
+
     def prune(self, radar: Radar, n_chirps: int, noise_power_m2: float) -> list[dict[str, Any]]:
         """Leave out ghosts of objects that are not worth their cost.
 
@@ -88,7 +105,7 @@ class World:
         chirps = np.unique(np.linspace(0, n_chirps - 1, _INSTANTS).astype(np.int64))
         found = []
         for number, own in enumerate(self.objects):
-            powers = [_power(path, chirps) for path in own]
+            powers = [float(_powers(path, chirps).mean()) for path in own]
             enough = max(least, powers[0] * 10 ** (LEAST_GHOST_DB / 10)) if least else 0.0
             worth = [not place or 0 < power >= enough for place, power in enumerate(powers)]
             rows = [
@@ -100,12 +117,13 @@ class World:
         return found
 
 
-def _power(path: RigidEchoes, chirps: NDArray[np.int64]) -> float:
-    """Power of the echoes [m^2], of which those next to each other add up as fields."""
+def _powers(path: RigidEchoes, chirps: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Power of the echoes (chirp,) [m^2], of which those next to each other add up as fields."""
     echoes = path.echoes(chirps)
     k = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
     turns = np.exp(1j * k[:, None, None, None] * echoes.length)
-    return float((np.abs((echoes.amplitude * turns).sum(axis=3)) ** 2).mean())
+    fields = (echoes.amplitude * turns).sum(axis=3)
+    return np.asarray((np.abs(fields) ** 2).mean(axis=(0, 2)))
 
 
 def build_world(

@@ -53,15 +53,21 @@ class Effect:
     note: str
 
 
+class Mover(NamedTuple):
+    """Power of the echoes of who or what moves [m^2], and their mean delay [s]."""
+
+    power_m2: float
+    delay_s: float
+
+
 class Expected(NamedTuple):
     """What a receiver is expected to get, in the unit of IF samples.
 
-    ``moving_m2`` is the power of the echoes that move, ``moving_s`` their mean delay. ``noise_m2``
-    is the noise of a sample, ``cell_m2`` that of a cell of a channel's map [m^2].
+    ``movers`` are people and everything else that moves. ``noise_m2`` is the noise of a sample,
+    ``cell_m2`` that of a cell of a channel's map [m^2].
     """
 
-    moving_m2: float
-    moving_s: float
+    movers: tuple[Mover, ...]
     noise_m2: float
     cell_m2: float
 
@@ -97,7 +103,8 @@ class ReceiverStage:
         window = np.hanning(shape[2] + 1)[:-1]
         profiles = np.fft.fft(around * (window / window.sum()))
         # The strongest cell, of what is still or of what moves.
-        self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), expected.moving_m2)
+        strongest = max((mover.power_m2 for mover in expected.movers), default=0.0)
+        self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), strongest)
         if self._receiver.phase_noise_hz:
             self._set_phase_noise(seed, ((*room.cycle,) if room else ()) + still)
         self._set_channels()
@@ -115,7 +122,7 @@ class ReceiverStage:
         if power_m2 > 0 and noise_m2 > 0:
             level_db = 10 * math.log10(power_m2) - 10 * math.log10(noise_m2)
         loud = power_m2 > noise_m2 * 10 ** (LEFT_OUT_DB / 10)
-        effect = Effect(name, level_db, bool(loud or (self._keep_all and power_m2 > 0)), note)
+        effect = Effect(name, level_db, bool(loud or self._keep_all), note)
         self.effects = (*self.effects, effect)
         return effect.modelled
 
@@ -155,9 +162,11 @@ class ReceiverStage:
 
     def _set_phase_noise(self, seed: int, still: tuple[Echoes, ...]) -> None:
         e = self._expected
-        noise = PhaseNoise(self._radar, self._receiver, seed, still, e.moving_s)
+        farthest_s = max((mover.delay_s for mover in e.movers), default=0.0)
+        noise = PhaseNoise(self._radar, self._receiver, seed, still, farthest_s)
         note = "residual density, where it is densest, over that of the noise"
-        if self._keep("phase_noise", noise.level_m2(e.moving_m2, e.moving_s), e.noise_m2, note):
+        level = max((noise.level_m2(*mover) for mover in e.movers), default=noise.level_m2(0, 0))
+        if self._keep("phase_noise", level, e.noise_m2, note):
             self._noise, self._fields = noise, noise.fields()
 
     def _set_channels(self) -> None:
@@ -221,12 +230,14 @@ class ReceiverStage:
         self._corners = np.zeros(0, np.float32)
         if receiver.highpass_hz:
             beat = np.arange(profiles.shape[-1]) * rate / profiles.shape[-1]
-            moving_hz = self._radar.slope_hz_per_s * e.moving_s
+            delays = np.array([mover.delay_s for mover in e.movers])
+            moving_hz = self._radar.slope_hz_per_s * delays
             of_still, of_moving = (
-                np.abs(1 - _passed(receiver.highpass_hz, np.asarray(f))) for f in (beat, moving_hz)
+                np.abs(1 - _passed(receiver.highpass_hz, f)) for f in (beat, moving_hz)
             )
             lost = float((np.abs(profiles * of_still) ** 2).max())
-            lost = max(lost, e.moving_m2 * float(of_moving) ** 2)
+            for mover, taken in zip(e.movers, of_moving, strict=True):
+                lost = max(lost, mover.power_m2 * float(taken) ** 2)
             if keep("highpass", lost, e.cell_m2, "what it takes from the strongest echo"):
                 corners = np.pi * np.array(receiver.highpass_hz) / rate
                 self._corners = corners.astype(np.float32)
@@ -248,9 +259,9 @@ class ReceiverStage:
             step = full / 2 ** (receiver.adc_bits - 1)
             if self._keep("quantisation", step**2 / 6, e.noise_m2, "white noise of rounding"):
                 self._step = np.float32(step)
-        moving, noise = math.sqrt(e.moving_m2), math.sqrt(e.noise_m2)
+        moving = sum(math.sqrt(mover.power_m2) for mover in e.movers)
         other = float(np.abs(self._steering).max())
-        most = float(abs(self._dc)) + most + other + 3 * moving + 4 * noise
+        most = float(abs(self._dc)) + most + other + 3 * moving + 4 * math.sqrt(e.noise_m2)
         beyond = max(most - full, 0.0)
         note = f"samples reach {20 * math.log10(max(most, 1e-300) / full):.1f} dB of full scale"
         if self._keep("clipping", beyond**2, e.cell_m2, note):

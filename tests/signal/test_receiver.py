@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.signal import receive
-from rtradar.signal.receiver import Expected, ReceiverStage
+from rtradar.signal.receiver import Expected, Mover, ReceiverStage
 
 RAMPS = rt.Interferer(
     start_frequency_hz=12e9, slope_hz_per_s=6.399e13, ramp_s=6.2e-5, period_s=6.25e-5, power_dbm=-60
@@ -55,7 +55,7 @@ def radar(multiplexing: str = "tdm", **fields: Any) -> rt.Radar:
 
 
 def stage(radar: rt.Radar, noise_m2: float = 0.0, **options: Any) -> ReceiverStage:
-    expected = Expected(1e-2, 4e-8, noise_m2, noise_m2 / 100)
+    expected = Expected((Mover(1e-2, 4e-8),), noise_m2, noise_m2 / 100)
     return ReceiverStage(radar, expected, n_chirps=60, **options)
 
 
@@ -90,7 +90,7 @@ def test_how_a_capture_is_cut_into_blocks_does_not_matter(
     fields = FULL if multiplexing == "fdm" else FULL | OF_ADC
     its = radar(multiplexing, **fields)
     made = stage(its)
-    assert all(effect.modelled for effect in made.effects if effect.name != "clipping")
+    assert all(effect.modelled for effect in made.effects)
     edges = sorted({0, 60, *(2 * cut for cut in cuts)})
     blocks = [received(made, its, begin, end - begin) for begin, end in pairwise(edges)]
     np.testing.assert_array_equal(np.concatenate(blocks), received(made, its, 0, 60))
@@ -109,7 +109,7 @@ def test_what_is_below_the_noise_is_left_out_and_listed() -> None:
 
 def test_everything_is_kept_on_demand() -> None:
     made = stage(radar(**FULL | OF_ADC), noise_m2=1e15, keep_all=True)
-    assert all(effect.modelled for effect in made.effects if effect.name != "clipping")
+    assert all(effect.modelled for effect in made.effects)
 
 
 def test_seeds_make_other_phase_noise_and_other_channels() -> None:
@@ -143,3 +143,27 @@ def test_a_run_lists_the_effects_of_its_receiver() -> None:
     ]
     with pytest.raises(rt.InputError, match="need the loss with distance"):
         rt.run(motion, its, spreading=False, **options)
+
+
+def test_an_object_that_moves_may_clip_the_converter() -> None:
+    # A corner reflector on a cart 2 m ahead, and somebody far behind it, whose echoes are weak.
+    fields = {"phase_noise_hz": (1e4, 1e6), "phase_noise_dbc_hz": (-80, -100)}
+    its = dataclasses.replace(
+        radar(adc_full_scale_dbm=-60.0, **fields), samples_per_chirp=256, bandwidth_hz=1e9
+    )
+    cart = rt.Object(
+        "cart", "trihedral", "metal", position_m=(-2.0, 1.0, 0.9), yaw_deg=180,
+        motion=rt.FollowingPath(velocity_mps=(-1.0, 0.0, 0.0)),
+    )  # fmt: skip
+    person = rt.Person(rt.synthetic_motion("stand", duration_s=0.02), (4.0, 0.0))
+    options: Any = {"fidelity": "specular", "duration_s": 0.01, "snr_db": 20.0}
+    alone, both = (
+        {one["name"]: one for one in rt.run(who, its, **options).summary["receiver"]}
+        for who in ([person], [person, cart])
+    )
+    assert not alone["clipping"]["modelled"]
+    assert both["clipping"]["modelled"]
+    assert both["phase_noise"]["level_db"] > alone["phase_noise"]["level_db"] + 20
+    samples = rt.simulate([person, cart], its, **options).samples.values
+    full = np.sqrt(10**-6 * 1e-3 / its.watts_per_m2)
+    assert np.abs(samples.real).max() == pytest.approx(full, rel=1e-5)

@@ -19,6 +19,7 @@ import math
 import sys
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import j0
 
 import rtradar as rt
-from rtradar.signal.receiver import Expected, ReceiverStage
+from rtradar.signal.receiver import Expected, Mover, ReceiverStage
 from rtradar.validate.rows import Row, judged, main, reported
 
 LIGHT = 299_792_458.0
@@ -53,7 +54,7 @@ def radar(n_rx: int = 1, **fields: Any) -> rt.Radar:
 
 def stage(made: rt.Radar, moving_m2: float = 1.0) -> ReceiverStage:
     """Everything that the receiver has, for there is no noise."""
-    return ReceiverStage(made, Expected(moving_m2, 1e-8, 0.0, 0.0), n_chirps=100)
+    return ReceiverStage(made, Expected((Mover(moving_m2, 1e-8),), 0.0, 0.0), n_chirps=100)
 
 
 def received(made: rt.Radar, samples: NDArray[Any]) -> NDArray[np.complex128]:
@@ -197,6 +198,36 @@ def clipping_rows() -> Iterator[Row]:
                 db(spectrum[place] / full), 0.2, reference=db(expected / full),
                 key="clipping", says=says,
             )  # fmt: skip
+
+
+def mover_rows() -> Iterator[Row]:
+    """A corner reflector on a cart, twice as strong as the converter takes, behind a weak person.
+
+    Its echo is a tone of amplitude A = sqrt(4 pi a^4 / (3 lambda^2)) / R^2, of which the fraction
+    2 / pi acos(L / A) lies beyond the limit L.
+    """
+    edge_m, range_m = 0.4, 30.0
+    made = radar(n_rx=1)
+    expected = math.sqrt(4 * math.pi * edge_m**4 / 3) / made.wavelength_m / range_m**2
+    level_dbm = db(expected / 2 / amplitude_of(made, 0.0))
+    made = replace(radar(n_rx=1, adc_full_scale_dbm=level_dbm), position_m=(0.0, 0.0, 0.0))
+    middle = edge_m / 3 * np.array([1 / math.sqrt(3), 0.0, 0.0])
+    cart = rt.Object(
+        "cart", "trihedral", "metal", position_m=tuple((range_m, 0, 0) - middle), yaw_deg=180.0,
+        motion=rt.FollowingPath(velocity_mps=(1.0, 0.0, 0.0)),
+    )  # fmt: skip
+    person = rt.Person(rt.synthetic_motion("stand", duration_s=0.03), (0.0, 100.0))
+    samples = rt.simulate(
+        [person, cart], made, snr_db=math.inf, duration_s=0.02, fidelity="specular"
+    ).samples.values
+    limit = amplitude_of(made, level_dbm)
+    beyond = float((np.abs(samples.real) > limit * (1 - 1e-5)).mean())
+    says = "samples that an object which moves takes beyond the converter's limit, as a tone does"
+    # Half a decibel of the reflector's cross-section.
+    yield judged(
+        "a corner reflector on a cart", "fraction of samples", "", beyond, 0.02,
+        reference=2 / math.pi * math.acos(0.5), key="clipping", says=says,
+    )  # fmt: skip
 
 
 def highpass_rows() -> Iterator[Row]:
@@ -347,6 +378,7 @@ def measure(quick: bool) -> list[Row]:
     warnings.simplefilter("ignore", rt.ValidityWarning)
     return [
         *phase_noise_rows(quick),
+        *mover_rows(),
         *iq_rows(),
         *quantisation_rows(quick),
         *clipping_rows(),
