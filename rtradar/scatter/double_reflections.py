@@ -7,6 +7,7 @@ person has. Mitsuba decides at keyframes what hides the three legs.
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from itertools import combinations, permutations
 from typing import Any, Literal, NamedTuple
@@ -34,11 +35,10 @@ Indices = NDArray[np.int64]
 Visible = NDArray[np.bool_]
 
 LEAST_DB = -30.0
-"""Power of a pair over that of all single reflections, below which it is left out: of a walker at
-12 GHz 14 of 240 stay (`validation/other_methods/double_reflections.py`)."""
+"""Power of a pair over that of the single reflections of its person, below which it is left out."""
 
-_INSTANTS = 50
-"""Chirps of a recording at which the power of pairs is looked at."""
+_FADE_DB = 3.0
+"""Power above that within which a pair fades in, so that none begins at once."""
 
 _CHIRPS_PER_THREAD = 16
 _KEPT, _PASSING = 2048, 2
@@ -111,25 +111,28 @@ def solve_doubles(
 
 def pairs_apart(centres: Array, frames: Array, semi_axes: Array) -> Indices:
     """List ordered pairs (pair, 2) of ellipsoids that do not touch in a pose."""
-    apart = [
-        pair
-        for pair in map(list, combinations(range(len(semi_axes)), 2))
-        if not _touch(centres[pair], frames[pair], semi_axes[pair])
-    ]
-    return np.array([*apart, *(pair[::-1] for pair in apart)], dtype=np.int64).reshape(-1, 2)
+    pairs = np.array(list(combinations(range(len(semi_axes)), 2)), dtype=np.int64).reshape(-1, 2)
+    # Those whose balls are apart need no more.
+    gaps = np.linalg.norm(centres[pairs[:, 1]] - centres[pairs[:, 0]], axis=1)
+    near = np.flatnonzero(gaps <= semi_axes.max(axis=1)[pairs].sum(axis=1))
+    touching = np.zeros(len(pairs), dtype=bool)
+    touching[near] = _touch(centres[pairs[near]], frames[pairs[near]], semi_axes[pairs[near]])
+    apart = pairs[~touching]
+    return np.concatenate([apart, apart[:, ::-1]])
 
 
-def _touch(centres: Array, frames: Array, axes: Array) -> bool:
-    """Whether two ellipsoids overlap.
+def _touch(centres: Array, frames: Array, axes: Array) -> NDArray[np.bool_]:
+    """Whether pairs of ellipsoids (pair, 2, ...) overlap.
 
     They do not if for some 0 < s < 1 d^T (A / (1 - s) + B / s)^-1 d exceeds 1, with A and B their
     matrices of squared semi-axes (J. W. Perram, M. S. Wertheim, *J. Comput. Phys.* 58, 1985, 409).
     """
-    one, other = (frame * own**2 @ frame.T for frame, own in zip(frames, axes, strict=True))
-    apart = centres[1] - centres[0]
+    forms = (frames * axes[:, :, None] ** 2) @ np.swapaxes(frames, -1, -2)
+    apart = centres[:, 1] - centres[:, 0]
     s = np.linspace(0.02, 0.98, 49)[:, None, None]
-    solved = np.linalg.solve(one / (1 - s) + other / s, np.broadcast_to(apart, (49, 3))[..., None])
-    return bool((solved[..., 0] @ apart).max() <= 1)
+    mixed = forms[:, None, 0] / (1 - s) + forms[:, None, 1] / s  # (pair, s, 3, 3)
+    solved = np.linalg.solve(mixed, np.broadcast_to(apart[:, None, :, None], (*mixed.shape[:3], 1)))
+    return np.asarray((solved[..., 0] @ apart[..., None])[..., 0].max(axis=1) <= 1)
 
 
 def legs_clear(tracer: BodyTracer, tx: Array, rx: Array, points: Array, pairs: Indices) -> Visible:
@@ -167,14 +170,26 @@ def double_scattering(
     return sum_of_echoes(found.length, found.amplitude * clear, at, frequency)
 
 
+class _Keyframe(NamedTuple):
+    """Pairs (pair, 2) that return something, how much counts (pair,), and unit vectors to begin at.
+
+    ``start (pair, 2, 3)`` are in the axes in which the parts are unit spheres.
+    """
+
+    pairs: Indices
+    weight: Array
+    start: Array
+
+
 class DoubleReflections:
     """Reflections over two parts of a moving body, for any chirps.
 
-    Chosen once are pairs whose power, over some instants of the recording, exceeds ``least_db`` of
-    that of all single reflections; ``pairs (pair, 2)`` and their ``power_db (pair,)``. Lengths and
-    amplitudes are those of every chirp and receiver; what hides a leg is asked between the middles
-    of the lines of antennas at keyframes 10 ms apart, and fades in between. Parts that touch at any
-    of these instants reflect from one to the other only if ``touching``.
+    At keyframes 10 ms apart pairs are chosen that do not touch, or may do so with ``touching``,
+    whose legs nothing hides between the middles of the lines of antennas, and whose power exceeds
+    ``least_db`` of that of the single reflections of the person they belong to, or of the weaker of
+    both; a pair fades in above that, and between keyframes. Nothing depends on how long the
+    recording is, nor on who else is there. Lengths and amplitudes are those of every chirp and
+    receiver.
     """
 
     def __init__(
@@ -189,108 +204,100 @@ class DoubleReflections:
     ) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
         self._spreading, self._step = spreading, keyframe_step(radar)
-        self._keyframes: KeyframeCache[int, tuple[Visible, Array]]
-        self._keyframes = KeyframeCache(_KEPT, _PASSING)
-        self.pairs, self.power_db = self._worth(least_db, touching)
-
-    def _at(self, times: Array) -> Geometry:
-        """Poses at some times [s], before the middles of the lines of antennas."""
-        tx, rx = (
-            np.tile(antennas.mean(axis=0), (len(times), 1))
-            for antennas in (self._radar.tx, self._radar.rx)
-        )
-        centres, frames, semi_axes = self._body.at(times)
-        return Geometry(tx, rx[:, None], centres, frames, semi_axes)
-
-    def _worth(self, least_db: float, touching: bool) -> tuple[Indices, Array]:
-        times = np.linspace(0.0, self._body.duration_s, _INSTANTS)
-        at = self._at(times)
-        parts = len(at.semi_axes)
-        every = np.array(list(permutations(range(parts), 2)), dtype=np.int64).reshape(-1, 2)
-        if not touching:
-            apart = np.zeros((len(times), parts, parts), dtype=bool)
-            for number, (centres, frames) in enumerate(zip(at.centres, at.frames, strict=True)):
-                own = pairs_apart(centres, frames, at.semi_axes)
-                apart[number, own[:, 0], own[:, 1]] = True
-            always = np.flatnonzero(apart[:, every[:, 0], every[:, 1]].all(axis=0))
-            every = every[always]
-        if not len(every):
-            return every, np.empty(0)
-        found = solve_doubles(at, every, polarization=self._radar.polarization)
-        clear = [self._clear(at, found.points, every, number) for number in range(len(times))]
-        power = (found.amplitude[:, 0] ** 2 * np.stack(clear)).mean(axis=0)
-        whole = (solve_specular_points(at)[1] ** 2).sum(axis=2).mean()
-        with np.errstate(divide="ignore"):
-            decibels = 10 * np.log10(power / whole)
-        kept = np.flatnonzero(decibels > least_db)
-        return np.ascontiguousarray(every[kept]), decibels[kept]
-
-    def _clear(self, at: Geometry, points: Array, pairs: Indices, pose: int) -> Visible:
-        """Which pairs (pair,) have all legs clear in one pose."""
-        one = slice(pose, pose + 1)
-        self._tracer.pose(at.centres[pose], at.frames[pose])
-        clear = legs_clear(self._tracer, at.tx[one], at.rx[one], points[one], pairs)
-        return clear.reshape(-1)
+        self._least_db, self._touching = least_db, touching
+        self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT, _PASSING)
+        parts = len(body.part_names)
+        self._power, self._whole = np.zeros((parts, parts)), 0.0
 
     def account(self) -> dict[str, Any]:
-        """Name the parts of each pair that is kept, strongest first, with its mean power [dB]."""
-        names, order = self._body.part_names, np.argsort(-self.power_db)
+        """Name the parts of each pair, strongest first, with its mean power at keyframes [dB]."""
+        names, whole = self._body.part_names, max(self._whole, np.finfo(np.float64).tiny)
+        order = sorted(np.argwhere(self._power).tolist(), key=lambda pair: -self._power[*pair])
         rows = [
             {
-                "first": names[self.pairs[pair, 0]],
-                "last": names[self.pairs[pair, 1]],
-                "over_single_reflections_db": round(float(self.power_db[pair]), 1),
+                "first": names[first],
+                "last": names[last],
+                "over_single_reflections_db": round(
+                    10 * math.log10(self._power[first, last] / whole), 1
+                ),
             }
-            for pair in order
+            for first, last in order
         ]
         return {"double_reflections": rows}
 
     def beside(self, single: Echoes, chirps: NDArray[np.int64]) -> Echoes:
         """Put echoes of these chirps after the single reflections, each of the part met last."""
+        pairs, weight, start = self._known(chirps)
+        if not len(pairs):
+            return single
         at = chirp_poses(self._radar, self._body, chirps)
-        visible, start = self._known(chirps)
         found = solve_doubles(
             at,
-            self.pairs,
+            pairs,
             start=start,
             polarization=self._radar.polarization,
             spreading=self._spreading,
         )
-        amplitude = (found.amplitude * visible[:, None]).astype(np.complex128)
+        amplitude = (found.amplitude * weight[:, None]).astype(np.complex128)
         double = Echoes(
             length=found.length,
             amplitude=amplitude[None],
             frequency=np.array([self._radar.centre_frequency_hz]),
             tx=at.tx_index,
-            part=self.pairs[:, 1],
-            bounces=np.full(len(self.pairs), 2),
+            part=pairs[:, 1],
+            bounces=np.full(len(pairs), 2),
         )
         return together([single, double])
 
-    def _known(self, chirps: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Visibility (chirp, pair), and where the search begins (chirp, pair, 2, 3)."""
+    def _known(self, chirps: NDArray[np.int64]) -> tuple[Indices, Array, Array]:
+        """Pairs (pair, 2), weights (chirp, pair), and where to begin (chirp, pair, 2, 3)."""
         before, rest = keyframe_before(self._radar, chirps, self._step)
-        visible = np.empty((len(chirps), len(self.pairs)))
-        start = np.empty((len(chirps), len(self.pairs), 2, 3))
-        for interval in np.unique(before).tolist():
-            inside = np.flatnonzero(before == interval)
-            clear, start[inside] = self._keyframe(interval)
-            after, _ = self._keyframe(interval + 1)
-            ramp = smoothstep(rest[inside] / self._step)[:, None]
-            visible[inside] = (1 - ramp) * clear + ramp * after
-        return visible, start
+        numbers = np.unique([before, before + 1]).tolist()
+        keyframes = {
+            number: self._keyframes.get(number, partial(self._trace, number)) for number in numbers
+        }
+        every = np.concatenate([keyframe.pairs for keyframe in keyframes.values()])
+        pairs = np.unique(every, axis=0)
+        places = {(first, last): place for place, (first, last) in enumerate(pairs.tolist())}
+        weight = np.zeros((len(chirps), len(pairs)))
+        start = np.full((len(chirps), len(pairs), 2, 3), np.nan)
+        ramp = smoothstep(rest / self._step)
+        for number, keyframe in keyframes.items():
+            own = np.array(
+                [places[first, last] for first, last in keyframe.pairs.tolist()], np.int64
+            )
+            for inside, share in ((before == number, 1 - ramp), (before + 1 == number, ramp)):
+                some = np.flatnonzero(inside)
+                weight[np.ix_(some, own)] += share[some, None] * keyframe.weight
+                begun = start[np.ix_(some, own)]
+                start[np.ix_(some, own)] = np.where(np.isnan(begun), keyframe.start, begun)
+        return np.ascontiguousarray(pairs), weight, start
 
-    def _keyframe(self, number: int) -> tuple[Visible, Array]:
-        return self._keyframes.get(number, partial(self._trace, number))
-
-    def _trace(self, number: int) -> tuple[Visible, Array]:
+    def _trace(self, number: int) -> _Keyframe:
         time_s = self._radar.gapless.centres_of(np.array([number * self._step]))
-        at = self._at(np.minimum(time_s, self._body.duration_s))
-        found = solve_doubles(at, self.pairs, polarization=self._radar.polarization)
-        clear = self._clear(at, found.points, self.pairs, 0) & (found.amplitude[0, 0] != 0)
+        centres, frames, semi_axes = self._body.at(np.minimum(time_s, self._body.duration_s))
+        tx, rx = (antennas.mean(axis=0)[None] for antennas in (self._radar.tx, self._radar.rx))
+        at = Geometry(tx, rx[:, None], centres, frames, semi_axes)
+        if self._touching:
+            pairs = np.array(list(permutations(range(len(semi_axes)), 2)), dtype=np.int64)
+        else:
+            pairs = pairs_apart(centres[0], frames[0], semi_axes)
+        found = solve_doubles(at, pairs, polarization=self._radar.polarization)
+        power = found.amplitude[0, 0] ** 2
+        single = solve_specular_points(at)[1][0, 0] ** 2
+        owner = self._body.owner
+        of_person = np.bincount(owner, weights=single, minlength=len(self._body.names))
+        beside = of_person[owner[pairs]].min(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            above_db = 10 * np.log10(power / beside) - self._least_db
+        worth = np.flatnonzero(above_db > 0)
+        pairs, points = pairs[worth], found.points[:, :, worth]
+        self._tracer.pose(centres[0], frames[0])
+        clear = legs_clear(self._tracer, tx, rx[:, None], points, pairs)[0, 0]
+        weight = clear * smoothstep(np.minimum(above_db[worth] / _FADE_DB, 1.0))
+        self._power[pairs[:, 0], pairs[:, 1]] += power[worth] * weight**2
+        self._whole += float(single.sum())
         # To the axes in which the parts are unit spheres.
-        apart = found.points[0, 0] - at.centres[0, self.pairs]
-        local = np.einsum("neji,nej->nei", at.frames[0, self.pairs], apart)
-        start = local / at.semi_axes[self.pairs]
-        start[found.amplitude[0, 0] == 0] = np.nan
-        return clear, start
+        away = points[0, 0] - centres[0, pairs]
+        local = np.einsum("neji,nej->nei", frames[0, pairs], away)
+        return _Keyframe(pairs[clear], weight[clear], (local / semi_axes[pairs])[clear])
