@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, check_number
@@ -23,6 +23,24 @@ UPWARD = ("x", "y", "z", "-x", "-y", "-z")
 
 SAID = ("up", "unit", "rate_hz")
 """Keys of what may be said, in TOML as in Python."""
+
+
+class Finding(NamedTuple):
+    """What was found of a recording, or assumed: its name, value and words for people."""
+
+    name: str
+    value: float | str
+    text: str
+
+
+def rate_of(rate_hz: float) -> Finding:
+    """Say the frames a second of a file."""
+    return Finding("rate_hz", rate_hz, f"rate: {rate_hz:g} frames a second")
+
+
+def tall(stature_m: float) -> Finding:
+    """Say the stature of a person [m]."""
+    return Finding("stature_m", round(stature_m, 3), f"stature: {stature_m:.2f} m")
 
 
 def check_up(where: str, value: object) -> str | None:

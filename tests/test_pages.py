@@ -228,6 +228,13 @@ def keys_not_on(text: str) -> set[str]:
     return {key for key, script in every.items() if not named & {key, script}}
 
 
+def test_the_readme_has_the_number_of_figures_of_the_table() -> None:
+    page = (ROOT / "docs/validation.md").read_text(encoding="utf-8")
+    kept, judged = re.findall(r"^(\d+) of (\d+) judged figures", page, re.MULTILINE)[0]
+    assert f"all {judged} judged figures were within" in (ROOT / "README.md").read_text("utf-8")
+    assert kept == judged
+
+
 def test_every_claim_is_on_the_page_of_the_validation() -> None:
     text = (ROOT / "docs/validation.md").read_text(encoding="utf-8")
     assert keys_not_on(text) <= NOT_YET_IN_THE_TABLE

@@ -119,6 +119,7 @@ ON_A_RUN = {
     "process": ["process", "RUN"],
     "export": ["export", "RUN", "--out", "OUT.nc"],
     "view": ["view", "RUN", "--no-browser", "--out", "OUT.html"],
+    "inspect": ["inspect", "FILE", "--json", "OUT.json"],
     "list": ["list", "fidelities", "--json", "OUT.json"],
     "validate": ["validate", "--quick", "--only", "materials", "--json", "OUT.json"],
     "doctor": ["doctor", "--json", "OUT.json"],
@@ -137,7 +138,9 @@ def test_every_other_command(
     command: str, small_file: Path, small_run: Path, tmp_path: Path
 ) -> None:
     words = [
-        word.replace("RUN", str(small_run)).replace("OUT", str(tmp_path / "out"))
+        word.replace("RUN", str(small_run))
+        .replace("FILE", str(small_file))
+        .replace("OUT", str(tmp_path / "out"))
         for word in ON_A_RUN[command]
     ]
     if command in ("compare", "bench"):

@@ -137,7 +137,16 @@ def _show_warning(
 
 def _parser() -> argparse.ArgumentParser:
     from rtradar import __version__
-    from rtradar.cli import captures, checks, learning, listing, paper, results, samples
+    from rtradar.cli import (
+        captures,
+        checks,
+        inspecting,
+        learning,
+        listing,
+        paper,
+        results,
+        samples,
+    )
     from rtradar.cli.values import OneLineParser
 
     parser = OneLineParser(
@@ -154,6 +163,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rtradar {__version__}")
     commands = parser.commands()
-    for module in (captures, samples, listing, results, learning, checks, paper):
+    for module in (captures, samples, inspecting, listing, results, learning, checks, paper):
         module.add(commands)
     return parser

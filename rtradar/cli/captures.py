@@ -16,24 +16,21 @@ from rtradar.cli.values import (
     QUIET_HELP,
     add_command,
     add_files,
-    axis,
+    add_reading,
     breathing,
     decibels,
     decibels_below,
     number,
     path,
     place_at,
-    rate,
     say,
     seconds,
     setting,
     show_page,
-    unit,
     whole,
     window,
 )
 from rtradar.errors import InputError
-from rtradar.recordings import UNITS_M, UPWARD
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
@@ -173,25 +170,7 @@ def _add_capture(command: OneLineParser) -> None:
         action="append",
         default=[],
     )
-    command.option(
-        "--up",
-        "AXIS",
-        f"axis of recordings that is up: {', '.join(UPWARD)} (default: found from who stands)",
-        type=axis,
-    )
-    command.option(
-        "--unit",
-        "NAME|X",
-        f"length unit of recordings: {', '.join(UNITS_M)}, or metres (default: the file's, or "
-        "found from the person's stature)",
-        type=unit,
-    )
-    command.option(
-        "--rate",
-        "HZ",
-        "frames a second of recordings (default: the file's; 120 of an .amc)",
-        type=rate,
-    )
+    add_reading(command)
     command.option(
         "--radar",
         "NAME|TOML|CFG",

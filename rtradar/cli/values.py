@@ -123,6 +123,29 @@ def add_files(command: OneLineParser, *, out: str = "", json: str) -> None:
     command.option("--json", "FILE", json, type=path)
 
 
+def add_reading(command: OneLineParser) -> None:
+    """Add what may be said of a recording whose file does not say it."""
+    command.option(
+        "--up",
+        "AXIS",
+        f"axis of recordings that is up: {', '.join(UPWARD)} (default: found from who stands)",
+        type=axis,
+    )
+    command.option(
+        "--unit",
+        "NAME|X",
+        f"length unit of recordings: {', '.join(UNITS_M)}, or metres (default: the file's, or "
+        "found from the person's stature)",
+        type=unit,
+    )
+    command.option(
+        "--rate",
+        "HZ",
+        "frames a second of recordings (default: the file's; 120 of an .amc)",
+        type=rate,
+    )
+
+
 def say(options: argparse.Namespace, text: str) -> None:
     """Print a result, unless ``--quiet`` asks for errors only."""
     if not options.quiet:

@@ -16,6 +16,7 @@ from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
 from rtradar.motion import display
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
+from rtradar.recordings import Finding
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
@@ -68,8 +69,8 @@ class Motion:
         Duration, where the motion ends before its last frame [s].
     girth : float
         Thickness of the subject relative to the nominal body.
-    notes : tuple of str
-        What was found of the recording, or assumed: unit, up, rate, largest speed.
+    findings : tuple of Finding
+        What was found of the recording, or assumed: unit, up, stature, rate, largest speed.
 
     Raises
     ------
@@ -104,7 +105,7 @@ class Motion:
     first_frame_s: float = 0.0
     length_s: float | None = None
     girth: float = 1.0
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes

@@ -2,8 +2,8 @@
 
 Files of motion rarely say it, and say it wrongly. All formats are looked at alike, by the 22 nodes
 of the person: a unit by the stature, up by who stands on a floor, frames by their speed. What is
-found is kept in ``Motion.notes`` and shown; what contradicts the format is warned of; and where two
-readings are as good as each other, an `InputError` names the option that tells.
+found is kept in ``Motion.findings`` and shown; what contradicts the format is warned of; and where
+two readings are as good as each other, an `InputError` names the option that tells.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_multiply
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.recordings import UNITS_M, UPWARD
+from rtradar.recordings import UNITS_M, UPWARD, Finding, tall
 from rtradar.system.row_files import file_backed, in_blocks
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
         fitting = {name: unit for name, unit in UNITS_M.items() if low <= stature * unit <= high}
         if len(fitting) == 1:
             ((name, unit),) = fitting.items()
-            return unit, f"unit: {name}, for the person is {stature * unit:.2f} m tall then"
+            return unit, f"unit: {name}, by the stature"
         if fitting:
             break
     tall = [f"{stature * unit:.3g} m in {name}" for name, unit in UNITS_M.items()]
@@ -109,14 +109,19 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
     )
 
 
-def check_unit(where: str, stature_m: float, unit_m: float) -> None:
-    """Warn where a given unit makes nobody's stature."""
+def settled_unit(where: str, stature: float, unit_m: float | None) -> tuple[float, Finding]:
+    """Find the unit, or check one that is given: a warning says where it makes nobody's stature."""
+    how = f"unit: {unit_m} m, as given"
+    if unit_m is None:
+        unit_m, how = found_unit(where, stature)
+    stature_m = stature * unit_m
     if not STATURE_M[0] <= stature_m <= STATURE_M[1]:
         warnings.warn(
             f"{where}: with a unit of {unit_m:g} m the person is {stature_m:.3g} m tall",
             ValidityWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
+    return unit_m, Finding("unit_m", unit_m, how)
 
 
 # -- up --------------------------------------------------------------------------------------------
@@ -268,7 +273,7 @@ def _in_t_pose(nodes: Array) -> bool:
     return True
 
 
-def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: float) -> str:
+def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: float) -> Finding:
     """Say the largest speed of a joint, and warn where no person is so fast."""
     fastest, joint, frame, first = 0.0, 0, 0, 0
     before = positions[:0]
@@ -287,7 +292,7 @@ def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: f
             ValidityWarning,
             stacklevel=3,
         )
-    return text
+    return Finding("largest_speed_mps", round(fastest, 3), text)
 
 
 # -- motions of skeletons --------------------------------------------------------------------------
@@ -327,27 +332,23 @@ def settled(
     except InputError:  # names that are not known, which a body of its own may have
         unit_m = found_unit(where, about)[0] if unit_m is None else unit_m
         return replace(turned_up(motion.scaled(unit_m), up or usual_up), girth=motion.girth)
-    size, notes = stature_of(nodes) * about / _NOMINAL_STATURE_M, []
-    if unit_m is None:
-        unit_m, how = found_unit(where, size)
-        notes.append(how)
-    else:
-        check_unit(where, size * unit_m, unit_m)
-        notes.append(f"unit: {unit_m:g} m, as given; the person is {size * unit_m:.2f} m tall")
+    size = stature_of(nodes) * about / _NOMINAL_STATURE_M
+    unit_m, unit = settled_unit(where, size, unit_m)
+    found = [unit, tall(size * unit_m)]
     upward, how = found_up(where, nodes @ to_world_from("y"), given=up or "", usual=usual_up)
-    notes.append(how)
+    found.append(Finding("up", upward, how))
     made = replace(turned_up(motion.scaled(unit_m), upward), girth=motion.girth)
     first = to_nodes(_first_frames(made)).positions
     dropped = leading_t_pose(first, made.rate_hz)
     if dropped:
         text = f"frame 1 is a T-pose: {dropped} frame{'s' * (dropped > 1)} dropped at the beginning"
         warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=3)
-        notes.append(text)
+        found.append(Finding("t_pose_frames", dropped, text))
         made = replace(
             made, root_positions=made.root_positions[dropped:], rotations=made.rotations[dropped:]
         )
-    notes.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
-    return replace(made, notes=tuple(notes))
+    found.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
+    return replace(made, findings=tuple(found))
 
 
 def turned_up(motion: Motion, up: str) -> Motion:

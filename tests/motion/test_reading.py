@@ -148,7 +148,9 @@ def test_a_file_of_the_format_is_read_without_a_word(tmp_path: Path) -> None:
     motion, said = read(tmp_path, walker())
     walks_upright(motion)
     assert not said
-    assert [note.split(":")[0] for note in motion.notes] == ["unit", "up", "largest speed"]
+    assert [one.name for one in motion.findings] == [
+        "unit_m", "stature_m", "up", "largest_speed_mps", "rate_hz",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("turn", "up"), [(Z_UP, "z"), (Y_DOWN, "-y")])
@@ -187,7 +189,7 @@ def test_children_and_tall_people_are_found_in_their_unit(
     motion, said = read(tmp_path, walker(unit_m=UNITS_M[unit] / size))
     assert np.ptp(motion.positions[0, :, 2]) == pytest.approx(1.76 * size, rel=0.01)
     assert not said
-    assert motion.notes[0].startswith(f"unit: {unit}, for the person is")
+    assert motion.findings[0].text == f"unit: {unit}, by the stature"
 
 
 @pytest.mark.parametrize("unit", UNITS_M)
@@ -320,7 +322,7 @@ def test_who_falls_does_not_get_up(tmp_path: Path, up: str) -> None:
     height = nodes_of(recorded)["head"][:, 2]
     assert np.ptp(height) > 1.4
     np.testing.assert_allclose(nodes_of(motion)["head"][:, 2], height, atol=0.15)
-    assert f"up: {up}" in motion.notes[0]
+    assert ("up", up) in [one[:2] for one in motion.findings]
 
 
 def test_who_lies_in_bed_may_as_well_stand(tmp_path: Path) -> None:
@@ -345,7 +347,7 @@ def test_frames_hardly_apart_are_one(tmp_path: Path) -> None:
     times[31] = times[30] + 2e-6
     path = joints(tmp_path, walk, np.eye(3), np.zeros(3), time_s=times, up="z")
     motion = load_motion(path)
-    assert "times: 1 frames hardly after another one left out" in motion.notes
+    assert ("joined_frames", 1) in [one[:2] for one in motion.findings]
     expected = load_motion(joints(tmp_path, walk, np.eye(3), np.zeros(3), up="z"))
     np.testing.assert_allclose(motion.at(0.25)[0], expected.at(0.25)[0], atol=2e-3)
 

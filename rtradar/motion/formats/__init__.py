@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.recordings import check_rate, check_unit, check_up
+from rtradar.recordings import check_rate, check_unit, check_up, rate_of
 from rtradar.system.registries import READERS, reader_of
 
 register_reader = READERS.register
@@ -48,7 +49,7 @@ def load_motion(
     -------
     Motion
         World axes (y-up mocap (z, x, y) becomes (x, y, z)), metres, not yet placed before a radar.
-        Its ``notes`` say what was found.
+        Its ``findings`` say what was found.
 
     Raises
     ------
@@ -74,4 +75,6 @@ def load_motion(
         motion = read(file, **{option: value for option, value in given.items() if option in taken})
     if not isinstance(motion, Motion):
         raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")
-    return motion
+    if any(one.name == "rate_hz" for one in motion.findings):
+        return motion
+    return replace(motion, findings=(*motion.findings, rate_of(motion.rate_hz)))

@@ -22,7 +22,7 @@ from rtradar.errors import InputError
 from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.reading import to_world_from, warn_of_speed
-from rtradar.recordings import UPWARD
+from rtradar.recordings import UPWARD, Finding
 from rtradar.system.checks import brief
 from rtradar.system.files import open_regular
 
@@ -53,7 +53,7 @@ class Markers:
     rate_hz: float
     first_frame: int
     says_up: bool
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
 
 class _Content(NamedTuple):
@@ -83,7 +83,7 @@ def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None, up: str
     centres, pelvis, thorax = joint_centres(markers)
     motion = rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
     speed = warn_of_speed(str(path), motion.joints, motion.positions, seen.rate_hz)
-    return replace(motion, notes=(*seen.notes, speed))
+    return replace(motion, findings=(*seen.findings, speed))
 
 
 def read_markers(
@@ -142,11 +142,13 @@ def read_markers(
     places = places @ to_world_from(upward).T
     places[unseen] = np.nan
     said = bool(up or read.upward)
-    notes = (
-        f"unit: {scale:g} m, as {'given' if unit_m is not None else 'POINT:UNITS says'}",
-        f"up: {upward}, as {'given' if up else 'POINT:Y_SCREEN says' if said else 'usual'}",
+    by_unit = "given" if unit_m is not None else "POINT:UNITS says"
+    by_up = "given" if up else "POINT:Y_SCREEN says" if said else "usual"
+    findings = (
+        Finding("unit_m", scale, f"unit: {scale:g} m, as {by_unit}"),
+        Finding("up", upward, f"up: {upward}, as {by_up}"),
     )
-    return Markers(path, names, places, read.rate_hz, read.first_frame, said, notes)
+    return Markers(path, names, places, read.rate_hz, read.first_frame, said, findings)
 
 
 def bridged(seen: Markers) -> NDArray[np.float64]:

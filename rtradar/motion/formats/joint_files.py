@@ -1,6 +1,6 @@
 """Files of joint positions: archives of NumPy (.npz), and tables with a header (.csv).
 
-Both hold ``positions (frame, joint, 3)`` [m], the names of the ``joints``, which axis is ``up``,
+Both hold ``positions (frame, joint, 3)``, the names of the ``joints``, which axis is ``up``,
 and ``rate_hz`` or ``time_s (frame,)``. In a table each coordinate of a joint has a column, such as
 ``HipLeft_x``; ``time_s``, ``rate_hz`` and ``up`` have one each. What is not seen is NaN, an empty
 cell, or the origin to the last bit.
@@ -32,7 +32,7 @@ LEAST_FRAMES = 5
 
 _NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
 _MOST_JOINTS = 1000
-_FARTHEST_M, _LEAST_STEP_S = 1e6, 1e-6
+_FARTHEST, _LEAST_STEP_S = 1e9, 1e-6
 
 _LEAST_STEP = 0.1
 """Least step of time over the median; a spline through places that are nearer in time would swing
@@ -41,7 +41,7 @@ by metres."""
 
 @dataclass(frozen=True)
 class JointRecording:
-    """Positions (frame, joint, 3) of named joints in the file's axes [m], NaN where not seen.
+    """Positions (frame, joint, 3) of named joints in the file's axes and unit, NaN where not seen.
 
     ``times`` (frame,) ascend from 0 [s]. ``up`` is one of `UPWARD`, or empty where the file does
     not say it. ``joined`` frames were left out, for another is hardly a moment before them.
@@ -55,7 +55,7 @@ class JointRecording:
     joined: int = 0
 
 
-def read_npz(path: Path, unit_m: float) -> JointRecording:
+def read_npz(path: Path) -> JointRecording:
     """Read an archive of NumPy; an `InputError` tells what is wrong with it."""
     try:
         arrays = read_arrays(path)
@@ -68,10 +68,10 @@ def read_npz(path: Path, unit_m: float) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    return _checked(path, arrays, unit_m)
+    return _checked(path, arrays)
 
 
-def read_csv(path: Path, unit_m: float) -> JointRecording:
+def read_csv(path: Path) -> JointRecording:
     """Read a table with a header; an `InputError` names the line."""
     with TextFile(path, "table of joint positions") as text:
         header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
@@ -101,7 +101,7 @@ def read_csv(path: Path, unit_m: float) -> JointRecording:
         arrays["time_s"] = values[:, columns["time_s"]]
     if "rate_hz" in columns and len(rows):
         arrays["rate_hz"] = values[0, columns["rate_hz"]]
-    return _checked(path, arrays, unit_m)
+    return _checked(path, arrays)
 
 
 def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
@@ -131,13 +131,11 @@ def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[st
     return others, joints
 
 
-def _checked(path: Path, arrays: Mapping[str, NDArray[Any]], unit_m: float) -> JointRecording:
+def _checked(path: Path, arrays: Mapping[str, NDArray[Any]]) -> JointRecording:
     """Make a recording of what a file holds."""
     for needed in ("positions", "joints", "rate_hz or time_s"):
         if not any(name in arrays for name in needed.split(" or ")):
             raise InputError(f"{path}: {needed} is missing; {_NEEDED}")
-    if not (math.isfinite(unit_m) and unit_m > 0):
-        raise InputError(f"{path}: unit_m = {unit_m}; it must be positive (0.001 for millimetres)")
     given, named = arrays["positions"], arrays["joints"]
     if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "fiu":
         raise InputError(
@@ -159,12 +157,9 @@ def _checked(path: Path, arrays: Mapping[str, NDArray[Any]], unit_m: float) -> J
     for name in names:
         if known.count(plain(name)) > 1:
             raise InputError(f"{path}: joint {brief(name)} is there twice; keep one person's")
-    positions = given.astype(np.float64) * unit_m
-    if (np.abs(positions) > _FARTHEST_M).any():  # NaN is not
-        raise InputError(
-            f"{path}: positions reach beyond {_FARTHEST_M:g} m; what is not seen is NaN, and "
-            "unit_m says how many metres a unit has"
-        )
+    positions = given.astype(np.float64)
+    if (np.abs(positions) > _FARTHEST).any():  # NaN is not
+        raise InputError(f"{path}: positions reach beyond {_FARTHEST:g}; what is not seen is NaN")
     positions[np.isnan(positions).any(axis=2) | ~positions.any(axis=2)] = np.nan
     up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
     if up and up not in UPWARD:

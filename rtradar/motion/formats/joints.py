@@ -37,8 +37,15 @@ from rtradar.motion.formats.joint_files import (
 from rtradar.motion.formats.joint_sets import JointSet, node_positions, recognise
 from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
-from rtradar.motion.reading import found_up, stature_of, to_world_from, warn_of_speed
+from rtradar.motion.reading import (
+    found_up,
+    settled_unit,
+    stature_of,
+    to_world_from,
+    warn_of_speed,
+)
 from rtradar.motion.skeleton import HEAD_OF_THIGH, MINIMUM_PART_M, NODE_PARENTS, NODES
+from rtradar.recordings import Finding, rate_of, tall
 
 Array = NDArray[np.float64]
 
@@ -58,9 +65,6 @@ _EVEN = 0.01
 _TIMES_TOO_LONG, _TIMES_TOO_SHORT = 1.6, 0.5
 """Lengths of a bone over its median beyond which the joint at its end was lost by the camera."""
 
-_THIGH_M = (0.15, 0.8)
-"""Limits of the length of people's thighs, children included [m]."""
-
 _FOOT_OF_SHANK = 0.43
 """Ratio of the lengths from ankle to toe tip and from knee to ankle (HDM05, CMU)."""
 
@@ -74,15 +78,17 @@ height of the lowest node, over all frames, that is a person's who stands."""
 
 def load_npz(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
     """Read joint positions from an archive of NumPy."""
-    return motion_of(read_npz(path, 1.0 if unit_m is None else unit_m), up)
+    return motion_of(read_npz(path), unit_m, up)
 
 
 def load_csv(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
     """Read joint positions from a table with a header."""
-    return motion_of(read_csv(path, 1.0 if unit_m is None else unit_m), up)
+    return motion_of(read_csv(path), unit_m, up)
 
 
-def motion_of(recording: JointRecording, up: str | None = None) -> Motion:
+def motion_of(
+    recording: JointRecording, unit_m: float | None = None, up: str | None = None
+) -> Motion:
     """Make the motion of a rigid skeleton of joints that were measured one by one."""
     where = str(recording.path)
     joint_set = recognise(where, recording.names)
@@ -92,14 +98,11 @@ def motion_of(recording: JointRecording, up: str | None = None) -> Motion:
             f"{where}: the joint of node {NODES[node]!r} is never seen; add it, or take another "
             "recording"
         )
+    unit_m, unit = settled_unit(where, stature_of(nodes), unit_m)
     upward, how = found_up(where, nodes, given=up or recording.up)
-    nodes = nodes @ to_world_from(upward).T
-    thigh = float(np.nanmedian(_length(nodes, "l_knee", "l_hip")))
-    if not _THIGH_M[0] <= thigh <= _THIGH_M[1]:
-        raise InputError(
-            f"{where}: hip and knee are {thigh:.3g} m apart, a person's {_THIGH_M[0]} to "
-            f"{_THIGH_M[1]} m; positions are in metres, give unit_m (0.001 for millimetres)"
-        )
+    steps = np.diff(recording.times)
+    found = [unit, Finding("up", upward, how), rate_of(round(1 / float(np.median(steps)), 3))]
+    nodes = unit_m * nodes @ to_world_from(upward).T
     if joint_set.cutoff_hz:
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
@@ -112,10 +115,12 @@ def motion_of(recording: JointRecording, up: str | None = None) -> Motion:
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
     nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
     motion = rigid_motion(recording.path.stem, nodes, pelvis, thorax, rate_hz)
-    notes = [how, warn_of_speed(where, NODES, motion.positions, rate_hz)]
+    found.append(tall(size * _NOMINAL_STATURE_M))
     if recording.joined:
-        notes.append(f"times: {recording.joined} frames hardly after another one left out")
-    return dataclasses.replace(motion, girth=size, notes=tuple(notes))
+        text = f"times: {recording.joined} frames hardly after another one left out"
+        found.append(Finding("joined_frames", recording.joined, text))
+    found.append(warn_of_speed(where, NODES, motion.positions, rate_hz))
+    return dataclasses.replace(motion, girth=size, findings=tuple(found))
 
 
 _SIDES = ("hip", "shoulder")
