@@ -68,6 +68,7 @@ def test_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ("name", "words"),
     [
         ("a.asf", "a skeleton without its motion; give the .amc, and this as --skeleton"),
+        ("", "a folder, not a motion file; name one of its files"),
         ("a.txt", "unknown kind of motion file '.txt'"),
         ("none.bvh", "cannot read this BVH file"),
     ],
@@ -75,7 +76,7 @@ def test_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_is_none_of_these_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, words: str
 ) -> None:
-    if not name.startswith("none"):
+    if name.startswith("a."):
         (tmp_path / name).write_text("x")
     assert main(["inspect", str(tmp_path / name)]) == 2
     said = capsys.readouterr().err

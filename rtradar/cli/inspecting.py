@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.cli.values import add_command, add_files, add_reading, path
-from rtradar.errors import InputError
 from rtradar.system.checks import read_toml
 from rtradar.system.files import check_place, write_json
 
@@ -61,10 +60,6 @@ def _inspect(options: argparse.Namespace) -> int:
 def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:
     """Return the kind of a file, values of what was found, and text about it."""
     suffix = file.suffix.lower()
-    if suffix == ".asf":
-        raise InputError(
-            f"{file}: a skeleton without its motion; give the .amc, and this as --skeleton"
-        )
     if suffix in _SAMPLES:
         return _samples(file)
     if suffix == ".cfg" or (suffix == ".toml" and not _is_scene(file)):

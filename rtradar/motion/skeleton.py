@@ -100,21 +100,47 @@ CONVENTIONS: tuple[Convention, ...] = (
         "shoulder=upperarm@ elbow=lowerarm@ wrist=hand@ hand=hand@end",
     ),
     _convention(
-        "CMU BVH, MotionBuilder, Mixamo",
+        "CMU BVH, MotionBuilder, Mixamo, Rokoko",
         "left",
         "right",
         "root=hips thorax=neck neck=neck1,head head=headtopend,headend",
-        "hip=@upleg knee=@leg ankle=@foot toe=@toebaseend,@toeend,@toebase "
+        "hip=@upleg,@thigh knee=@leg,@shin ankle=@foot "
+        "toe=@toebaseend,@toeend,@toebase,@toe,@footend "
         "shoulder=@arm elbow=@forearm wrist=@hand hand=@handmiddle3,@handmiddle2,@handmiddle1,"
         "@handindex1end,@handindex1,@handend",
     ),
     _convention(
-        "Poser BVH",
+        "Poser BVH, SMPL",
         "left",
         "right",
-        "root=hips,hip thorax=neck neck=head head=headend",
-        "hip=@hip knee=@knee ankle=@ankle toe=@toe,@ankleend "
-        "shoulder=@shoulder elbow=@elbow wrist=@wrist hand=@wristend",
+        "root=hips,hip,pelvis thorax=neck neck=head head=headend",
+        "hip=@hip knee=@knee ankle=@ankle toe=@toe,@footend,@foot,@ankleend "
+        "shoulder=@shoulder elbow=@elbow wrist=@wrist hand=@handend,@hand,@wristend",
+    ),
+    _convention(
+        "DAZ, OptiTrack Motive",
+        "l",
+        "r",
+        "root=hip,hips thorax=neck,necklower neck=head head=headend",
+        "hip=@thigh,@thighbend knee=@shin ankle=@foot toe=@toeend,@toe,@footend "
+        "shoulder=@shldr,@shldrbend,@uarm elbow=@forearm,@forearmbend,@farm wrist=@hand "
+        "hand=@mid1,@handend",
+    ),
+    _convention(
+        "3ds Max Biped",
+        "l",
+        "r",
+        "root=pelvis thorax=neck neck=head head=headnub,headend",
+        "hip=@thigh knee=@calf ankle=@foot toe=@toe0nub,@toe0end,@toe0,@footend "
+        "shoulder=@upperarm elbow=@forearm wrist=@hand hand=@finger2,@finger1,@handend",
+    ),
+    _convention(
+        "Unreal Engine",
+        "l",
+        "r",
+        "root=pelvis thorax=neck01 neck=head head=headend",
+        "hip=thigh@ knee=calf@ ankle=foot@ toe=ball@end,ball@,foot@end "
+        "shoulder=upperarm@ elbow=lowerarm@ wrist=hand@ hand=middle01@,hand@end",
     ),
 )
 """Every kind of skeleton that is understood."""
@@ -124,8 +150,8 @@ ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*CONVENTIONS[0].joints.
 
 
 def plain(name: str) -> str:
-    """A joint's name without namespace (``mixamorig:``), case, spaces and underscores."""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*)", "", name).lower())
+    """A joint's name without namespace (``mixamorig:``, ``Bip01``), case, spaces, underscores."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|Bip\d+)", "", name).lower())
 
 
 MINIMUM_PART_M = 0.01

@@ -135,6 +135,12 @@ def reader_of(path: str | Path, skeleton: str | Path | None = None) -> str:
     """
     file = Path(path)
     name = file.suffix.lower().removeprefix(".")
+    if name == "asf" and name not in READERS:
+        raise InputError(
+            f"{file}: a skeleton without its motion; give the .amc, and this as --skeleton"
+        )
+    if name not in READERS and file.is_dir():
+        raise InputError(f"{file}: a folder, not a motion file; name one of its files")
     if name not in READERS:
         known = ", ".join(f".{known}" for known in READERS)
         raise InputError(

@@ -284,6 +284,64 @@ def test_decimal_commas_are_named(tmp_path: Path) -> None:
         read(tmp_path, head + motion + frames + time + values.replace(".", ","))
 
 
+# -- names -----------------------------------------------------------------------------------------
+
+_SIDED = ("UpLeg", "Leg", "Foot", "ToeBase", "Shoulder", "Arm", "ForeArm", "Hand", "HandMiddle1")
+_TRUNK = ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
+CONVENTIONS = {
+    "DAZ": (
+        "hip abdomen abdomen2 chest neck head",
+        "@Thigh @Shin @Foot @Toe @Collar @Shldr @ForeArm @Hand @Mid1",
+        "lr",
+    ),
+    "OptiTrack Motive": (
+        "Hip Ab Spine Chest Neck Head",
+        "@Thigh @Shin @Foot @Toe @Shoulder @UArm @FArm @Hand @Fingers",
+        "LR",
+    ),
+    "3ds Max Biped": (
+        "Bip01_Pelvis Bip01_Spine Bip01_Spine1 Bip01_Spine2 Bip01_Neck Bip01_Head",
+        "Bip01_@_Thigh Bip01_@_Calf Bip01_@_Foot Bip01_@_Toe0 Bip01_@_Clavicle Bip01_@_UpperArm "
+        "Bip01_@_Forearm Bip01_@_Hand Bip01_@_Finger2",
+        "LR",
+    ),
+    "Unreal Engine": (
+        "pelvis spine_01 spine_02 spine_03 neck_01 head",
+        "thigh_@ calf_@ foot_@ ball_@ clavicle_@ upperarm_@ lowerarm_@ hand_@ middle_01_@",
+        "lr",
+    ),
+    "Rokoko": (
+        "Hips Spine Spine2 Spine3 Neck Head",
+        "@Thigh @Shin @Foot @Toe @Shoulder @Arm @ForeArm @Hand @HandMiddle1",
+        ("Left", "Right"),
+    ),
+    "SMPL": (
+        "pelvis spine1 spine2 spine3 neck head",
+        "@_hip @_knee @_ankle @_foot @_collar @_shoulder @_elbow @_wrist @_hand",
+        ("left", "right"),
+    ),
+}
+
+
+@pytest.mark.parametrize("spaces", [False, True])
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_names_of_other_programs_are_known(tmp_path: Path, name: str, spaces: bool) -> None:
+    trunk, limbs, sides = CONVENTIONS[name]
+    names = dict(zip(_TRUNK, trunk.split(), strict=True))
+    for ours, side in zip(("Left", "Right"), sides, strict=True):
+        for bone, other in zip(_SIDED, limbs.split(), strict=True):
+            names[ours + bone] = other.replace("@", side)
+    lines = walker().splitlines()
+    for number, line in enumerate(lines):
+        words = line.split()
+        if words[0] in ("ROOT", "JOINT") and words[1] in names:
+            other = names[words[1]]
+            lines[number] = f"{words[0]} {other.replace('_', ' ') if spaces else other}"
+    motion, said = read(tmp_path, "\n".join(lines))
+    walks_upright(motion)
+    assert not said
+
+
 # -- joints ----------------------------------------------------------------------------------------
 
 SMPL = {
