@@ -366,6 +366,51 @@ def joints(folder: Path, motion: Motion, axes: Array, shift: Array, **more: obje
     return folder / "a.npz"
 
 
+AZURE = {
+    "PELVIS": "root", "SPINE_NAVEL": "lowerback", "SPINE_CHEST": "upperback", "NECK": "thorax",
+    "HEAD": "head",
+} | {
+    f"{joint}_{side}": f"{side[0].lower()}_{node}"
+    for side in ("LEFT", "RIGHT")
+    for joint, node in (
+        ("HIP", "hip"), ("KNEE", "knee"), ("ANKLE", "ankle"), ("FOOT", "toe"),
+        ("SHOULDER", "shoulder"), ("ELBOW", "elbow"), ("WRIST", "wrist"), ("HAND", "wrist"),
+        ("HANDTIP", "hand"),
+    )
+}  # fmt: skip
+HUMAN36M = {"Hip": "root", "Spine": "upperback", "Thorax": "thorax", "Head": "head"} | {
+    f"{side}{joint}": f"{side.lower()}_{node}"
+    for side in "LR"
+    for joint, node in (
+        ("Hip", "hip"), ("Knee", "knee"), ("Foot", "ankle"),
+        ("Shoulder", "shoulder"), ("Elbow", "elbow"), ("Wrist", "wrist"),
+    )
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("names", [AZURE, HUMAN36M], ids=["Azure Kinect", "Human3.6M"])
+def test_joints_of_cameras_in_millimetres_with_y_down(
+    tmp_path: Path, names: dict[str, str]
+) -> None:
+    walk = synthetic_motion("walk", seed=0)
+    places = walk.positions[:, [NODES.index(node) for node in names.values()]]
+    places = places[..., [1, 2, 0]] * [1.0, -1.0, -1.0] * 1000.0 + [300.0, 900.0, 3000.0]
+    arrays = {"joints": np.array(list(names)), "positions": places, "rate_hz": walk.rate_hz}
+    np.savez(tmp_path / "a.npz", **arrays)  # type: ignore[arg-type]
+    motion = load_motion(tmp_path / "a.npz")
+    found = {one.name: one.value for one in motion.findings}
+    assert (found["unit_m"], found["up"]) == (0.001, "-y")
+    ours, theirs = nodes_of(motion), nodes_of(walk)
+    turned = [-1.0, -1.0, 1.0]  # a camera that looks back at who comes
+    for limb in ("hip", "knee", "ankle", "elbow", "wrist"):
+        for side in "lr":
+            away = (ours[f"{side}_{limb}"] - ours["root"]) * turned
+            apart = np.linalg.norm(away - theirs[f"{side}_{limb}"] + theirs["root"], axis=1)
+            assert np.median(apart) < 0.03
+    ahead = (ours["root"][-1] - ours["root"][0]) * turned
+    assert ahead @ (theirs["root"][-1] - theirs["root"][0]) > 0
+
+
 def falls() -> Motion:
     """A person who lies for most of the time, gets up, falls and lies."""
     return synthetic_motion("fall", seed=0, duration_s=8.0)

@@ -36,12 +36,18 @@ class JointSet:
 
 
 def _joint_set(
-    name: str, middle: str, sided: str, *, cutoff_hz: float | None = None, top: bool = False
+    name: str,
+    middle: str,
+    sided: str,
+    *,
+    sides: tuple[str, str] = ("left", "right"),
+    cutoff_hz: float | None = None,
+    top: bool = False,
 ) -> JointSet:
     """Make a set from texts such as ``root=hips; neck=neck>head 0.4, neck``."""
     joints = {}
     for prefix, text in (("", middle), ("l_", sided), ("r_", sided)):
-        for entry in text.replace("@", "right" if prefix == "r_" else "left").split(";"):
+        for entry in text.replace("@", sides[prefix == "r_"]).split(";"):
             node, found = entry.split("=")
             joints[prefix + node.strip()] = tuple(found.strip().split(", "))
     return JointSet(name, joints, cutoff_hz, top)
@@ -67,6 +73,24 @@ JOINT_SETS: tuple[JointSet, ...] = (
         "thorax=spineshoulder; neck=neck; head=head",
         _KINECT_LIMBS,
         cutoff_hz=6.0,
+    ),
+    _joint_set(
+        "Azure Kinect",
+        # Its neck is where the trunk ends.
+        "root=pelvis; lowerback=spinenavel; upperback=spinechest; thorax=neck; "
+        "neck=neck>head 0.36; head=head",
+        _KINECT_LIMBS,
+        cutoff_hz=6.0,
+    ),
+    _joint_set(
+        "Human3.6M",
+        # Without toes and hands; the joint of the foot is the ankle.
+        "root=hip, pelvis; lowerback=hip>spine 0.5, pelvis>spine 0.5; upperback=spine; "
+        "thorax=thorax; neck=thorax>head 0.4; head=head",
+        "hip=@hip; knee=@knee; ankle=@foot, @ankle; toe=@foot, @ankle; "
+        f"shoulder=@shoulder; elbow=@elbow; wrist=@wrist; hand=@elbow>@wrist {_HAND}",
+        sides=("l", "r"),
+        top=True,
     ),
     _joint_set(
         "Berkeley MHAD",
