@@ -365,6 +365,24 @@ def test_import_is_quick_and_light() -> None:
     assert not set(imported("import rtradar")) - {"numpy"}
 
 
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        ("run synthetic:walk --snr 10", "no option --snr; did you mean --snr-db?"),
+        ("run synthetic:walk --fidelty=rays", "no option --fidelty; did you mean --fidelity?"),
+        ("predict x --zzz", "no option --zzz; see"),
+        ("dataset build x.toml --worker 1", "no option --worker; did you mean --workers?"),
+    ],
+)
+def test_an_option_that_is_none_is_told_with_the_nearest(
+    words: str, near: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words.split()) == 2
+    said = capsys.readouterr().err
+    assert near in said
+    assert said.count("\n") == 1
+
+
 @pytest.mark.parametrize("words", [[], ["--help"], ["--version"], ["run", "--fidelty", "x"]])
 def test_help_and_unknown_options_need_no_numpy(words: list[str]) -> None:
     assert "numpy" in imported("import numpy")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import difflib
+import itertools
 import math
 import os
 import re
@@ -46,6 +48,8 @@ class OneLineParser(argparse.ArgumentParser):
         self._fill, self.intermixed = fill, False
         if examples:
             options["epilog"] = "\n  ".join(["examples:", *examples])
+        # The beginning of an option is none: "--snr" might as well be another one tomorrow.
+        options |= {"allow_abbrev": False}
         super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **options)
 
     def commands(self, metavar: str = "COMMAND") -> Subcommands:
@@ -68,10 +72,26 @@ class OneLineParser(argparse.ArgumentParser):
         self._filled()
         if args is not None:
             args = _joined(args)
+            if self._subparsers is None:
+                self._refuse_unknown(args)
         if self.intermixed:
             self.intermixed = False  # for it calls this method
             return self.parse_known_intermixed_args(args, namespace)
         return super().parse_known_args(args, namespace)
+
+    def _refuse_unknown(self, args: Sequence[str]) -> None:
+        """Refuse the first option that is none, before anything else is missed."""
+        for word in itertools.takewhile(lambda word: word != "--", args):
+            name = word.partition("=")[0]
+            if name.startswith("--") and name not in self._option_string_actions:
+                self._unknown(name)
+
+    def _unknown(self, word: str) -> NoReturn:
+        """Say that there is no such option, and which one is near."""
+        known = [name for name in self._option_string_actions if name.startswith("--")]
+        near = [name for name in known if name.startswith(word)]
+        near = near or difflib.get_close_matches(word, known, 1)
+        self.error(f"no option {word}{f'; did you mean {near[0]}?' if near else ''}")
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""

@@ -87,9 +87,9 @@ def ti_oob(
             f"detector ti-oob: radar '{radar.name}' has multiplexing = '{radar.multiplexing}'; the "
             "chain is that of tdm and bpm"
         )
-    if not threshold_db > 0:
+    if not 0 < threshold_db < np.inf:
         raise InputError(f"detector ti-oob: threshold_db = {threshold_db}; it must be above 0 dB")
-    if max_points != int(max_points) or max_points < 1:
+    if not 1 <= max_points < np.inf or max_points != int(max_points):
         raise InputError(
             f"detector ti-oob: max_points = {max_points}; it must be a whole number, at least 1"
         )

@@ -139,7 +139,11 @@ def folded_angle_deg(radar: Radar) -> float:
         return 0.0
     spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
     if radar.tx_positions_m is not None:
-        spacing_m = float(np.median(np.linalg.norm(np.diff(radar.tx_m, axis=0), axis=1)))
+        # Two Tx at one place are two polarisations.
+        apart = np.linalg.norm(np.diff(radar.tx_m, axis=0), axis=1)
+        if not apart.any():
+            return 0.0
+        spacing_m = float(np.median(apart[apart > 0]))
     return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
 
 

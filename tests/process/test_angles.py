@@ -157,6 +157,9 @@ def test_what_is_not_turned_shows_where_it_is() -> None:
     ):
         assert folded_angle_deg(Radar(**fields)) == 0
     assert folded_angle_deg(Radar(tx_y=0)) > 0
+    # Two Tx at one place, for two polarisations.
+    twice = {"tx_positions_m": ((0.0, 0.0, 0.0),) * 2, "rx_positions_m": ((0.0, 0.01, 0.0),) * 1}
+    assert folded_angle_deg(Radar(**twice)) == 0
 
 
 def test_focusing_gains_and_sharpens() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 from pathlib import Path
 from typing import Any
@@ -196,6 +197,8 @@ def test_azimuth_is_on_the_grid_of_measured_clouds() -> None:
     ("options", "changes", "says"),
     [
         ({"threshold_db": 0.0}, {}, "threshold_db = 0.0; it must be above 0"),
+        ({"threshold_db": math.nan}, {}, "threshold_db = nan; it must be above 0"),
+        ({"max_points": math.inf}, {}, "max_points = inf; it must be a whole number"),
         ({"max_points": 0}, {}, "max_points = 0; it must be a whole number"),
         ({"points": 3}, {}, "no option 'points'; allowed: threshold_db, max_points"),
         ({"cfar_axes": "all"}, {}, "cfar_axes = 'all'; allowed: both, range"),
