@@ -10,6 +10,9 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any, TypeVar
 
+from rtradar.errors import InputError
+from rtradar.system.checks import brief
+
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, for workers that share cores."""
 
@@ -22,7 +25,13 @@ _Result = TypeVar("_Result")
 def thread_limit() -> int | None:
     """Return the number of threads that the environment allows, if it gives one."""
     named = os.environ.get(THREADS_VARIABLE, "")
-    return int(named) if named.isdigit() and int(named) > 0 else None
+    if not named:
+        return None
+    if not named.isdecimal() or int(named) < 1:
+        raise InputError(
+            f"{THREADS_VARIABLE} = {brief(named)}; it must be a whole number, at least 1, or unset"
+        )
+    return int(named)
 
 
 def thread_count() -> int:

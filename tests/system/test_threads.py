@@ -15,6 +15,7 @@ from functools import partial
 import pytest
 from threadpoolctl import ThreadpoolController
 
+from rtradar.errors import InputError
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
@@ -153,9 +154,7 @@ raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     )
 
 
-@pytest.mark.parametrize(
-    ("named", "limit"), [("3", 3), ("", None), ("0", None), ("many", None), ("-1", None)]
-)
+@pytest.mark.parametrize(("named", "limit"), [("3", 3), ("", None)])
 def test_the_environment_limits_threads(
     monkeypatch: pytest.MonkeyPatch, named: str, limit: int | None
 ) -> None:
@@ -194,3 +193,12 @@ def test_matrix_products_take_one_thread_inside_and_as_many_as_before_after() ->
     with one_blas_thread():
         assert set(_blas_threads()) == {1}
     assert _blas_threads() == before
+
+
+@pytest.mark.parametrize("text", ["abc", "0", "-1", "1.5", "\u00b2"])
+def test_another_number_of_threads_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv(threads.THREADS_VARIABLE, text)
+    with pytest.raises(InputError, match=r"RTRADAR_THREADS = .*; it must be a whole number"):
+        threads.thread_count()
+    monkeypatch.setenv(threads.THREADS_VARIABLE, "")
+    assert threads.thread_count() >= 1
