@@ -377,10 +377,19 @@ def _some_frames(motion: Motion) -> Motion:
     step = math.ceil(len(motion.root_positions) / _LOOKED_AT)
     return replace(
         motion,
-        root_positions=motion.root_positions[::step],
-        rotations=motion.rotations[::step],
+        root_positions=_every(motion.root_positions, step),
+        rotations=_every(motion.rotations, step),
         length_s=None,
     )
+
+
+def _every(array: Array, step: int) -> Array:
+    """Copy of every so many rows, of which a file's pages are released as they are passed."""
+    found, first = list[Array](), 0
+    for (rows,) in in_blocks(array):
+        found.append(rows[-first % step :: step].copy())
+        first += len(rows)
+    return np.concatenate(found)
 
 
 def _first_frames(motion: Motion) -> Motion:
