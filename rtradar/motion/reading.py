@@ -20,7 +20,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_multiply
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.recordings import UNITS_M, UPWARD, Finding, tall
+from rtradar.recordings import UNITS_M, UPWARD, Finding, rate_of, tall
 from rtradar.system.row_files import file_backed, in_blocks
 
 Array = NDArray[np.float64]
@@ -348,6 +348,7 @@ def settled(
             made, root_positions=made.root_positions[dropped:], rotations=made.rotations[dropped:]
         )
     found.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
+    found.append(rate_of(made.rate_hz))
     return replace(made, findings=tuple(found))
 
 

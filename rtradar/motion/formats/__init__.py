@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import replace
 from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.recordings import check_rate, check_unit, check_up, rate_of
+from rtradar.recordings import check_rate, check_unit, check_up
 from rtradar.system.registries import READERS, reader_of
 
 register_reader = READERS.register
@@ -75,6 +74,4 @@ def load_motion(
         motion = read(file, **{option: value for option, value in given.items() if option in taken})
     if not isinstance(motion, Motion):
         raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")
-    if any(one.name == "rate_hz" for one in motion.findings):
-        return motion
-    return replace(motion, findings=(*motion.findings, rate_of(motion.rate_hz)))
+    return motion

@@ -22,7 +22,7 @@ from rtradar.errors import InputError
 from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.reading import to_world_from, warn_of_speed
-from rtradar.recordings import UPWARD, Finding
+from rtradar.recordings import UPWARD, Finding, rate_of
 from rtradar.system.checks import brief
 from rtradar.system.files import open_regular
 
@@ -83,7 +83,7 @@ def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None, up: str
     centres, pelvis, thorax = joint_centres(markers)
     motion = rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
     speed = warn_of_speed(str(path), motion.joints, motion.positions, seen.rate_hz)
-    return replace(motion, findings=(*seen.findings, speed))
+    return replace(motion, findings=(*seen.findings, rate_of(seen.rate_hz), speed))
 
 
 def read_markers(
