@@ -57,11 +57,20 @@ def test_a_radar_and_a_scene(tmp_path: Path) -> None:
     assert (found["kind"], found["furniture"]) == ("scene", 1)
 
 
+def test_what_comes_along_is_told_apart(tmp_path: Path) -> None:
+    for folder, kind in (("radars", "radar"), ("scenes", "scene")):
+        for file in sorted((Path(__file__).parents[1] / folder).glob("*.toml")):
+            found = looked(tmp_path, str(file))
+            assert (found["kind"], bool(found["name"])) == (kind, True), file
+
+
 def test_samples(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     np.save(tmp_path / "a.npy", np.ones((8, 3, 4, 16), np.complex64))
     found = looked(tmp_path, str(tmp_path / "a.npy"))
     assert (found["kind"], found["chirps"], found["tx_per_cycle"]) == ("samples", 24, 3)
     assert "which does not tell of its radar (--radar)" in capsys.readouterr().out
+    radar = str(Path(__file__).parents[1] / "radars" / "iwr1843.toml")
+    assert looked(tmp_path, str(tmp_path / "a.npy"), "--radar", radar)["radar"] == "iwr1843"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rtradar.campaign.augmentation import Augmented
@@ -64,7 +63,7 @@ class Recorded(NamedTuple):
     subject: str
     licence: str
     intervals: Intervals
-    said: Mapping[str, Any] = MappingProxyType({})
+    said: Mapping[str, Any]
 
 
 class Combination(NamedTuple):

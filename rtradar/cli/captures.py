@@ -409,7 +409,7 @@ def _people(options: argparse.Namespace, skeletons: Mapping[str, Path]) -> list[
             motion = load_motion(
                 name,
                 skeleton=skeletons.get(name),
-                up=options.up or "auto",
+                up=options.up,
                 unit=options.unit,
                 rate_hz=options.rate,
             )

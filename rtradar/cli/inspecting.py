@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 from rtradar.cli.values import add_command, add_files, add_reading, path
 from rtradar.system.checks import read_toml
 from rtradar.system.files import check_place, write_json
+from rtradar.system.registries import READERS
 
 if TYPE_CHECKING:
     from rtradar.cli.values import OneLineParser, Subcommands
 
-_SAMPLES = (".bin", ".npy", ".zarr", ".nc", ".mat")
-_OF_SCENES = ("room", "walls", "furniture", "objects", "people", "person_position_m")
-"""Keys of TOML files that tell a scene from a radar."""
+_OF_RADARS = ("range_bin_m", "max_range_m", "velocity_bin_mps", "max_velocity_mps", "n_tx", "n_rx")
 
 
 def add(commands: Subcommands) -> None:
@@ -40,6 +40,7 @@ def _add_inspect(command: OneLineParser) -> None:
     )
     command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
     add_reading(command)
+    command.option("--radar", "NAME|TOML|CFG", "the radar that received IF samples")
     add_files(command, json="write what was found there as JSON")
     command.set_defaults(command=_inspect)
 
@@ -60,38 +61,38 @@ def _inspect(options: argparse.Namespace) -> int:
 def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:
     """Return the kind of a file, values of what was found, and text about it."""
     suffix = file.suffix.lower()
-    if suffix in _SAMPLES:
-        return _samples(file)
-    if suffix == ".cfg" or (suffix == ".toml" and not _is_scene(file)):
-        from rtradar.radar import Radar
+    if suffix in (".cfg", ".toml"):
+        return _described(file)
+    if suffix.removeprefix(".") not in READERS:
+        from rtradar.exchange import IF_FORMATS
 
-        radar = Radar.load(file)
-        names = (
-            "range_bin_m",
-            "max_range_m",
-            "velocity_bin_mps",
-            "max_velocity_mps",
-            "n_tx",
-            "n_rx",
-        )
-        return "radar", {"name": radar.name} | {n: getattr(radar, n) for n in names}, repr(radar)
-    if suffix == ".toml":
-        from rtradar.scene import Scene
-
-        scene = Scene.load(file)
-        counts = {n: len(getattr(scene, n)) for n in ("walls", "furniture", "objects", "people")}
-        return "scene", {"name": scene.name, **counts}, repr(scene)
+        if suffix in IF_FORMATS:
+            return _samples(file, options)
     return _motion(file, options)
 
 
-def _is_scene(file: Path) -> bool:
-    return any(key in read_toml(file, "file", "give a TOML file") for key in _OF_SCENES)
+def _described(file: Path) -> tuple[str, dict[str, Any], str]:
+    """Look at a radar or a scene, of which a radar has fields beside its name."""
+    from rtradar.radar import Radar
+
+    fields = {field.name for field in dataclasses.fields(Radar)} - {"name"}
+    if file.suffix.lower() == ".cfg" or fields & read_toml(file, "file", "check the path").keys():
+        radar = Radar.load(file)
+        values = {name: getattr(radar, name) for name in _OF_RADARS}
+        return "radar", {"name": radar.name, **values}, repr(radar)
+    from rtradar.scene import Scene
+
+    scene = Scene.load(file)
+    counts = {n: len(getattr(scene, n)) for n in ("walls", "furniture", "objects", "people")}
+    return "scene", {"name": scene.name, **counts}, repr(scene)
 
 
-def _samples(file: Path) -> tuple[str, dict[str, Any], str]:
+def _samples(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:
     from rtradar.exchange import open_samples
+    from rtradar.radar import Radar
 
-    samples = open_samples(file)
+    given = None if options.radar is None else Radar.load(options.radar)
+    samples = open_samples(file, given)
     chirps, rx, of_chirp = samples.shape
     radar = None if samples.radar is None else samples.radar.name
     tx = "" if samples.tx_per_cycle is None else f", {samples.tx_per_cycle} Tx a cycle"
@@ -106,7 +107,7 @@ def _motion(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any
     from rtradar.motion.skeleton import to_nodes
 
     motion = load_motion(
-        file, options.skeleton, up=options.up or "auto", unit=options.unit, rate_hz=options.rate
+        file, options.skeleton, up=options.up, unit=options.unit, rate_hz=options.rate
     )
     to_nodes(motion)  # which names a joint that lacks
     found: dict[str, Any] = {one.name: one.value for one in motion.findings}

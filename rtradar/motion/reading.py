@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,7 @@ STATURE_M, _ADULT_M = (0.7, 2.2), (1.4, 2.05)
 """Limits of the stature of people, small children included, and of adults [m]."""
 
 FASTEST_M_S = 30.0
-"""No joint of a person is faster: a boxer's fist and a kicker's foot reach 10 to 25 m/s [m/s]."""
+"""Speed of a joint above which a recording is doubted [m/s]."""
 
 _ANKLE_OF_STATURE = 0.039
 """Height of the ankle over that of the person (Drillis and Contini 1966)."""
@@ -62,7 +64,7 @@ _LONGEST_POSE_S, _T_POSE_M_S, _T_POSE_TIMES = 2.0, 10.0, 4.0
 and so many times as fast as they move in nearly all frames after it."""
 
 
-def node(nodes: Array, name: str) -> Array:
+def of_node(nodes: Array, name: str) -> Array:
     """Positions (frame, 3) of a node among all (frame, node, 3)."""
     return nodes[:, NODES.index(name)]
 
@@ -74,15 +76,15 @@ def stature_of(nodes: Array) -> float:
         return float(np.nanmedian(np.linalg.norm(first - last, axis=1)))
 
     def middle(of: str) -> Array:
-        return (node(nodes, f"l_{of}") + node(nodes, f"r_{of}")) / 2
+        return (of_node(nodes, f"l_{of}") + of_node(nodes, f"r_{of}")) / 2
 
     legs = [
-        span(node(nodes, f"{side}_{first}"), node(nodes, f"{side}_{last}"))
+        span(of_node(nodes, f"{side}_{first}"), of_node(nodes, f"{side}_{last}"))
         for side in "lr"
         for first, last in (("hip", "knee"), ("knee", "ankle"))
     ]
     trunk = span(middle("shoulder"), middle("hip"))
-    head = span(node(nodes, "head"), middle("shoulder"))
+    head = span(of_node(nodes, "head"), middle("shoulder"))
     return (sum(legs) / 2 + trunk + head) / (1 - _ANKLE_OF_STATURE)
 
 
@@ -109,9 +111,11 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
     )
 
 
-def settled_unit(where: str, stature: float, unit_m: float | None) -> tuple[float, Finding]:
+def settled_unit(
+    where: str, stature: float, unit_m: float | None, by: str = "given"
+) -> tuple[float, Finding]:
     """Find the unit, or check one that is given: a warning says where it makes nobody's stature."""
-    how = f"unit: {unit_m} m, as given"
+    how = f"unit: {unit_m:.4g} m, as {by}" if unit_m is not None else ""
     if unit_m is None:
         unit_m, how = found_unit(where, stature)
     stature_m = stature * unit_m
@@ -148,8 +152,8 @@ class _Stance:
 
 def _stances(nodes: Array) -> dict[str, _Stance]:
     size = stature_of(nodes)
-    ankles = (node(nodes, "l_ankle") + node(nodes, "r_ankle")) / 2
-    body = node(nodes, "head") - ankles
+    ankles = (of_node(nodes, "l_ankle") + of_node(nodes, "r_ankle")) / 2
+    body = of_node(nodes, "head") - ankles
     with np.errstate(invalid="ignore", divide="ignore"):
         body = body / np.linalg.norm(body, axis=1, keepdims=True)
     found = {}
@@ -263,10 +267,10 @@ def leading_t_pose(nodes: Array, rate_hz: float) -> int:
 
 
 def _in_t_pose(nodes: Array) -> bool:
-    across = node(nodes, "l_shoulder") - node(nodes, "r_shoulder")
+    across = of_node(nodes, "l_shoulder") - of_node(nodes, "r_shoulder")
     across = across / np.linalg.norm(across, axis=1, keepdims=True)
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        arm = node(nodes, f"{side}_wrist") - node(nodes, f"{side}_shoulder")
+        arm = of_node(nodes, f"{side}_wrist") - of_node(nodes, f"{side}_shoulder")
         level = sign * np.sum(arm * across, axis=1) / np.linalg.norm(arm, axis=1)
         if (level < _ARMS_LEVEL).any():
             return False
@@ -308,9 +312,9 @@ def longest_chain(motion: Motion) -> float:
 
 
 def settled(
-    where: str, motion: Motion, *, unit_m: float | None, up: str | None, usual_up: str = "y"
+    where: str, motion: Motion, *, unit_m: float | None, up: str | None, unit_by: str = "given"
 ) -> Motion:
-    """Give a motion of a skeleton its unit and its world.
+    """Give a motion of a skeleton, of a format whose y is up, its unit and its world.
 
     Parameters
     ----------
@@ -320,36 +324,34 @@ def settled(
         As read: lengths in units of the file, and axes as if y were up there.
     unit_m, up : float, str, optional
         What the user says; found where not given.
-    usual_up : str
-        Axis that the format has.
+    unit_by : str
+        Who says the unit.
     """
-    # Lengths that are nothing to a person are told from others at a person's size.
+    # What is too short for a part of a body is known at a body's size alone.
+    count = len(motion.root_positions)
     about = longest_chain(motion) / _CHAIN_OF_STATURE
     if not about > 0:
         raise InputError(f"{where}: no bone has a length; mend the skeleton")
     try:
-        nodes = to_nodes(_some_frames(motion.scaled(_NOMINAL_STATURE_M / about))).positions
-    except InputError:  # names that are not known, which a body of its own may have
+        some = _of_frames(motion, partial(_every, step=math.ceil(count / _LOOKED_AT)))
+        nodes = to_nodes(some.scaled(_NOMINAL_STATURE_M / about)).positions
+    except InputError:  # its names are not known: whoever needs its nodes is told which lack
         unit_m = found_unit(where, about)[0] if unit_m is None else unit_m
-        return replace(turned_up(motion.scaled(unit_m), up or usual_up), girth=motion.girth)
+        return replace(turned_up(motion.scaled(unit_m), up or "y"), girth=motion.girth)
     size = stature_of(nodes) * about / _NOMINAL_STATURE_M
-    unit_m, unit = settled_unit(where, size, unit_m)
-    found = [unit, tall(size * unit_m)]
-    upward, how = found_up(where, nodes @ to_world_from("y"), given=up or "", usual=usual_up)
-    found.append(Finding("up", upward, how))
-    made = replace(turned_up(motion.scaled(unit_m), upward), girth=motion.girth)
-    first = to_nodes(_first_frames(made)).positions
-    dropped = leading_t_pose(first, made.rate_hz)
+    unit_m, unit = settled_unit(where, size, unit_m, unit_by)
+    upward, how = found_up(where, nodes @ to_world_from("y"), given=up or "", usual="y")
+    found = [unit, tall(size * unit_m), Finding("up", upward, how), rate_of(motion.rate_hz)]
+    made = turned_up(motion if unit_m == 1 else motion.scaled(unit_m), upward)
+    first = slice(round(2 * _LONGEST_POSE_S * made.rate_hz))
+    dropped = leading_t_pose(to_nodes(_of_frames(made, itemgetter(first))).positions, made.rate_hz)
     if dropped:
         text = f"frame 1 is a T-pose: {dropped} frame{'s' * (dropped > 1)} dropped at the beginning"
         warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=3)
         found.append(Finding("t_pose_frames", dropped, text))
-        made = replace(
-            made, root_positions=made.root_positions[dropped:], rotations=made.rotations[dropped:]
-        )
+        made = _of_frames(made, itemgetter(slice(dropped, None)))
     found.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
-    found.append(rate_of(made.rate_hz))
-    return replace(made, findings=tuple(found))
+    return replace(made, girth=motion.girth, findings=tuple(found))
 
 
 def turned_up(motion: Motion, up: str) -> Motion:
@@ -374,14 +376,10 @@ def _quaternion(rotation: Array) -> Array:
     return np.asarray(Rotation.from_matrix(rotation).as_quat())
 
 
-def _some_frames(motion: Motion) -> Motion:
-    step = math.ceil(len(motion.root_positions) / _LOOKED_AT)
-    return replace(
-        motion,
-        root_positions=_every(motion.root_positions, step),
-        rotations=_every(motion.rotations, step),
-        length_s=None,
-    )
+def _of_frames(motion: Motion, take: Callable[[Array], Array]) -> Motion:
+    """Keep some frames of a motion, those that a function takes from rows."""
+    rows = take(motion.root_positions), take(motion.rotations)
+    return replace(motion, root_positions=rows[0], rotations=rows[1])
 
 
 def _every(array: Array, step: int) -> Array:
@@ -391,12 +389,3 @@ def _every(array: Array, step: int) -> Array:
         found.append(rows[-first % step :: step].copy())
         first += len(rows)
     return np.concatenate(found)
-
-
-def _first_frames(motion: Motion) -> Motion:
-    return replace(
-        motion,
-        root_positions=motion.root_positions[:_LOOKED_AT],
-        rotations=motion.rotations[:_LOOKED_AT],
-        length_s=None,
-    )

@@ -151,7 +151,7 @@ ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*CONVENTIONS[0].joints.
 
 def plain(name: str) -> str:
     """A joint's name without namespace (``mixamorig:``, ``Bip01``), case, spaces, underscores."""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|Bip\d+)", "", name).lower())
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|[Bb]ip\d+)", "", name).lower())
 
 
 MINIMUM_PART_M = 0.01

@@ -42,6 +42,9 @@ from rtradar.system.threads import one_blas_thread
 Moving = Motion | Person | Sequence[Motion | Person | Object]
 """Who and what moves: one or several, with a bare motion for a person where the scene puts them."""
 
+_CREST = 9.0
+"""Power of people's samples at their peak over its mean: the echoes of parts add up by chance."""
+
 
 @one_blas_thread()
 def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
@@ -98,7 +101,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
-    movers = _movers(radar, budget, model, echoes, n_chirps)
+    movers = _movers(budget, model, echoes, n_chirps) if radar.receiver is not None else ()
     inside, tones = None, model
     if radar.multiplexing == "bpm":
         tones = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
@@ -194,22 +197,15 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
 
 
 def _movers(
-    radar: Radar, budget: LinkBudget, model: EchoModel, echoes: Echoes, n_chirps: int
+    budget: LinkBudget, model: EchoModel, echoes: Echoes, n_chirps: int
 ) -> tuple[Mover, ...]:
-    """Power and delay of people, by the link budget and some echoes, and of each moving object."""
-    if radar.receiver is None:
-        return ()
+    """Return people, by the link budget and some echoes of everything, and each moving object."""
     objects = model.movers(n_chirps) if isinstance(model, World) else ()
-    own = np.flatnonzero(echoes.part < len(budget.part_power))
-    of_people = replace(
-        echoes,
-        length=echoes.length[..., own],
-        amplitude=echoes.amplitude[..., own],
-        part=echoes.part[own],
-        bounces=echoes.bounces[own],
-    )
-    people = Mover(sum(budget.person_power), float(mean_delays(of_people).mean()))
-    return people, *(Mover(*one) for one in objects)
+    own = echoes.part < len(budget.part_power)
+    delays = mean_delays(replace(echoes, amplitude=np.where(own, echoes.amplitude, 0)))
+    power = sum(budget.person_power)
+    people = Mover(power, _CREST * power, float(delays.mean()))
+    return people, *(Mover(largest, largest, delay_s) for largest, delay_s in objects)
 
 
 def _receiver(

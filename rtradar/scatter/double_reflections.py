@@ -7,7 +7,6 @@ person has. Mitsuba decides at keyframes what hides the three legs.
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from itertools import combinations, permutations
 from typing import Any, Literal, NamedTuple
@@ -207,21 +206,20 @@ class DoubleReflections:
         self._least_db, self._touching = least_db, touching
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT, _PASSING)
         parts = len(body.part_names)
-        self._power, self._whole = np.zeros((parts, parts)), 0.0
+        self._power, self._beside = np.zeros((parts, parts)), np.zeros((parts, parts))
 
     def account(self) -> dict[str, Any]:
-        """Name the parts of each pair, strongest first, with its mean power at keyframes [dB]."""
-        names, whole = self._body.part_names, max(self._whole, np.finfo(np.float64).tiny)
-        order = sorted(np.argwhere(self._power).tolist(), key=lambda pair: -self._power[*pair])
+        """Name the parts of each pair, strongest first, with its power where it is kept [dB]."""
+        names, pairs = self._body.part_names, np.argwhere(self._power)
+        own = tuple(pairs.T)
+        decibels = 10 * np.log10(self._power[own] / self._beside[own])
         rows = [
             {
-                "first": names[first],
-                "last": names[last],
-                "over_single_reflections_db": round(
-                    10 * math.log10(self._power[first, last] / whole), 1
-                ),
+                "first": names[pairs[place, 0]],
+                "last": names[pairs[place, 1]],
+                "over_single_reflections_db": round(float(decibels[place]), 1),
             }
-            for first, last in order
+            for place in np.argsort(-decibels)
         ]
         return {"double_reflections": rows}
 
@@ -295,8 +293,8 @@ class DoubleReflections:
         self._tracer.pose(centres[0], frames[0])
         clear = legs_clear(self._tracer, tx, rx[:, None], points, pairs)[0, 0]
         weight = clear * smoothstep(np.minimum(above_db[worth] / _FADE_DB, 1.0))
-        self._power[pairs[:, 0], pairs[:, 1]] += power[worth] * weight**2
-        self._whole += float(single.sum())
+        for sums, values in ((self._power, power), (self._beside, beside)):
+            sums[tuple(pairs[clear].T)] += values[worth][clear]
         # To the axes in which the parts are unit spheres.
         away = points[0, 0] - centres[0, pairs]
         local = np.einsum("neji,nej->nei", frames[0, pairs], away)

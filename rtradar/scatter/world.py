@@ -86,10 +86,10 @@ class World:
         chirps = np.unique(np.linspace(0, n_chirps - 1, _GLANCES).astype(np.int64))
         found = []
         for direct, *_ in self.objects:
-            powers = _powers(direct, chirps)
-            at = int(powers.argmax())
-            length = direct.echoes(chirps[at : at + 1]).length
-            found.append((float(powers[at]), float(length.mean()) / SPEED_OF_LIGHT_MPS))
+            echoes = direct.echoes(chirps)
+            powers = _powers(echoes)
+            length = echoes.length[powers.argmax()].mean()
+            found.append((float(powers.max()), float(length) / SPEED_OF_LIGHT_MPS))
         return found
 
     def prune(self, radar: Radar, n_chirps: int, noise_power_m2: float) -> list[dict[str, Any]]:
@@ -105,7 +105,7 @@ class World:
         chirps = np.unique(np.linspace(0, n_chirps - 1, _INSTANTS).astype(np.int64))
         found = []
         for number, own in enumerate(self.objects):
-            powers = [float(_powers(path, chirps).mean()) for path in own]
+            powers = [float(_powers(path.echoes(chirps)).mean()) for path in own]
             enough = max(least, powers[0] * 10 ** (LEAST_GHOST_DB / 10)) if least else 0.0
             worth = [not place or 0 < power >= enough for place, power in enumerate(powers)]
             rows = [
@@ -117,9 +117,8 @@ class World:
         return found
 
 
-def _powers(path: RigidEchoes, chirps: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Power of the echoes (chirp,) [m^2], of which those next to each other add up as fields."""
-    echoes = path.echoes(chirps)
+def _powers(echoes: Echoes) -> NDArray[np.float64]:
+    """Power of echoes (chirp,) [m^2], of which those next to each other add up as fields."""
     k = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
     turns = np.exp(1j * k[:, None, None, None] * echoes.length)
     fields = (echoes.amplitude * turns).sum(axis=3)

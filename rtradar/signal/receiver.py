@@ -54,9 +54,10 @@ class Effect:
 
 
 class Mover(NamedTuple):
-    """Power of the echoes of who or what moves [m^2], and their mean delay [s]."""
+    """Echoes of who or what moves: their power, that at their peak [m^2], and mean delay [s]."""
 
     power_m2: float
+    peak_m2: float
     delay_s: float
 
 
@@ -103,7 +104,7 @@ class ReceiverStage:
         window = np.hanning(shape[2] + 1)[:-1]
         profiles = np.fft.fft(around * (window / window.sum()))
         # The strongest cell, of what is still or of what moves.
-        strongest = max((mover.power_m2 for mover in expected.movers), default=0.0)
+        strongest = max(mover.power_m2 for mover in expected.movers)
         self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), strongest)
         if self._receiver.phase_noise_hz:
             self._set_phase_noise(seed, ((*room.cycle,) if room else ()) + still)
@@ -162,10 +163,10 @@ class ReceiverStage:
 
     def _set_phase_noise(self, seed: int, still: tuple[Echoes, ...]) -> None:
         e = self._expected
-        farthest_s = max((mover.delay_s for mover in e.movers), default=0.0)
+        farthest_s = max(mover.delay_s for mover in e.movers)
         noise = PhaseNoise(self._radar, self._receiver, seed, still, farthest_s)
         note = "residual density, where it is densest, over that of the noise"
-        level = max((noise.level_m2(*mover) for mover in e.movers), default=noise.level_m2(0, 0))
+        level = max(noise.level_m2(mover.power_m2, mover.delay_s) for mover in e.movers)
         if self._keep("phase_noise", level, e.noise_m2, note):
             self._noise, self._fields = noise, noise.fields()
 
@@ -259,9 +260,9 @@ class ReceiverStage:
             step = full / 2 ** (receiver.adc_bits - 1)
             if self._keep("quantisation", step**2 / 6, e.noise_m2, "white noise of rounding"):
                 self._step = np.float32(step)
-        moving = sum(math.sqrt(mover.power_m2) for mover in e.movers)
+        moving = sum(math.sqrt(mover.peak_m2) for mover in e.movers)
         other = float(np.abs(self._steering).max())
-        most = float(abs(self._dc)) + most + other + 3 * moving + 4 * math.sqrt(e.noise_m2)
+        most = float(abs(self._dc)) + most + other + moving + 4 * math.sqrt(e.noise_m2)
         beyond = max(most - full, 0.0)
         note = f"samples reach {20 * math.log10(max(most, 1e-300) / full):.1f} dB of full scale"
         if self._keep("clipping", beyond**2, e.cell_m2, note):

@@ -159,7 +159,7 @@ def _costs(outcomes: Sequence[Outcome]) -> str:
     lines = [f"{'script':<26} {'processor':>10} {'share':>6} {'judged':>6} {'a figure':>9}"]
     whole = sum(outcome.cpu_seconds for outcome in outcomes) or 1.0
     for outcome in sorted(outcomes, key=lambda each: -each.cpu_seconds)[:_COSTLIEST]:
-        seconds, count = outcome.cpu_seconds, sum(r.tolerance is not None for r in outcome.rows)
+        seconds, count = outcome.cpu_seconds, outcome.judged
         each = f"{seconds / count:.2f} s" if count else "-"
         lines.append(
             f"{outcome.claim.name:<26} {seconds:8.1f} s {seconds / whole:6.1%} {count:6d} {each:>9}"
@@ -183,7 +183,7 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
                 "keys": outcome.keys,
                 "seconds": round(outcome.seconds, 2),
                 "cpu_seconds": round(outcome.cpu_seconds, 2),
-                "judged": sum(row.tolerance is not None for row in outcome.rows),
+                "judged": outcome.judged,
                 "failed": len(outcome.failed),
                 "left_out": outcome.left_out,
                 "trouble": outcome.trouble,

@@ -63,6 +63,11 @@ class Outcome:
     left_out: tuple[str, ...] = ()
 
     @property
+    def judged(self) -> int:
+        """Number of rows that have a limit."""
+        return sum(row.tolerance is not None for row in self.rows)
+
+    @property
     def failed(self) -> list[Row]:
         """Rows outside their limits."""
         return [row for row in self.rows if not row.passed]

@@ -63,7 +63,8 @@ def walker(
     frames: int = 60,
     t_poses: int = 0,
     layout: str = "usual",
-    travels: bool = True,
+    way: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    swing_deg: float = 25.0,
 ) -> str:
     """A BVH file of a walker, whose root is turned as a whole."""
     turn = Rotation.identity() if turn is None else turn
@@ -91,9 +92,9 @@ def walker(
         lines = [" ".join(lines)]
     rows = []
     for frame in range(t_poses + frames):
-        swing = 25 * np.sin(2 * np.pi * 0.9 * frame / RATE_HZ) * (frame >= t_poses)
-        ahead = 1.1 * frame / RATE_HZ * travels
-        place = turn.apply([0.0, HIP_M + 0.005, ahead]) / unit_m
+        swing = swing_deg * np.sin(2 * np.pi * 0.9 * frame / RATE_HZ) * (frame >= t_poses)
+        gone = 1.1 * frame / RATE_HZ * np.array(way)
+        place = turn.apply(np.array([0.0, HIP_M + 0.005, 0.0]) + gone) / unit_m
         angles = dict.fromkeys(order, (0.0, 0.0, 0.0))
         angles["LeftUpLeg"], angles["RightUpLeg"] = (0, swing, 0), (0, -swing, 0)
         if frame >= t_poses:  # the arms hang down
@@ -149,7 +150,7 @@ def test_a_file_of_the_format_is_read_without_a_word(tmp_path: Path) -> None:
     walks_upright(motion)
     assert not said
     assert [one.name for one in motion.findings] == [
-        "unit_m", "stature_m", "up", "largest_speed_mps", "rate_hz",
+        "unit_m", "stature_m", "up", "rate_hz", "largest_speed_mps",
     ]  # fmt: skip
 
 
@@ -164,12 +165,13 @@ def test_another_axis_that_is_up_is_found_and_said(tmp_path: Path, turn: Rotatio
 
 
 def test_who_lies_stays_lying(tmp_path: Path) -> None:
-    # On the back, in place: along y there is a floor at zero, along z the head is 1.5 m away.
+    # On the back, moving along the body: y has a floor at zero, -z one that goes away.
     lying = Rotation.from_euler("x", -90, degrees=True)
-    motion, said = read(tmp_path, walker(turn=lying, travels=False), up="y")
+    shifted = walker(turn=lying, swing_deg=5.0, way=(0.0, 1.0, 0.0))
+    motion, said = read(tmp_path, shifted)
     assert not said
+    assert "the person lies on a floor" in {one.name: one.text for one in motion.findings}["up"]
     assert np.ptp(nodes_of(motion)["head"][:, 2]) < 0.1
-    assert nodes_of(motion)["head"][:, 2].max() < 0.5
 
 
 def test_who_may_as_well_stand_is_refused(tmp_path: Path) -> None:
@@ -248,6 +250,15 @@ def test_the_rate_may_be_said(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"line \d+: Frame Time: is 33.333; .*--rate"):
         read(tmp_path, wrong)
     assert read(tmp_path, wrong, rate_hz=30.0)[0].rate_hz == 30
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0])
+def test_a_rate_counts_in_place_of_the_file_s(tmp_path: Path, rate_hz: float) -> None:
+    walk = synthetic_motion("walk", seed=0, duration_s=1.0)
+    path = joints(tmp_path, walk, np.eye(3), np.zeros(3), up="z", time_s=np.arange(121) * 1e-3)
+    motion = load_motion(path, rate_hz=rate_hz)
+    assert motion.duration_s == pytest.approx(120 / rate_hz)
+    assert ("rate_hz", rate_hz) in [one[:2] for one in motion.findings]
 
 
 def test_what_nobody_can_do_is_said(tmp_path: Path) -> None:

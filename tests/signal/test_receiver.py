@@ -55,7 +55,7 @@ def radar(multiplexing: str = "tdm", **fields: Any) -> rt.Radar:
 
 
 def stage(radar: rt.Radar, noise_m2: float = 0.0, **options: Any) -> ReceiverStage:
-    expected = Expected((Mover(1e-2, 4e-8),), noise_m2, noise_m2 / 100)
+    expected = Expected((Mover(1e-2, 9e-2, 4e-8),), noise_m2, noise_m2 / 100)
     return ReceiverStage(radar, expected, n_chirps=60, **options)
 
 
@@ -163,7 +163,14 @@ def test_an_object_that_moves_may_clip_the_converter() -> None:
     )
     assert not alone["clipping"]["modelled"]
     assert both["clipping"]["modelled"]
+    said = float(both["clipping"]["note"].split()[2])
     assert both["phase_noise"]["level_db"] > alone["phase_noise"]["level_db"] + 20
     samples = rt.simulate([person, cart], its, **options).samples.values
     full = np.sqrt(10**-6 * 1e-3 / its.watts_per_m2)
     assert np.abs(samples.real).max() == pytest.approx(full, rel=1e-5)
+    # The note is about what the samples of an ideal converter reach.
+    wider = dataclasses.replace(
+        its, receiver=dataclasses.replace(its.receiver, adc_full_scale_dbm=0.0)
+    )
+    ideal = rt.simulate([person, cart], wider, **options).samples.values
+    assert said == pytest.approx(20 * np.log10(np.abs(ideal).max() / full), abs=3.0)

@@ -54,7 +54,9 @@ def radar(n_rx: int = 1, **fields: Any) -> rt.Radar:
 
 def stage(made: rt.Radar, moving_m2: float = 1.0) -> ReceiverStage:
     """Everything that the receiver has, for there is no noise."""
-    return ReceiverStage(made, Expected((Mover(moving_m2, 1e-8),), 0.0, 0.0), n_chirps=100)
+    return ReceiverStage(
+        made, Expected((Mover(moving_m2, 9 * moving_m2, 1e-8),), 0.0, 0.0), n_chirps=100
+    )
 
 
 def received(made: rt.Radar, samples: NDArray[Any]) -> NDArray[np.complex128]:

@@ -17,7 +17,7 @@ def load_motion(
     path: str | Path,
     skeleton: str | Path | None = None,
     *,
-    up: str = "auto",
+    up: str | None = "auto",
     unit: str | float | None = None,
     rate_hz: float | None = None,
     unit_m: float | None = None,
@@ -34,7 +34,7 @@ def load_motion(
         ``.npz`` and ``.csv`` with joint positions, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
-    up : {"auto", "x", "y", "z", "-x", "-y", "-z"}
+    up : {"auto", "x", "y", "z", "-x", "-y", "-z"}, optional
         Axis of the file that is up.
     unit : {"m", "cm", "mm", "in", "cmu"} or float, optional
         Length unit of the file, or the metres of one; an ``.asf`` says it itself.
@@ -70,7 +70,8 @@ def load_motion(
         taken = inspect.signature(read).parameters
         for option, value in given.items():
             if value is not None and option not in taken:
-                raise InputError(f"{file}: {name.upper()} files take no {option}; leave it out")
+                said = "unit" if option == "unit_m" else option
+                raise InputError(f"{file}: {name.upper()} files take no {said}; leave it out")
         motion = read(file, **{option: value for option, value in given.items() if option in taken})
     if not isinstance(motion, Motion):
         raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")

@@ -237,7 +237,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
         rotations=rotations.rows(),
         rate_hz=_RATE_HZ if rate_hz is None else rate_hz,
     )
-    return settled(str(path), motion, unit_m=1.0, up=up)
+    return settled(str(path), motion, unit_m=1.0, up=up, unit_by="metres by the skeleton")
 
 
 def _posed(

@@ -67,7 +67,14 @@ class _Content(NamedTuple):
     upward: str
 
 
-def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None, up: str | None) -> Motion:
+def load_c3d(
+    path: Path,
+    *,
+    skeleton: Path | None,
+    unit_m: float | None,
+    up: str | None,
+    rate_hz: float | None,
+) -> Motion:
     """Read a C3D file, and find the 22 joints of a rigid skeleton from its markers (`markers`).
 
     An `InputError` names the marker and the frames, by the file's numbers.
@@ -77,6 +84,8 @@ def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None, up: str
             f"{path}: a C3D file holds markers, from which joints are found; leave {skeleton} out"
         )
     seen = read_markers(path, NEEDED, unit_m, up)
+    if rate_hz is not None:
+        seen = replace(seen, rate_hz=rate_hz)
     positions = bridged(seen)
     markers = {name: positions[:, k] for k, name in enumerate(seen.names)}
     _check_person(seen, markers)

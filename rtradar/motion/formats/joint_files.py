@@ -55,7 +55,7 @@ class JointRecording:
     joined: int = 0
 
 
-def read_npz(path: Path) -> JointRecording:
+def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
     """Read an archive of NumPy; an `InputError` tells what is wrong with it."""
     try:
         arrays = read_arrays(path)
@@ -68,10 +68,10 @@ def read_npz(path: Path) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    return _checked(path, arrays)
+    return _checked(path, arrays, rate_hz)
 
 
-def read_csv(path: Path) -> JointRecording:
+def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
     """Read a table with a header; an `InputError` names the line."""
     with TextFile(path, "table of joint positions") as text:
         header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
@@ -101,7 +101,7 @@ def read_csv(path: Path) -> JointRecording:
         arrays["time_s"] = values[:, columns["time_s"]]
     if "rate_hz" in columns and len(rows):
         arrays["rate_hz"] = values[0, columns["rate_hz"]]
-    return _checked(path, arrays)
+    return _checked(path, arrays, rate_hz)
 
 
 def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
@@ -131,8 +131,13 @@ def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[st
     return others, joints
 
 
-def _checked(path: Path, arrays: Mapping[str, NDArray[Any]]) -> JointRecording:
-    """Make a recording of what a file holds."""
+def _checked(
+    path: Path, arrays: Mapping[str, NDArray[Any]], rate_hz: float | None
+) -> JointRecording:
+    """Make a recording of what a file holds; a rate that is given counts in place of the file's."""
+    if rate_hz is not None:
+        arrays = {name: array for name, array in arrays.items() if name != "time_s"}
+        arrays["rate_hz"] = np.array(rate_hz)
     for needed in ("positions", "joints", "rate_hz or time_s"):
         if not any(name in arrays for name in needed.split(" or ")):
             raise InputError(f"{path}: {needed} is missing; {_NEEDED}")

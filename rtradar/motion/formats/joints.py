@@ -39,6 +39,7 @@ from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.reading import (
     found_up,
+    of_node,
     settled_unit,
     stature_of,
     to_world_from,
@@ -76,14 +77,14 @@ _TOE_HEIGHT_M, _ON_THE_FLOOR = 0.02, 0.1
 height of the lowest node, over all frames, that is a person's who stands."""
 
 
-def load_npz(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
+def load_npz(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
     """Read joint positions from an archive of NumPy."""
-    return motion_of(read_npz(path), unit_m, up)
+    return motion_of(read_npz(path, rate_hz), unit_m, up)
 
 
-def load_csv(path: Path, *, unit_m: float | None = None, up: str | None = None) -> Motion:
+def load_csv(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
     """Read joint positions from a table with a header."""
-    return motion_of(read_csv(path), unit_m, up)
+    return motion_of(read_csv(path, rate_hz), unit_m, up)
 
 
 def motion_of(
@@ -93,9 +94,9 @@ def motion_of(
     where = str(recording.path)
     joint_set = recognise(where, recording.names)
     nodes = node_positions(joint_set, recording.names, recording.positions)
-    for node in np.flatnonzero(np.isnan(nodes[..., 0]).all(axis=0)):
+    for unseen in np.flatnonzero(np.isnan(nodes[..., 0]).all(axis=0)):
         raise InputError(
-            f"{where}: the joint of node {NODES[node]!r} is never seen; add it, or take another "
+            f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
     unit_m, unit = settled_unit(where, stature_of(nodes), unit_m)
@@ -107,7 +108,7 @@ def motion_of(
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, joint_set)
-    hips, shoulders = (_node(nodes, f"l_{at}") - _node(nodes, f"r_{at}") for at in _SIDES)
+    hips, shoulders = (of_node(nodes, f"l_{at}") - of_node(nodes, f"r_{at}") for at in _SIDES)
     pelvis, thorax = (_axes(where, left, _trunk(nodes)) for left in (hips, shoulders))
     _complete(nodes, pelvis, joint_set)
     _keep_directions(where, nodes)
@@ -126,17 +127,13 @@ def motion_of(
 _SIDES = ("hip", "shoulder")
 
 
-def _node(nodes: Array, name: str) -> Array:
-    return nodes[:, NODES.index(name)]
-
-
 def _length(nodes: Array, first: str, last: str) -> Array:
-    return np.asarray(np.linalg.norm(_node(nodes, first) - _node(nodes, last), axis=1))
+    return np.asarray(np.linalg.norm(of_node(nodes, first) - of_node(nodes, last), axis=1))
 
 
 def _trunk(nodes: Array) -> Array:
     """Vectors (frame, 3) from the middle of the hips to that of the shoulders."""
-    hips, shoulders = (_node(nodes, f"l_{at}") + _node(nodes, f"r_{at}") for at in _SIDES)
+    hips, shoulders = (of_node(nodes, f"l_{at}") + of_node(nodes, f"r_{at}") for at in _SIDES)
     return np.asarray((shoulders - hips) / 2)
 
 
@@ -223,20 +220,20 @@ def _complete(nodes: Array, pelvis: Array, joint_set: JointSet) -> None:
     direction is uncertain then, points more and more as the forearm or the trunk does.
     """
     thigh = float(np.median(_length(nodes, "l_knee", "l_hip")))
-    head, upward = _node(nodes, "head") - _node(nodes, "neck"), _directions(_trunk(nodes))
+    head, upward = of_node(nodes, "head") - of_node(nodes, "neck"), _directions(_trunk(nodes))
     head = _lengthened(head, upward, 0.5 * float(np.median(np.linalg.norm(head, axis=1))))
     if not joint_set.head_is_top:
         head = HEAD_OF_THIGH * thigh * _directions(head)
-    nodes[:, NODES.index("head")] = _node(nodes, "neck") + head
+    nodes[:, NODES.index("head")] = of_node(nodes, "neck") + head
     for side in ("l", "r"):
-        knee, ankle, toe = (_node(nodes, f"{side}_{at}") for at in ("knee", "ankle", "toe"))
+        knee, ankle, toe = (of_node(nodes, f"{side}_{at}") for at in ("knee", "ankle", "toe"))
         shank = _directions(knee - ankle)
         length = _FOOT_OF_SHANK * float(np.median(_length(nodes, f"{side}_knee", f"{side}_ankle")))
         along = np.sum((toe - ankle) * shank, axis=1, keepdims=True) * shank
         reach = np.sqrt(np.maximum(length**2 - np.sum(along**2, axis=1, keepdims=True), 0))
         ahead = _lengthened(toe - ankle - along, np.cross(pelvis[..., 1], shank), reach)
         nodes[:, NODES.index(f"{side}_toe")] = ankle + along + ahead
-        elbow, wrist, end = (_node(nodes, f"{side}_{at}") for at in ("elbow", "wrist", "hand"))
+        elbow, wrist, end = (of_node(nodes, f"{side}_{at}") for at in ("elbow", "wrist", "hand"))
         half = 0.5 * float(np.median(_length(nodes, f"{side}_hand", f"{side}_wrist")))
         hand = _lengthened(end - wrist, _directions(wrist - elbow), half)
         nodes[:, NODES.index(f"{side}_hand")] = wrist + hand
