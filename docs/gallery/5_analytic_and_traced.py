@@ -45,8 +45,8 @@ above.set(
     xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps"
 )
 above.legend()
-occluded = found.summary["fidelities"]["specular"]["part_hidden_share"]
+occluded = found.summary["fidelities"]["specular"]["part_occluded_share"]
 below.barh(list(occluded), [100 * fraction for fraction in occluded.values()])
-below.set(xlabel="Occluded [% of time and channels]", title="What rays find occluded")
+below.set(xlabel="Occluded [% of the part's power]", title="What rays find occluded")
 below.tick_params(axis="y", labelsize=6)
 figure.savefig(OUT / "5_analytic_and_traced.png")

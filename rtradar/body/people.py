@@ -206,6 +206,40 @@ class Bodies(Body):
         return Poses(centres, frames, self.semi_axes)
 
 
+class OnePart(Body):
+    """One part of a body, moving as it does with the rest, alone in the world.
+
+    Parameters
+    ----------
+    body : Body
+        Body of ellipsoids.
+    part : int
+        Number of the part.
+    """
+
+    def __init__(self, body: Body, part: int) -> None:
+        for name, value in (
+            ("semi_axes", body.semi_axes[part : part + 1]),
+            ("names", (body.names[body.owner[part]],)),
+            ("owner", np.zeros(1, np.int64)),
+            ("materials", body.materials[part : part + 1]),
+            ("part_names", body.part_names[part : part + 1]),
+            ("duration_s", body.duration_s),
+            ("_whole", body),
+            ("_part", part),
+        ):
+            object.__setattr__(self, name, value)
+
+    _whole: Body
+    _part: int
+
+    def at(self, times: ArrayLike) -> Poses:
+        """Poses of the part; see `Body.at`."""
+        own = slice(self._part, self._part + 1)
+        centres, frames, semi_axes = self._whole.at(times)
+        return Poses(centres[:, own], frames[:, own], semi_axes[own])
+
+
 def distinct_names(names: Sequence[str]) -> tuple[str, ...]:
     """Number the names that come more than once, from 1 on.
 

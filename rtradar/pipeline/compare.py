@@ -16,7 +16,7 @@ from rtradar.errors import InputError
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_runs
-from rtradar.pipeline.prepare import Moving
+from rtradar.pipeline.prepare import Moving, power_alone
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.pipeline.view import load_run_view
@@ -29,14 +29,14 @@ from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, check_fidelities, settings_of
+from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings_of
 from rtradar.system.output_folder import atomic_folder
 
 MEASURES = (
     # key, heading, digits
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
-    ("hidden_share", "Occluded fraction of parts, times and channels", 3),
+    ("occluded_share", "Echo power that other parts occlude, fraction", 3),
     ("range_doppler_correlation", "Range-Doppler correlation [dB maps]", 3),
     ("range_doppler_mean_db", "Range-Doppler, mean difference [dB]", 2),
     ("range_doppler_rms_db", "Range-Doppler, rms difference [dB]", 2),
@@ -137,16 +137,17 @@ def compare(
     settings = settings_of("compare", RunOptions, options)
     kind = files_of_runs("compare.json", _FILES, list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
+        scene = Scene() if scene is None else scene
         results: dict[str, Result] = {}
+        occluded: dict[str, _Occluded] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = run_into(
-                folder / name, motion, radar, Scene() if scene is None else scene, own
-            )
+            results[name] = run_into(folder / name, motion, radar, scene, own)
+            occluded[name] = _occluded(results[name], motion, radar, scene, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
-        summary = _summary(results, radar, names[-1])
-        pictures, unit = _draw(results, folder, radar, names[-1])
+        summary = _summary(results, occluded, radar, names[-1])
+        pictures, unit = _draw(results, occluded, folder, radar, names[-1])
         views = {name: load_run_view(folder / name) for name in names}
         comparison.write_comparison(
             folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
@@ -171,7 +172,34 @@ def comparison_rows(
     return rows
 
 
-def _summary(results: Mapping[str, Result], radar: Radar, reference: str) -> dict[str, Any]:
+class _Occluded(NamedTuple):
+    """Fraction of the echo power that other parts occlude, over all and of each part (part,)."""
+
+    share: float | None
+    of_parts: NDArray[np.float64]
+
+
+def _occluded(
+    result: Result, motion: Moving, radar: Radar, scene: Scene, settings: RunSettings
+) -> _Occluded:
+    """Compare the echo power of each part with that which the same level has of it alone."""
+    seen = _budget(result).power_at
+    if result.summary["occlusion"] == "none":
+        return _Occluded(0.0, np.zeros(seen.shape[1]))
+    alone = power_alone(motion, radar, scene, settings)
+    if alone is None:
+        return _Occluded(None, np.full(seen.shape[1], np.nan))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_parts = 1 - seen.sum(axis=0) / alone.sum(axis=0)
+        return _Occluded(_finite(float(1 - seen.sum() / alone.sum())), of_parts)
+
+
+def _summary(
+    results: Mapping[str, Result],
+    occluded: Mapping[str, _Occluded],
+    radar: Radar,
+    reference: str,
+) -> dict[str, Any]:
     first = next(iter(results.values())).summary
     shared = dict(first["parameters"])
     del shared["fidelity"], shared["variant"]
@@ -180,21 +208,23 @@ def _summary(results: Mapping[str, Result], radar: Radar, reference: str) -> dic
         "parameters": shared,
         **{name: first[name] for name in ("seed", "noise_power_m2", "versions")},
         "fidelities": {
-            name: _figures(result, results[reference], radar) for name, result in results.items()
+            name: _figures(result, occluded[name], results[reference], radar)
+            for name, result in results.items()
         },
     }
 
 
-def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
+def _figures(
+    result: Result, occluded: _Occluded, reference: Result, radar: Radar
+) -> dict[str, Any]:
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
     power = _total_db(result) - _total_db(reference)
-    hidden = _budget(result).hidden_at
-    of_parts = hidden.mean(axis=0).tolist()
+    of_parts = map(_finite, occluded.of_parts.tolist())
     return {
         "power_mean_db": _finite(float(power.mean())),
         "power_rms_db": _finite(float(np.sqrt((power**2).mean()))),
-        "hidden_share": float(hidden.mean()),
+        "occluded_share": occluded.share,
         **map_figures(_maps_of(result), _maps_of(reference)),
         "detections": summary["detections"],
         "rdt_chamfer_bins": chamfer_bins(result.points, reference.points, radar),
@@ -205,7 +235,7 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
             for name in ("real_time_factor", "peak_memory_mb", "stages", "variant")
         },
         **{name: summary[name] for name in ("limits", "part_power_m2")},
-        "part_hidden_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
+        "part_occluded_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
     }
 
 
@@ -213,7 +243,11 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
 
 
 def _draw(
-    results: Mapping[str, Result], folder: Path, radar: Radar, reference: str
+    results: Mapping[str, Result],
+    occluded: Mapping[str, _Occluded],
+    folder: Path,
+    radar: Radar,
+    reference: str,
 ) -> tuple[dict[str, Path], FieldUnit]:
     """Draw the pictures of a comparison; return them and the unit of the power of parts."""
     parameters = results[reference].summary["parameters"]
@@ -232,7 +266,7 @@ def _draw(
         next(paths), times, total, unit_of(total.values()), reference, title
     )
     mean = {name: budget.power_at.mean(axis=0) for name, budget in budgets.items()}
-    hidden = {name: budget.hidden_at.mean(axis=0) for name, budget in budgets.items()}
+    hidden = {name: found.of_parts for name, found in occluded.items()}
     parts, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
     comparison.draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
 

@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.binary_phase import BinaryPhaseModel
-from rtradar.scatter.link_budget import LinkBudget, link_budget
+from rtradar.scatter.common.poses import has_mesh
+from rtradar.scatter.link_budget import LinkBudget, link_budget, power_of_parts_alone
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -194,6 +196,22 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
         materials=body.materials,
         **(settings.model_options or {}),
     )
+
+
+def power_alone(
+    moving: Moving, radar: Radar, scene: Scene, settings: RunSettings
+) -> NDArray[np.float64] | None:
+    """Power (time, part) of each part, alone in free space, at the times of the `LinkBudget` [m^2].
+
+    None for people with a mesh, of which no part can stand alone.
+    """
+    scene, everyone = people_in(scene, moving)
+    body = body_of_people(everyone, settings)
+    if has_mesh(body):
+        return None
+    radar, body, _ = in_radar_axes(scene.place(radar), body, scene)
+    level = partial(_echo_model, radar, scene=Scene(), settings=settings)
+    return power_of_parts_alone(level, radar, body, radar.chirps_in(body.duration_s))
 
 
 def _movers(

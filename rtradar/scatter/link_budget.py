@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.body.people import OnePart
 from rtradar.conventions import MINIMUM_KA
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
@@ -42,8 +44,7 @@ class LinkBudget:
     ``power`` is the sum of |amplitude|^2 over the visible echoes, averaged over rx and one chirp
     every 10 ms, ``part_power`` the same by name of body part and ``person_power`` (person,) by
     person [m^2]; ``visible`` says whether there is any echo. At ``times (time,)`` since the start
-    of the capture [s], ``power_at (time, part)`` is the power [m^2], and ``hidden_at (time, part)``
-    the fraction of the channels that do not see the part.
+    of the capture [s], ``power_at (time, part)`` is the power [m^2].
     """
 
     power: float
@@ -52,7 +53,6 @@ class LinkBudget:
     person_power: tuple[float, ...]
     times: Array
     power_at: Array
-    hidden_at: Array
     limits: tuple[Limit, ...]
 
 
@@ -75,7 +75,7 @@ def link_budget(
     issued if more than 5 % of the echo power is concerned by a limit, or nobody is visible.
     """
     chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
-    powers, fractions = FileBackedRows(), FileBackedRows()
+    powers = FileBackedRows()
     scene, there = in_world(scene or Scene(), body)
     solid, others = Inside(scene, body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
@@ -88,12 +88,12 @@ def link_budget(
         echoes = model.echoes(chosen)
         inside = sampled(echoes.length, radar)
         ever_sampled[body.owner[echoes.part[inside.any(axis=(0, 1))]]] = True
-        by_part, hidden, beyond = _by_part(echoes, inside, len(body.part_names))
+        by_part = _by_part(echoes, len(body.part_names))
         powers.append(by_part)
-        fractions.append(hidden)
         for look in (solid.look, others.look):
             look(times, there.at(times), by_part)
-        concerned["beyond_range"] += beyond
+        power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
+        concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
         small = by_part * small_curvature(radar, body, times)
         concerned["small_curvature"] += float(small.sum())
         small_parts |= small.any(axis=0)
@@ -105,13 +105,13 @@ def link_budget(
             f"{radar.max_range_m:.2f} m; place the radar nearer (position_m) or raise "
             "samples_per_chirp"
         )
-    power_at, hidden_at = powers.rows(), fractions.rows()
+    power_at = powers.rows()
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
     power = float(power_at.sum())
     person_power = np.bincount(body.owner, weights=power_at.mean(axis=0)).tolist()
     in_solids = [*solid.found(power_at.sum(axis=0)), *others.found()]
     release_pages(power_at)
-    kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at, hidden_at
+    kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at
     if power == 0:
         return LinkBudget(_reference_power(radar, spreading), False, *kept, ())
     names = [name for name, small in zip(body.part_names, small_parts, strict=True) if small]
@@ -123,16 +123,31 @@ def link_budget(
     return LinkBudget(power / len(chirps), True, *kept, limits)
 
 
-def _by_part(echoes: Echoes, inside: NDArray[np.bool_], n_parts: int) -> tuple[Array, Array, float]:
-    """Power (chirp, part), fraction of the channels that see nothing, and power out of band."""
-    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
+def power_of_parts_alone(
+    model_of: Callable[[Body], EchoModel], radar: Radar, body: Body, n_chirps: int
+) -> Array:
+    """Power (time, part) of each part where it is alone in free space [m^2].
+
+    ``model_of`` builds the level for a body. The instants are those of the `LinkBudget`: what its
+    ``power_at`` lacks of this power, other parts occlude.
+    """
+    chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
+    alone = np.empty((len(chirps), len(body.part_names)))
+    for part in range(len(body.part_names)):
+        model = model_of(OnePart(body, part))
+        for first in range(0, len(chirps), _CHIRPS_AT_ONCE):
+            chosen = slice(first, first + _CHIRPS_AT_ONCE)
+            amplitude = model.echoes(chirps[chosen]).amplitude
+            alone[chosen, part] = (np.abs(amplitude) ** 2).mean(axis=(0, 2)).sum(axis=-1)
+    return alone
+
+
+def _by_part(echoes: Echoes, n_parts: int) -> Array:
+    """Power (chirp, part), mean over rx and frequencies."""
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2))
     by_part = np.zeros((len(power), n_parts))
-    np.add.at(by_part.T, echoes.part, power.mean(axis=1).T)
-    seen = np.zeros((*power.shape[:2], n_parts), dtype=bool)
-    for echo, part in enumerate(echoes.part):
-        seen[..., part] |= power[..., echo] > 0
-    beyond = float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
-    return by_part, 1 - seen.mean(axis=1), beyond
+    np.add.at(by_part.T, echoes.part, power.T)
+    return by_part
 
 
 def _reference_power(radar: Radar, spreading: bool) -> float:

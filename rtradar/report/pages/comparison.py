@@ -74,13 +74,13 @@ def draw_part_power(
     path: Path,
     parts: Sequence[str],
     power: Mapping[str, NDArray[np.float64]],
-    hidden: Mapping[str, NDArray[np.float64]],
+    occluded: Mapping[str, NDArray[np.float64]],
     unit: FieldUnit,
     title: str,
 ) -> None:
-    """Draw the mean echo power of each body part by model, and the occluded fraction of time.
+    """Draw the mean echo power of each body part by model, and what other parts occlude of it.
 
-    ``power`` (part,) [m^2] and ``hidden`` (part,), a fraction of time and channels, are by model.
+    ``power`` (part,) [m^2] and ``occluded`` (part,), a fraction of the power, are by model.
     """
     figure = new_figure(6.5)
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
@@ -92,11 +92,11 @@ def draw_part_power(
         level = unit.level(power[name])
         offset = places + (number - (len(power) - 1) / 2) * height
         left.plot(level[seen], offset[seen], "o", markersize=4, label=name)
-        right.barh(offset, 100 * hidden[name], height)
+        right.barh(offset, 100 * occluded[name], height)
     left.set(yticks=places, yticklabels=parts, xlabel=unit.label("mean over time"))
     left.invert_yaxis()
     left.legend()
-    right.set(xlabel="Occluded [% of\ntime and channels]", xlim=(0, 100))
+    right.set(xlabel="Occluded [% of\nthe part's power]", xlim=(0, 100))
     dress(left, title=title, across=1.4)
     dress(right)
     save_figure(figure, path)
