@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import OWN_NAMES, Convention, built_in, conventions, plain
 from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, smallest_rotation
 from rtradar.system.row_files import FileBackedRows, in_blocks
 
@@ -58,101 +58,8 @@ NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PA
 """Index of the parent of each node, -1 for the root."""
 
 
-@dataclass(frozen=True)
-class Convention:
-    """Joint names of one kind of skeleton by node, as `plain` gives them; the first counts.
-
-    Nodes between root and thorax are found along the chain. Where ``open_ended``, hands, head and
-    toes may lack an end and are then extended.
-    """
-
-    name: str
-    joints: Mapping[str, tuple[str, ...]]
-    open_ended: bool
-
-
-def _convention(
-    name: str, left: str, right: str, middle: str, sided: str, *, open_ended: bool = True
-) -> Convention:
-    """Make a convention from texts such as ``hip=upleg toe=toeend,toebase``; ``@`` is the side."""
-    texts = {"": middle, "l_": sided.replace("@", left), "r_": sided.replace("@", right)}
-    entries = [(side, *entry.split("=")) for side in texts for entry in texts[side].split()]
-    joints = {f"{side}{node}": tuple(names.split(",")) for side, node, names in entries}
-    return Convention(name, joints, open_ended)
-
-
-CONVENTIONS: tuple[Convention, ...] = (
-    _convention(
-        "ASF (HDM05, CMU)",
-        "l",
-        "r",
-        "root=root thorax=thorax neck=lowerneck head=head",
-        "hip=@hipjoint knee=@femur ankle=@tibia toe=@toes "
-        "shoulder=@clavicle elbow=@humerus wrist=@wrist hand=@fingers",
-        open_ended=False,
-    ),
-    _convention(
-        "Bandai-Namco BVH",
-        "l",
-        "r",
-        "root=hips thorax=neck neck=head head=headend",
-        "hip=upperleg@ knee=lowerleg@ ankle=foot@ toe=toes@end,toes@ "
-        "shoulder=upperarm@ elbow=lowerarm@ wrist=hand@ hand=hand@end",
-    ),
-    _convention(
-        "CMU BVH, MotionBuilder, Mixamo, Rokoko",
-        "left",
-        "right",
-        "root=hips thorax=neck neck=neck1,head head=headtopend,headend",
-        "hip=@upleg,@thigh knee=@leg,@shin ankle=@foot "
-        "toe=@toebaseend,@toeend,@toebase,@toe,@footend "
-        "shoulder=@arm elbow=@forearm wrist=@hand hand=@handmiddle3,@handmiddle2,@handmiddle1,"
-        "@handindex1end,@handindex1,@handend",
-    ),
-    _convention(
-        "Poser BVH, SMPL",
-        "left",
-        "right",
-        "root=hips,hip,pelvis thorax=neck neck=head head=headend",
-        "hip=@hip knee=@knee ankle=@ankle toe=@toe,@footend,@foot,@ankleend "
-        "shoulder=@shoulder elbow=@elbow wrist=@wrist hand=@handend,@hand,@wristend",
-    ),
-    _convention(
-        "DAZ, OptiTrack Motive",
-        "l",
-        "r",
-        "root=hip,hips thorax=neck,necklower neck=head head=headend",
-        "hip=@thigh,@thighbend knee=@shin ankle=@foot toe=@toeend,@toe,@footend "
-        "shoulder=@shldr,@shldrbend,@uarm elbow=@forearm,@forearmbend,@farm wrist=@hand "
-        "hand=@mid1,@handend",
-    ),
-    _convention(
-        "3ds Max Biped",
-        "l",
-        "r",
-        "root=pelvis thorax=neck neck=head head=headnub,headend",
-        "hip=@thigh knee=@calf ankle=@foot toe=@toe0nub,@toe0end,@toe0,@footend "
-        "shoulder=@upperarm elbow=@forearm wrist=@hand hand=@finger2,@finger1,@handend",
-    ),
-    _convention(
-        "Unreal Engine",
-        "l",
-        "r",
-        "root=pelvis thorax=neck01 neck=head head=headend",
-        "hip=thigh@ knee=calf@ ankle=foot@ toe=ball@end,ball@,foot@end "
-        "shoulder=upperarm@ elbow=lowerarm@ wrist=hand@ hand=middle01@,hand@end",
-    ),
-)
-"""Every kind of skeleton that is understood."""
-
-ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*CONVENTIONS[0].joints.values()))
+ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*built_in("skeletons")[0].joints.values()))
 """HDM05 joints of the 22 nodes."""
-
-
-def plain(name: str) -> str:
-    """A joint's name without namespace (``mixamorig:``, ``Bip01``), case, spaces, underscores."""
-    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|[Bb]ip\d+)", "", name).lower())
-
 
 MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""
@@ -221,8 +128,9 @@ def to_nodes(motion: Motion) -> Motion:
 def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     """The convention whose names fit, and the joint of each node it names."""
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
+    known = conventions("skeletons")
     fewest, why = len(NODES), ""
-    for convention in CONVENTIONS:
+    for convention in known:
         found = {
             node: next(there[name] for name in names if name in there)
             for node, names in convention.joints.items()
@@ -235,6 +143,9 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
                 if NODE_PARENT[node] in found:
                     found[node] = found[NODE_PARENT[node]]
                 missing.remove(node)
+            if missing == ["thorax"] and motion.parents[found["neck"]] >= 0:
+                # Without a neck the head's own parent is where the trunk ends.
+                found["thorax"], missing = motion.parents[found["neck"]], []
         if not missing:
             return convention, found
         if len(missing) < fewest:
@@ -244,8 +155,8 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     if fewest > len(NODES) / 2:
         raise InputError(
             f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no "
-            f"kind of skeleton that is known: {'; '.join(known.name for known in CONVENTIONS)}; "
-            "rename them after one of these"
+            f"kind of skeleton that is known: {'; '.join(one.name for one in known)}; rename them "
+            f"after one of these, or name them in a table of your own ({OWN_NAMES})"
         )
     raise InputError(
         f"{motion.name}: {why} skeleton; {len(NODES)} nodes are needed, rename or add the joint"

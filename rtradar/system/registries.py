@@ -39,6 +39,7 @@ READERS = Registry(
         "c3d": "rtradar.motion.formats.c3d:load_c3d",
         "npz": "rtradar.motion.formats.joints:load_npz",
         "csv": "rtradar.motion.formats.joints:load_csv",
+        "trc": "rtradar.motion.formats.c3d:load_trc",
     },
 )
 """Readers of motion files, by the ending of the file without the dot."""

@@ -355,16 +355,17 @@ def test_names_of_other_programs_are_known(tmp_path: Path, name: str, spaces: bo
 
 # -- joints ----------------------------------------------------------------------------------------
 
+_LIMBS = (
+    ("hip", "hip"), ("knee", "knee"), ("ankle", "ankle"), ("foot", "toe"),
+    ("shoulder", "shoulder"), ("elbow", "elbow"), ("wrist", "wrist"),
+)  # fmt: skip
 SMPL = {
     "pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax",
     "neck": "neck", "head": "head",
 } | {
     f"{side}_{joint}": f"{side[0]}_{node}"
     for side in ("left", "right")
-    for joint, node in (
-        ("hip", "hip"), ("knee", "knee"), ("ankle", "ankle"), ("foot", "toe"),
-        ("shoulder", "shoulder"), ("elbow", "elbow"), ("wrist", "wrist"),
-    )
+    for joint, node in _LIMBS
 }  # fmt: skip
 
 
@@ -473,3 +474,257 @@ def test_a_jump_of_the_whole_person_is_said(tmp_path: Path) -> None:
     path = joints(tmp_path, walk, np.eye(3), shift, up="z")
     with pytest.warns(ValidityWarning, match="faster than people do"):
         load_motion(path)
+
+
+def test_a_skeleton_without_a_neck_is_read(tmp_path: Path) -> None:
+    lines = walker().splitlines()
+    # The head hangs on the chest, as low as the neck was.
+    neck = next(k for k, line in enumerate(lines) if line.split() == ["JOINT", "Neck"])
+    head = next(k for k, line in enumerate(lines) if line.split() == ["JOINT", "Head"])
+    assert neck < head
+    lines[neck] = lines[neck].replace("Neck", "Spine3")
+    motion, said = read(tmp_path, "\n".join(lines))
+    walks_upright(motion)
+    assert not said
+
+
+def test_names_of_ones_own_count_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    walk = synthetic_motion("walk", seed=0, duration_s=1.0)
+    path = joints(tmp_path, walk, np.eye(3), np.zeros(3), joints=[f"Ours-{k}" for k in SMPL])
+    with pytest.raises(InputError, match=r"named as in no set that is known.*RTRADAR_NAMES"):
+        load_motion(path)
+    table = "\n".join(
+        ['[[joints]]\nname = "Ours"\nsides = ["oursleft", "oursright"]']
+        + [f'middle.{SMPL[name]} = "ours{name}"' for name in SMPL if "_" not in name]
+        + [f'sided.{node} = "@{joint}"' for joint, node in _LIMBS]
+        + ['sided.hand = "@elbow>@wrist 1.7"']
+    )
+    (tmp_path / "names.toml").write_text(table)
+    monkeypatch.setenv("RTRADAR_NAMES", str(tmp_path / "names.toml"))
+    motion = load_motion(path)
+    assert np.ptp(motion.root_positions[:, 0]) > 0.9
+    assert (nodes_of(motion)["head"][:, 2] > 1.5).all()
+    (tmp_path / "worse.toml").write_text('[[joints]]\nname = "Ours"\nside = 1\n')
+    monkeypatch.setenv("RTRADAR_NAMES", str(tmp_path / "worse.toml"))
+    with pytest.raises(InputError, match=r"worse.toml: \[\[joints\]\] 1: unknown key 'side'"):
+        load_motion(path)
+
+
+# -- body models -----------------------------------------------------------------------------------
+
+# Joints of the mean person of SMPL in the rest pose, each side as it is [m].
+MEAN = {
+    "pelvis": ("", (-0.0018, -0.2233, 0.0282)),
+    "left_hip": ("pelvis", (0.0695, -0.0914, -0.0068)),
+    "right_hip": ("pelvis", (-0.0677, -0.0905, -0.0043)),
+    "spine1": ("pelvis", (-0.0025, 0.1089, -0.0267)),
+    "left_knee": ("left_hip", (0.0343, -0.3752, -0.0045)),
+    "right_knee": ("right_hip", (-0.0383, -0.3826, -0.0089)),
+    "spine2": ("spine1", (0.0055, 0.1352, 0.0011)),
+    "left_ankle": ("left_knee", (-0.0136, -0.3980, -0.0437)),
+    "right_ankle": ("right_knee", (0.0158, -0.3984, -0.0423)),
+    "spine3": ("spine2", (0.0015, 0.0529, 0.0254)),
+    "left_foot": ("left_ankle", (0.0264, -0.0558, 0.1193)),
+    "right_foot": ("right_ankle", (-0.0254, -0.0481, 0.1233)),
+    "neck": ("spine3", (-0.0028, 0.2139, -0.0429)),
+    "left_collar": ("spine3", (0.0788, 0.1218, -0.0341)),
+    "right_collar": ("spine3", (-0.0817, 0.1188, -0.0386)),
+    "head": ("neck", (0.0052, 0.0650, 0.0513)),
+    "left_shoulder": ("left_collar", (0.0910, 0.0305, -0.0089)),
+    "right_shoulder": ("right_collar", (-0.0961, 0.0325, -0.0091)),
+    "left_elbow": ("left_shoulder", (0.2596, -0.0128, -0.0275)),
+    "right_elbow": ("right_shoulder", (-0.2537, -0.0133, -0.0214)),
+    "left_wrist": ("left_elbow", (0.2492, 0.0090, -0.0012)),
+    "right_wrist": ("right_elbow", (-0.2553, 0.0078, -0.0056)),
+}
+
+
+def model_walk(heading_deg: float) -> tuple[Array, Array, Array]:
+    """Rotations (frame, 66) and trans of a walk in a file whose z is up, and joints (frame, 22, 3).
+
+    The arms hang and swing; the left hand is raised after a second.
+    """
+    time = np.arange(240) / 120
+    swing = 0.45 * np.sin(2 * np.pi * time)
+    own = {name: np.zeros((240, 3)) for name in MEAN}
+    upright = Rotation.from_euler("z", heading_deg, degrees=True) * Rotation.from_euler(
+        "x", 90, degrees=True
+    )
+    own["pelvis"][:] = upright.as_rotvec()
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        own[f"{side}_hip"][:, 0] = sign * swing
+        own[f"{side}_knee"][:, 0] = 0.4 + 0.3 * np.cos(2 * np.pi * time + sign)
+        own[f"{side}_shoulder"][:, 2] = -1.2 * sign
+    own["left_elbow"][:, 1] = -1.5 * (time > 1) * np.minimum(4 * (time - 1), 1)
+    ahead = upright.apply([0.0, 0.0, 1.0])
+    trans = time[:, None] * 1.1 * ahead + [0.0, 0.0, 1.0]
+    places, world = dict[str, Array](), dict[str, Rotation]()
+    for name, (parent, offset) in MEAN.items():
+        turned = Rotation.from_rotvec(own[name])
+        world[name] = world[parent] * turned if parent else turned
+        places[name] = (
+            places[parent] + world[parent].apply(offset) if parent else trans + np.array(offset)
+        )
+    return np.concatenate(list(own.values()), axis=1), trans, np.stack(list(places.values()), 1)
+
+
+@pytest.mark.parametrize("kind", ["smpl", "smplh", "smplx", "parts"])
+@pytest.mark.parametrize("heading_deg", [0.0, 70.0, 200.0])
+def test_rotations_of_body_models_are_the_joints_of_a_mean_person(
+    tmp_path: Path, kind: str, heading_deg: float
+) -> None:
+    rotations, trans, places = model_walk(heading_deg)
+    arrays: dict[str, object] = {"trans": trans, "betas": np.zeros(10), "gender": "neutral"}
+    if kind == "parts":
+        arrays |= {"root_orient": rotations[:, :3], "pose_body": rotations[:, 3:]}
+        arrays["mocap_frame_rate"] = 120.0
+    else:
+        width = {"smpl": 72, "smplh": 156, "smplx": 165}[kind]
+        hands = np.zeros((len(trans), width - 66))
+        arrays |= {"poses": np.concatenate([rotations, hands], axis=1), "mocap_framerate": 120.0}
+    if kind == "smplx":
+        arrays["surface_model_type"] = "smplx"
+    np.savez(tmp_path / "rotations.npz", **arrays)  # type: ignore[arg-type]
+    given = {"joints": np.array(list(MEAN)), "positions": places, "rate_hz": 120.0, "up": "z"}
+    np.savez(tmp_path / "joints.npz", **given)  # type: ignore[arg-type]
+    turned, seen = (load_motion(tmp_path / f"{name}.npz") for name in ("rotations", "joints"))
+    apart = turned.positions - seen.positions
+    shift = np.median(apart, axis=(0, 1))
+    # The root of SMPL-X is elsewhere in the rest pose, which shifts the whole walk.
+    assert np.linalg.norm(shift) < (0.14 if kind == "smplx" else 0.01)
+    assert np.linalg.norm(apart - shift, axis=2).max() < 0.02
+    speeds = [
+        np.linalg.norm(np.diff(one.positions, axis=0), axis=2) * one.rate_hz
+        for one in (turned, seen)
+    ]
+    assert np.abs(speeds[0] - speeds[1]).max() < 0.02 * speeds[1].max()
+    ours = nodes_of(turned)
+    walked = ours["root"][-1] - ours["root"][0]
+    expected = Rotation.from_euler("z", heading_deg, degrees=True).apply([0.0, -2.2, 0.0])
+    np.testing.assert_allclose(walked, expected, atol=0.03)
+    left = np.cross([0.0, 0.0, 1.0], walked)
+    assert ((ours["l_hip"] - ours["r_hip"]) @ left > 0).all()
+    raised = ours["l_wrist"][-1] - ours["l_elbow"][-1]
+    assert raised @ walked > 0.2 * np.linalg.norm(walked)
+    assert "body: rotations on the skeleton of a mean person" in turned.findings[0].text
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"trans": None}, "trans is missing"),
+        ({"trans": np.zeros((3, 3))}, r"trans is float64 of shape \(3, 3\)"),
+        ({"poses": np.zeros((240, 63))}, "axis times angle of 22 joints"),
+        ({"poses": np.full((240, 66), np.nan)}, "rotations are not finite in frame 1"),
+        ({"mocap_framerate": None}, "rate_hz or time_s is missing"),
+        ({"mocap_framerate": 0.0}, "rate_hz = 0"),
+    ],
+)
+def test_damaged_rotations_are_refused(
+    tmp_path: Path, change: dict[str, object], says: str
+) -> None:
+    rotations, trans, _ = model_walk(0.0)
+    arrays = {"trans": trans, "poses": rotations, "mocap_framerate": 120.0} | change
+    kept = {name: value for name, value in arrays.items() if value is not None}
+    np.savez(tmp_path / "a.npz", **kept)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=says):
+        load_motion(tmp_path / "a.npz")
+
+
+# -- points of TRC files ---------------------------------------------------------------------------
+
+
+def trc(path: Path, names: list[str], places: Array, rate_hz: float, units: str = "m") -> Path:
+    """A TRC file of points (frame, point, 3), empty where they are NaN."""
+    count, points = places.shape[:2]
+    header = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate",
+        f"{rate_hz}\t{rate_hz}\t{count}\t{points}\t{units}\t{rate_hz}",
+        "Frame#\tTime\t" + "\t\t\t".join(names),
+        "\t\t" + "\t".join(f"{axis}{k + 1}" for k in range(points) for axis in "XYZ"),
+        "",
+    ]
+    rows = [
+        f"{k + 1}\t{k / rate_hz:.5f}\t"
+        + "\t".join("" if np.isnan(value) else f"{value:.6f}" for value in row.ravel())
+        for k, row in enumerate(places)
+    ]
+    path.write_text("\n".join(header + rows) + "\n")
+    return path
+
+
+OPENPOSE = {
+    "Neck": ("thorax",), "midHip": ("root",), "Nose": ("head",),
+} | {
+    f"{side}{joint}": (f"{side.lower()}_{node}",)
+    for side in "LR"
+    for joint, node in (
+        ("Shoulder", "shoulder"), ("Elbow", "elbow"), ("Wrist", "wrist"), ("Hip", "hip"),
+        ("Knee", "knee"), ("Ankle", "ankle"), ("BigToe", "toe"), ("Heel", "ankle"),
+    )
+}  # fmt: skip
+MEDIAPIPE = {
+    "nose": ("head",), "left_ear": ("head",), "right_ear": ("head",),
+} | {
+    f"{side}_{joint}": (f"{side[0]}_{node}",)
+    for side in ("left", "right")
+    for joint, node in (
+        ("shoulder", "shoulder"), ("elbow", "elbow"), ("wrist", "wrist"), ("hip", "hip"),
+        ("knee", "knee"), ("ankle", "ankle"), ("foot_index", "toe"), ("index", "hand"),
+    )
+}  # fmt: skip
+
+
+def test_points_of_opencap_are_joints(tmp_path: Path) -> None:
+    walk = synthetic_motion("walk", seed=0)
+    places = walk.positions[:, [NODES.index(node) for (node,) in OPENPOSE.values()]]
+    places = places[..., [1, 2, 0]]  # y up
+    places[40:44, 3] = np.nan
+    file = trc(tmp_path / "a.trc", list(OPENPOSE), 1000 * places, walk.rate_hz, "mm")
+    motion = load_motion(file)
+    ours, theirs = nodes_of(motion), nodes_of(walk)
+    for limb in ("hip", "knee", "ankle", "elbow", "wrist"):
+        for side in "lr":
+            apart = ours[f"{side}_{limb}"] - theirs[f"{side}_{limb}"]
+            assert np.median(np.linalg.norm(apart, axis=1)) < 0.03
+    found = {one.name: one.value for one in motion.findings}
+    assert (found["unit_m"], found["up"], found["rate_hz"]) == (0.001, "y", 120.0)
+
+
+def test_landmarks_of_mediapipe_stay_about_the_hips(tmp_path: Path) -> None:
+    walk = synthetic_motion("walk", seed=0)
+    places = walk.positions[:, [NODES.index(node) for (node,) in MEDIAPIPE.values()]]
+    places[:, :3] += np.array([[0.1, 0.0, -0.1], [0.0, 0.07, -0.1], [0.0, -0.07, -0.1]])
+    hips = [list(MEDIAPIPE).index(f"{side}_hip") for side in ("left", "right")]
+    places -= places[:, hips].mean(axis=1, keepdims=True)
+    places = places[..., [1, 2, 0]] * [1.0, -1.0, -1.0]  # y down, the camera behind
+    arrays = {"joints": np.array(list(MEDIAPIPE)), "positions": places, "rate_hz": walk.rate_hz}
+    np.savez(tmp_path / "a.npz", **arrays)  # type: ignore[arg-type]
+    ours, theirs = nodes_of(load_motion(tmp_path / "a.npz")), nodes_of(walk)
+    for limb in ("knee", "ankle", "elbow", "wrist"):
+        for side in "lr":
+            away = (ours[f"{side}_{limb}"] - ours[f"{side}_hip"]) * [-1.0, -1.0, 1.0]
+            apart = away - theirs[f"{side}_{limb}"] + theirs[f"{side}_hip"]
+            assert np.median(np.linalg.norm(apart, axis=1)) < 0.03
+    assert (ours["head"][:, 2] > ours["root"][:, 2] + 0.5).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("PathFileType", "PathfileType"), "line 3: not a TRC file"),
+        (("Units", "Unit"), "line 3: not a TRC file"),
+        (("120.0\t", "many\t"), "line 3: 'many' is not a number"),
+        (("0.500000", "0,5"), "line .*decimal comma"),
+        (("Neck", "Nack"), "marker LFHD is missing"),
+    ],
+)
+def test_damaged_tables_of_points_are_refused(
+    tmp_path: Path, change: tuple[str, str], says: str
+) -> None:
+    places = np.full((8, len(OPENPOSE), 3), 0.5)
+    file = trc(tmp_path / "a.trc", list(OPENPOSE), places, 120.0)
+    file.write_text(file.read_text().replace(*change))
+    with pytest.raises(InputError, match=says):
+        load_motion(file)

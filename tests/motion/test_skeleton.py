@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion, synthetic_motion
+from rtradar.motion.names import plain
 from rtradar.motion.quaternions import quaternion_multiply
-from rtradar.motion.skeleton import ASF_JOINTS, NODE_PARENT, NODES, plain, to_nodes
+from rtradar.motion.skeleton import ASF_JOINTS, NODE_PARENT, NODES, to_nodes
 
 
 def test_there_are_22_nodes() -> None:

@@ -30,8 +30,9 @@ def load_motion(
     Parameters
     ----------
     path : path
-        ``.amc`` (with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and HDM05,
-        ``.npz`` and ``.csv`` with joint positions, or an ending of `READERS`.
+        ``.amc`` (with its ``skeleton``), ``.bvh``, ``.c3d`` and ``.trc`` with the markers of CMU,
+        HDM05 or Plug-in Gait or with joints, ``.npz`` and ``.csv`` with joint positions, ``.npz``
+        of AMASS, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
     up : {"auto", "x", "y", "z", "-x", "-y", "-z"}, optional

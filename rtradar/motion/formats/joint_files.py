@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.motion.formats import body_models
 from rtradar.motion.formats.text_file import TextFile
-from rtradar.motion.skeleton import plain
-from rtradar.recordings import UPWARD
+from rtradar.motion.names import plain
+from rtradar.recordings import UPWARD, Finding
 from rtradar.system.checks import brief, check_number
 from rtradar.system.files import read_arrays
 
@@ -44,7 +45,8 @@ class JointRecording:
     """Positions (frame, joint, 3) of named joints in the file's axes and unit, NaN where not seen.
 
     ``times`` (frame,) ascend from 0 [s]. ``up`` is one of `UPWARD`, or empty where the file does
-    not say it. ``joined`` frames were left out, for another is hardly a moment before them.
+    not say it; ``usual`` the axis that files of this kind have. ``joined`` frames were left out,
+    for another is hardly a moment before them.
     """
 
     path: Path
@@ -53,10 +55,15 @@ class JointRecording:
     times: Array
     up: str
     joined: int = 0
+    usual: str = ""
+    findings: tuple[Finding, ...] = ()
 
 
 def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
-    """Read an archive of NumPy; an `InputError` tells what is wrong with it."""
+    """Read an archive of NumPy, of positions or of the rotations of a body model (AMASS).
+
+    An `InputError` tells what is wrong with it.
+    """
     try:
         arrays = read_arrays(path)
     except OSError as error:
@@ -68,7 +75,11 @@ def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    return _checked(path, arrays, rate_hz)
+    if body_models.holds_rotations(arrays):
+        text = "body: rotations on the skeleton of a mean person; betas are not read"
+        made = checked(path, body_models.as_positions(path, arrays), rate_hz)
+        return replace(made, usual="z", findings=(Finding("body_model", "mean", text),))
+    return checked(path, arrays, rate_hz)
 
 
 def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
@@ -101,7 +112,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
         arrays["time_s"] = values[:, columns["time_s"]]
     if "rate_hz" in columns and len(rows):
         arrays["rate_hz"] = values[0, columns["rate_hz"]]
-    return _checked(path, arrays, rate_hz)
+    return checked(path, arrays, rate_hz)
 
 
 def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
@@ -131,7 +142,7 @@ def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[st
     return others, joints
 
 
-def _checked(
+def checked(
     path: Path, arrays: Mapping[str, NDArray[Any]], rate_hz: float | None
 ) -> JointRecording:
     """Make a recording of what a file holds; a rate that is given counts in place of the file's."""

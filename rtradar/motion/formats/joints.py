@@ -1,9 +1,9 @@
 """Recordings of joint positions, such as cameras with depth and body models give.
 
 What is measured joint by joint is made the motion of a rigid skeleton: the 22 nodes are taken from
-the joints (`joint_sets`), gaps are bridged, joints of cameras pass a low-pass, all is sampled
-evenly, heads and feet are completed, the floor is found, and the bones are given their median
-lengths (`markers.rigid_motion`).
+the joints (`rtradar.motion.names`), gaps are bridged, joints of cameras pass a low-pass, all is
+sampled evenly, heads and feet are completed, the floor is found, and the bones are given their
+median lengths (`markers.rigid_motion`).
 
 The low-pass is a smoothing spline, the least of ``sum (y - f)^2 + lam int f''^2``. For samples
 ``dt`` apart its response is ``1 / (1 + (f / f_c)^4)`` with ``lam = (2 pi f_c)^-4 / dt``, that of a
@@ -34,9 +34,9 @@ from rtradar.motion.formats.joint_files import (
     read_csv,
     read_npz,
 )
-from rtradar.motion.formats.joint_sets import JointSet, node_positions, recognise
 from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
     found_up,
     of_node,
@@ -92,25 +92,31 @@ def motion_of(
 ) -> Motion:
     """Make the motion of a rigid skeleton of joints that were measured one by one."""
     where = str(recording.path)
-    joint_set = recognise(where, recording.names)
-    nodes = node_positions(joint_set, recording.names, recording.positions)
+    convention = recognise(where, recording.names)
+    nodes = node_positions(convention, recording.names, recording.positions, NODES)
     for unseen in np.flatnonzero(np.isnan(nodes[..., 0]).all(axis=0)):
         raise InputError(
             f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
     unit_m, unit = settled_unit(where, stature_of(nodes), unit_m)
-    upward, how = found_up(where, nodes, given=up or recording.up)
+    usual = recording.usual or convention.up
+    upward, how = found_up(where, nodes, given=up or recording.up, usual=usual)
     steps = np.diff(recording.times)
-    found = [unit, Finding("up", upward, how), rate_of(round(1 / float(np.median(steps)), 3))]
+    found = [
+        *recording.findings,
+        unit,
+        Finding("up", upward, how),
+        rate_of(round(1 / float(np.median(steps)), 3)),
+    ]
     nodes = unit_m * nodes @ to_world_from(upward).T
-    if joint_set.cutoff_hz:
+    if convention.low_pass_hz:
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
-    nodes, rate_hz = _resampled(nodes, times, joint_set)
+    nodes, rate_hz = _resampled(nodes, times, convention)
     hips, shoulders = (of_node(nodes, f"l_{at}") - of_node(nodes, f"r_{at}") for at in _SIDES)
     pelvis, thorax = (_axes(where, left, _trunk(nodes)) for left in (hips, shoulders))
-    _complete(nodes, pelvis, joint_set)
+    _complete(nodes, pelvis, convention)
     _keep_directions(where, nodes)
     size = stature_of(nodes) / _NOMINAL_STATURE_M
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
@@ -191,7 +197,7 @@ def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Arr
     return nodes[best], times[best] - times[best.start]
 
 
-def _resampled(nodes: Array, times: Array, joint_set: JointSet) -> tuple[Array, float]:
+def _resampled(nodes: Array, times: Array, convention: Convention) -> tuple[Array, float]:
     """Nodes (frame, node, 3) at even times, without gaps, and their rate."""
     steps = np.diff(times)
     step = float(np.median(steps))
@@ -204,15 +210,15 @@ def _resampled(nodes: Array, times: Array, joint_set: JointSet) -> tuple[Array, 
     for own in np.unique(seen, axis=1).T:  # nodes that are seen in the same frames go together
         alike = np.flatnonzero((seen == own[:, None]).all(axis=0))
         places = nodes[own][:, alike]
-        if joint_set.cutoff_hz:
-            lam = (2 * np.pi * joint_set.cutoff_hz) ** -4 / step
+        if convention.low_pass_hz:
+            lam = (2 * np.pi * convention.low_pass_hz) ** -4 / step
             made[:, alike] = make_smoothing_spline(times[own], places, lam=lam)(at)
         else:
             made[:, alike] = CubicSpline(times[own], places)(at)
     return made, rate_hz
 
 
-def _complete(nodes: Array, pelvis: Array, joint_set: JointSet) -> None:
+def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
     """Complete heads, feet and hands, in place.
 
     A foot that ends before its toe tips goes on as the pelvis looks, at right angles to the shank;
@@ -222,7 +228,7 @@ def _complete(nodes: Array, pelvis: Array, joint_set: JointSet) -> None:
     thigh = float(np.median(_length(nodes, "l_knee", "l_hip")))
     head, upward = of_node(nodes, "head") - of_node(nodes, "neck"), _directions(_trunk(nodes))
     head = _lengthened(head, upward, 0.5 * float(np.median(np.linalg.norm(head, axis=1))))
-    if not joint_set.head_is_top:
+    if not convention.head_is_top:
         head = HEAD_OF_THIGH * thigh * _directions(head)
     nodes[:, NODES.index("head")] = of_node(nodes, "neck") + head
     for side in ("l", "r"):

@@ -428,3 +428,42 @@ def test_junk_is_refused_in_one_line(
     else:
         assert "\n" not in refusal
         assert "junk" in refusal
+
+
+def test_names_of_plug_in_gait_are_those_of_cmu(tmp_path: Path, walk: np.ndarray) -> None:
+    known = load_motion(write(tmp_path / "walk.c3d", walk))
+    worn = [name.replace("FWT", "ASI").replace("BWT", "PSI") for name in HDM05]
+    found = load_motion(write(tmp_path / "walk.c3d", walk, worn))
+    np.testing.assert_array_equal(found.positions, known.positions)
+    # One marker on the sacrum in place of two beside it.
+    one, other = HDM05.index("LBWT"), HDM05.index("RBWT")
+    middle = walk.copy()
+    middle[:, one] = middle[:, [one, other]].mean(axis=1)
+    worn[one], worn[other] = "SACR", "other"
+    found = load_motion(write(tmp_path / "sacrum.c3d", middle, worn))
+    assert np.linalg.norm(found.positions - known.positions, axis=2).max() < 0.02
+
+
+HELEN_HAYES = {
+    "L.ASIS": (0.12, 0.12, 0.95), "V.Sacral": (-0.12, 0.0, 0.95), "L.Knee": (0.0, 0.14, 0.50),
+    "L.Ankle": (0.0, 0.14, 0.08), "L.Toe": (0.16, 0.12, 0.04), "L.Shoulder": (0.0, 0.19, 1.44),
+    "L.Elbow": (0.0, 0.22, 1.12), "L.Wrist": (0.05, 0.22, 0.86), "Top.Head": (0.02, 0.0, 1.75),
+}  # fmt: skip
+
+
+def test_full_body_helen_hayes_gives_joints_some_centimetres_off(tmp_path: Path) -> None:
+    places = dict(HELEN_HAYES)
+    for name, (x, y, z) in HELEN_HAYES.items():
+        if name.startswith("L."):
+            places["R." + name[2:]] = (x, -y, z)
+    markers = moved(np.array(list(places.values())))
+    motion = load_motion(write(tmp_path / "walk.c3d", markers, list(places)))
+    shown = dict(zip(motion.joints, motion.positions[0] - motion.positions[0, 0], strict=True))
+    turn = np.array([np.cos(0.3), np.sin(0.3), 0.0])
+    for node, ahead, height in (
+        ("l_hip", 0.09, -0.09), ("l_knee", 0.0, -0.45), ("l_ankle", 0.0, -0.87),
+        ("r_elbow", 0.0, 0.17), ("head", 0.02, 0.80),
+    ):  # fmt: skip
+        assert shown[node][2] == pytest.approx(height, abs=0.04)
+        assert shown[node] @ turn == pytest.approx(ahead, abs=0.06)
+    assert shown["l_hip"] @ [-turn[1], turn[0], 0.0] > 0.05
