@@ -25,6 +25,9 @@ _LEFT_OUT, _OF_GHOSTS = 0.04, 0.75
 """Part of the tolerated power of errors that the weakest ghosts may take, which are left out, and
 that all ghosts may; the shadow in the clutter may take what they leave."""
 
+_LEADS = 0.5
+"""Part of the clutter power from behind the antennas above which there is a warning."""
+
 
 class Indoors(NamedTuple):
     """The person in the room: the echo model, and the IF of the room itself.
@@ -97,6 +100,16 @@ def indoors(
     limits = []
     if isinstance(scene, MovingScene):
         limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))
+    behind, leader = clutter.behind()
+    if behind > 0:
+        message = (
+            f"clutter power is from behind the antennas, most of it from '{leader}', and so are "
+            "ghosts; elements on a board radiate ahead: give the radar an [antenna], such as "
+            "pattern = 'cosine' with exponent = 2"
+        )
+        limits.append(Limit("clutter_behind", behind, message))
+        if behind > _LEADS:
+            warn_of(limits[-1])
     # Walls that are not followed over the sweep, where they matter.
     fraction = max(model.not_followed.values(), default=0.0)
     if fraction > 0:

@@ -28,6 +28,7 @@ from rtradar.process import (
     range_spectrum,
     takes_channels,
 )
+from rtradar.process.side_lobes import RangeSideLobes, SeenRanges
 from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
@@ -125,11 +126,15 @@ def block_chirps(radar: Radar) -> int:
 
 
 class Clouds(NamedTuple):
-    """The clouds of a capture; the spatial one was sampled from ``n_spatial`` points."""
+    """The clouds of a capture; the spatial one was sampled from ``n_spatial`` points.
+
+    ``ranges`` are those of the detections, None if there are none.
+    """
 
     rdt: RdtCloudResult
     spatial: SpatialCloud
     n_spatial: int
+    ranges: SeenRanges | None
 
 
 class Frame(NamedTuple):
@@ -169,6 +174,7 @@ class CloudMaker:
         self._angles = angles and bool(measured_angles(radar))
         self._sliding = SlidingWindows(radar)
         self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
+        self._ranges = RangeSideLobes(processing.window_functions.range, radar.range_m)
         self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=7)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
@@ -198,6 +204,7 @@ class CloudMaker:
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
+                self._ranges.add(power, mask)
             angles = source = None
             if self._source_of is not None:
                 with stages.time("sources"):
@@ -223,7 +230,7 @@ class CloudMaker:
             rows = rows[np.argsort(rows[:, 5], kind="stable")]
         source = None if self._source_of is None else rows[:, 6].astype(np.int64)
         spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], source)
-        return Clouds(rdt, spatial, self._spatial.n_seen)
+        return Clouds(rdt, spatial, self._spatial.n_seen, self._ranges.found())
 
 
 def frame_angles(

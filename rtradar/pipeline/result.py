@@ -143,9 +143,10 @@ class Result:
         """Return what the radar saw, by labels."""
         summary, rows = self.summary, {}
         if len(self.points):
-            low, high = central_limits(self.points[:, 1:])
-            rows["range"] = f"{low[0]:.1f} to {high[0]:.1f} m"
-            rows["velocity"] = f"{low[1]:+.1f} to {high[1]:+.1f} m/s, positive: receding"
+            low, high = central_limits(self.points)
+            nearest, farthest = summary.get("detected_range_m") or (low[1], high[1])
+            rows["range"] = f"{nearest:.1f} to {farthest:.1f} m"
+            rows["velocity"] = f"{low[2]:+.1f} to {high[2]:+.1f} m/s, positive: receding"
         if "noise_power_m2" in summary:
             echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
             snr = f"{10 * np.log10(echo / noise):.1f} dB" if echo and noise else "no noise"

@@ -30,7 +30,8 @@ class Limit:
     """A limit of validity that the capture came near or went past.
 
     ``name`` is short, for machines, ``message`` one line for people. ``share``, so called in
-    ``summary.json``, is the fraction of the person's echo power that is concerned, 0 to 1.
+    ``summary.json``, is the fraction that is concerned, 0 to 1: of the person's echo power, unless
+    the message begins with something else.
     """
 
     name: str

@@ -46,7 +46,9 @@ def draw_found(
     drawn: dict[str, Path] = {}
     with read_maps(folder / "maps.h5") as maps:
         found = maps, clouds.rdt.points, clouds.spatial, radar
-        plots = Plots(*found, {"parameters": settings.parameters()}, new_figure=new_figure)
+        ranges = clouds.ranges and (clouds.ranges.low_m, clouds.ranges.high_m)
+        said = {"parameters": settings.parameters(), "detected_range_m": ranges}
+        plots = Plots(*found, said, new_figure=new_figure)
         angles = [name for name in ("azimuth", "elevation") if name in maps]
         pictures: dict[str, tuple[str, Callable[[], Axes]]] = {
             "Range over time": ("range_time.png", plots.range_time)

@@ -19,6 +19,7 @@ from rtradar.pipeline.processing import Clouds, Processing
 from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.radar import Radar
 from rtradar.scatter import account_of
+from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions, RunSettings
 
 _PACKAGES = (
@@ -80,7 +81,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
             "echo_power_w": budget.power * scale,
             "noise_power_w": capture.noise.power * scale,
         }
-    summary["limits"] = _limits(capture)
+    summary["limits"] = _limits(capture) + _limits_of_detections(clouds)
     if (modelled := account_of(capture.model)) is not None:
         summary["modelled"] = modelled
     if capture.receiver is not None:
@@ -140,7 +141,7 @@ def summary_of_samples(
         "versions": {"python": platform.python_version(), **_versions()},
         **cost(processing, n_chirps, started_s),
         **_found(radar, n_chirps, clouds),
-        "limits": [],
+        "limits": _limits_of_detections(clouds),
     }
 
 
@@ -153,6 +154,7 @@ def _found(radar: Radar, n_chirps: int, clouds: Clouds) -> dict[str, Any]:
         "rdt_points": len(clouds.rdt.points),
         "xyz_points": len(clouds.spatial.points),
         "xyz_points_found": clouds.n_spatial,
+        "detected_range_m": clouds.ranges and (clouds.ranges.low_m, clouds.ranges.high_m),
     }
 
 
@@ -181,6 +183,19 @@ def _limits(capture: Capture) -> list[dict[str, Any]]:
         invisible = {"name": "nobody_visible", "share": 0.0}
         limits += [invisible | {"message": message} for message in capture.warned]
     return limits
+
+
+def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
+    ranges = clouds.ranges
+    if ranges is None or not ranges.side_lobes:
+        return []
+    message = (
+        f"detections nearer than {ranges.low_m:.1f} m or farther than {ranges.high_m:.1f} m, which "
+        "may be range side lobes of stronger echoes: past the last range they go on from the "
+        "first; range_window = 'hann' keeps them low"
+    )
+    share = ranges.side_lobes / ranges.detections
+    return [dataclasses.asdict(Limit("range_side_lobes", share, message))]
 
 
 def _versions() -> dict[str, str]:

@@ -74,7 +74,7 @@ class Plots:
     radar : Radar
         Radar at its position in the scene.
     summary : mapping
-        Contents of ``summary.json``, of which ``parameters`` are read.
+        Contents of ``summary.json``, of which ``parameters`` and ``detected_range_m`` are read.
     new_figure : callable
         Function that makes the figure, from its height [inch].
     """
@@ -448,7 +448,11 @@ class Plots:
         if not counts.any():
             times = self._axis("slow_time")
             counts = above_floor(thinned(self.maps["range_time"], times)[0]).sum(axis=0)
-        return fitted_limits(counts, self.radar.range_m, handful=self._handful)
+        range_m = self.radar.range_m
+        if (detected := self.summary.get("detected_range_m")) is not None:
+            # Side lobes beyond do not set the axis.
+            counts = np.where((range_m >= detected[0]) & (range_m <= detected[1]), counts, 0)
+        return fitted_limits(counts, range_m, handful=self._handful)
 
     @cached_property
     def _velocity_limits(self) -> tuple[float, float]:

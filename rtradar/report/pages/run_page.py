@@ -130,10 +130,11 @@ def _sections(
 def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:
     """Yield what the radar saw, as figures with captions."""
     if len(points):
-        low, high = central_limits(points[:, 1:])
-        yield f"{low[0]:.1f} to {high[0]:.1f} m", "range of what was detected"
+        low, high = central_limits(points)
+        nearest, farthest = summary.get("detected_range_m") or (low[1], high[1])
+        yield f"{nearest:.1f} to {farthest:.1f} m", "range of what was detected"
         yield (
-            minus(f"{low[1]:+.1f} to {high[1]:+.1f} m/s"),
+            minus(f"{low[2]:+.1f} to {high[2]:+.1f} m/s"),
             "velocity of what was detected, positive: receding",
         )
     parameters = summary.get("parameters", {})

@@ -151,6 +151,20 @@ class Clutter:
         pruned.dropped = (*self.dropped, *dropped)
         return pruned
 
+    def behind(self) -> tuple[float, str]:
+        """Return the fraction of the power from behind the antennas, and the object with most.
+
+        That is what leaves or arrives at an angle of more than 90 degrees from boresight.
+        """
+        whole, of_objects = 0.0, {"": 0.0}
+        for own in self.objects:
+            power = np.abs(own.amplitude[len(own.frequency) // 2]) ** 2
+            ends = own.points[..., [0, -1], 0] - self.radar.position_m[0]  # boresight is along x
+            whole += float(power.sum())
+            of_objects[own.name] = float((power * (ends < 0).any(axis=-1)).sum())
+        leader = max(of_objects, key=of_objects.__getitem__)
+        return sum(of_objects.values()) / whole if whole > 0 else 0.0, leader
+
     def cycle(self) -> Iterator[Echoes]:
         """Yield the echoes of one TDM cycle, object by object, each at as few nodes as it needs.
 
