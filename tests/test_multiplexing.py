@@ -292,8 +292,13 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
         ({"multiplexing": "fdm", "carrier_step_hz": 4e6}, "bands of the IF are 4.096e"),
         ({"multiplexing": "fdm", "carrier_step_hz": 12e9 / 5.5}, "at no positive frequency"),
         (
-            {"multiplexing": "fdm", "start_frequency_hz": 20e6},
-            "12 carriers 4.096e.06 Hz apart begin 2.25",
+            {
+                "multiplexing": "fdm",
+                "start_frequency_hz": 1e9,
+                "bandwidth_hz": 9e8,
+                "samples_per_chirp": 16000,
+            },
+            "12 carriers 2.56e.08 Hz apart begin 1.408",
         ),
         ({"carrier_step_hz": 4e6}, "belongs to multiplexing = 'fdm'"),
         ({"multiplexing": "fdm", "doppler_bands": 16}, "belongs to multiplexing = 'ddm'"),

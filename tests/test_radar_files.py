@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any
@@ -291,3 +292,53 @@ def test_a_frame_holds_a_cycle() -> None:
 )
 def test_no_value_without_meaning_gets_through(field: str, value: object) -> None:
     assert f"{field} = {value!r}" in refusal(Radar, **{field: value})
+
+
+def test_a_file_may_change_another_radar(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "iwr6843"\npitch_deg = -20\nidle_s = 20e-6\n')
+    radar, board = Radar.load(file), Radar.preset("iwr6843")
+    changed = dataclasses.replace(board, name="mine", pitch_deg=-20.0, idle_s=20e-6)
+    assert radar == changed
+    (tmp_path / "again.toml").write_text(
+        'base = "mine.toml"\nname = "again"\nframe_duration_s = 0.02\n'
+    )
+    again = Radar.load(tmp_path / "again.toml")
+    assert (again.pitch_deg, again.frame_period_s) == (-20.0, None)
+    assert again.cycles_per_frame == int(0.02 / again.cycle_duration_s)
+    file.write_text('base = "iwr6843"\ntx_y = 2\nrx_y = 4\ntx_z = 0\nrx_z = 0\n')
+    assert Radar.load(file).tx_positions_m is None
+    assert Radar.load({"base": "iwr1843", "roll_deg": 3}).roll_deg == 3
+    file.write_text('board = "iwr1642"\n')
+    assert Radar.load(file).n_channels == 8
+
+
+def test_antennas_that_a_file_does_not_name_are_not_there(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text("tx_y = 2\nrx_y = 4\n")
+    radar = Radar.load(file)
+    assert (radar.n_tx, radar.n_rx, radar.tx_z, radar.rx_z) == (2, 4, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("start_frequency_hz = 77", r"start_frequency_hz = 77; .*is that 77e9\?"),
+        ("start_frequency_hz = 77e9\nbandwidth_hz = 4", r"bandwidth_hz = 4; .*is that 4e9\?"),
+        ("chirp_duration_s = 62.5", r"chirp_duration_s = 62.5; .*is that 62.5e-6\?"),
+        ("start_frequency_hz = 1e9\nbandwidth_hz = 4e9", "it must be below start_frequency_hz"),
+        ("samples_per_chirp = 65521", "at most 16384 are simulated"),
+        ('base = "iwr9999"', "iwr9999"),
+        ("base = 3", "base = 3; it must be a name or a path"),
+        ('base = "none.toml"', "none.toml"),
+        ('base = "iwr1443"\nboard = "iwr1843"', "leave the board out"),
+    ],
+)
+def test_values_of_another_unit_and_bases_that_are_none(
+    tmp_path: Path, text: str, says: str
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=says) as caught:
+        Radar.load(file)
+    assert "\n" not in str(caught.value)

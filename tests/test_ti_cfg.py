@@ -165,7 +165,8 @@ def test_lines_that_are_not_read_are_named_in_one_warning(tmp_path: Path) -> Non
         ("sensorStart", "bpmCfg -1 1 0 2", "line 14: binary phase modulation"),
         ("sensorStart", "advFrameCfg 1 0 0 1 0", "line 14: frames of several kinds"),
         ("adcCfg 2 1\n", "", "has no adcCfg"),
-        ("xWR14xx", "xWR16xx", "is for platform xWR16xx, whose antennas are not known"),
+        ("xWR14xx", "xWR12xx", "is for platform xWR12xx, whose antennas are not known"),
+        ("xWR14xx", "xWR16xx", "Tx 3 is on, and board iwr1642 has 2"),
     ],
 )
 def test_what_is_not_simulated_is_refused_in_one_line(
@@ -201,8 +202,9 @@ def test_any_text_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> Non
 @pytest.mark.parametrize("name", BOARDS)
 def test_a_board_has_all_that_is_asked_of_it(name: str) -> None:
     radar = Radar.preset(name)
-    assert radar.n_rx == 4
-    assert radar.n_tx == (4 if name == "awr2944" else 3)
+    assert radar.n_rx == (3 if name == "iwrl6432" else 4)
+    few = ("iwr1642", "awr1642", "iwrl6432")
+    assert radar.n_tx == (4 if name == "awr2944" else 2 if name in few else 3)
     assert radar.transmit_power_dbm is not None
     assert radar.noise_figure_db is not None
     assert radar.tx_antenna is not None
@@ -228,3 +230,182 @@ def test_rtradar_process_takes_the_order_of_words_from_the_profile(tmp_path: Pat
     options.lanes = None
     (tmp_path / "adc.json").write_text("{}")  # says the order of what rtradar wrote
     assert _radar_and_layout(options)[1] is None
+
+
+# -- what other boards, languages and labs write ---------------------------------------------------
+
+# Made here, line for line as TI's tools and labs write them.
+VISUALIZER_16XX = """\
+% Platform:xWR16xx
+sensorStop
+flushCfg
+dfeDataOutputMode 1
+channelCfg 15 3 0
+adcCfg 2 1
+adcbufCfg 0 1 0 1
+profileCfg 0 77 39 7 57.14 0 0 70 1 256 5209 0 0 30
+chirpCfg 0 0 0 0 0 0 0 1
+chirpCfg 1 1 0 0 0 0 0 2
+frameCfg 0 1 16 0 33.333 1 0
+sensorStart
+"""
+LOW_POWER = """\
+% Platform: xWRL6432
+channelCfg 7 3 0
+chirpComnCfg 15 5 0 128 1 34 3
+chirpTimingCfg 6 26 1 47.95 60
+frameCfg 2 0 600 64 200 0
+antGeometryCfg 1 0 0 1 1 2 1 1 0 2 1 3 2.5 2.5
+sensorStart 0 0 0 0
+"""
+FALL_BPM = """\
+% Platform: xWR68xx
+dfeDataOutputMode 1
+channelCfg 15 7 0
+adcCfg 2 1
+adcbufCfg -1 0 1 1 1
+profileCfg 0 60.75 30.00 1.00 10.00 0 0 200.0 1 96 10785.00 2 1 36
+chirpCfg 0 0 0 0 0 0 0 5
+chirpCfg 1 1 0 0 0 0 0 2
+chirpCfg 2 2 0 0 0 0 0 5
+frameCfg 0 2 48 0 90.00 1 0
+bpmCfg -1 1 0 2
+sensorStart
+"""
+DDM = """\
+% Platform: xWR294x
+dfeDataOutputMode 1
+channelCfg 15 15 0 0 0
+adcCfg 2 0
+adcbufCfg -1 1 0 1 1
+profileCfg 0 77 7 7 20.81 0 0 80 0 256 25000 0 0 164
+chirpCfg 0 5 0 0 0 0 0 15
+frameCfg 0 5 128 0 384 50 1 0
+ddmPhaseShiftAntOrder 0 2 3 1
+"""
+
+
+def said(text: str, folder: Path) -> tuple[Radar, str]:
+    (folder / "a.cfg").write_text(text)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        radar = Radar.load(folder / "a.cfg")
+    return radar, " ".join(str(one.message) for one in caught)
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "bin_m", "most_m", "most_mps", "warned"),
+    [
+        # dR, Rmax and vmax by hand: c / 2B of the sampled sweep, samples times that, lambda / 4T.
+        (VISUALIZER_16XX, "iwr1642 a", 0.0436, 11.15, 4.92, ""),
+        (LOW_POWER, "iwrl6432 a", 0.163, 10.42, 2.06, "taken evenly"),
+        (FALL_BPM, "iwr6843 a", 0.0842, 8.08, 10.1, "3 dB less signal"),
+        (DDM, "awr2944 a", 0.183, 23.4, 5.72, ""),
+    ],
+)
+def test_profiles_of_other_boards_and_languages(
+    tmp_path: Path, text: str, name: str, bin_m: float, most_m: float, most_mps: float, warned: str
+) -> None:
+    radar, warning = said(text, tmp_path)
+    assert radar.name == name
+    assert radar.range_bin_m == pytest.approx(bin_m, rel=5e-3)
+    assert radar.max_range_m == pytest.approx(most_m, rel=5e-3)
+    assert radar.max_velocity_mps / radar.n_doppler_bands == pytest.approx(most_mps, rel=1e-2)
+    assert warned in warning
+    assert bool(warned) == bool(warning)
+
+
+def test_bursts_of_a_low_power_chip(tmp_path: Path) -> None:
+    radar, _ = said(LOW_POWER, tmp_path)
+    assert (radar.n_tx, radar.n_rx, radar.cycles_per_frame) == (2, 3, 64)
+    assert radar.frame_period_s == pytest.approx(0.2)
+    # Rows and columns of the virtual antennas, 2.5 mm apart, the first row on top.
+    virtual = (radar.tx[:, None] + radar.rx[None]).reshape(-1, 3)[:, 1:]
+    steps = np.array([[1, 0], [0, 1], [1, 2], [1, 1], [0, 2], [1, 3]])
+    expected = steps[:, ::-1] * [2.5e-3, -2.5e-3]
+    np.testing.assert_allclose(virtual - virtual[0], expected - expected[0], atol=1e-12)
+    both, _ = said(LOW_POWER.replace("128 1 34", "128 4 34"), tmp_path)
+    assert both.multiplexing == "bpm"
+    with pytest.raises(InputError, match="has no frameCfg"):
+        said(LOW_POWER.replace("frameCfg", "% frameCfg"), tmp_path)
+    with pytest.raises(InputError, match=r"line 5: .*the sweep must rise and the chirps fit"):
+        said(LOW_POWER.replace("2 0 600", "2 0 60"), tmp_path)
+    with pytest.raises(InputError, match="virtual antenna 6 is not where"):
+        said(LOW_POWER.replace("1 3 2.5", "1 4 2.5"), tmp_path)
+    with pytest.raises(InputError, match="has no antGeometryCfg"):
+        said(LOW_POWER.replace("6432", "6844").replace("antGeometryCfg", "% ant"), tmp_path)
+
+
+def test_signs_and_phases_tell_the_tx_apart(tmp_path: Path) -> None:
+    shared = FALL_BPM.replace("frameCfg 0 2", "frameCfg 0 1").replace("-1 1 0 2", "-1 1 0 1")
+    shared = shared.replace("channelCfg 15 7", "channelCfg 15 3")
+    shared = shared.replace("0 0 0 0 0 5\n", "0 0 0 0 0 3\n").replace(
+        "0 0 0 0 0 2\n", "0 0 0 0 0 3\n"
+    )
+    radar, warning = said(shared, tmp_path)
+    assert (radar.multiplexing, radar.n_tx, warning) == ("bpm", 2, "")
+    # Release 1 of the SDK names no subframe: on, and the two chirps.
+    assert said(shared.replace("-1 1 0 1", "1 0 1"), tmp_path)[0] == radar
+    for off in ("-1 0 0 0", "0 0 0"):
+        with pytest.raises(InputError, match="neither bpmCfg nor ddmPhaseShiftAntOrder"):
+            said(shared.replace("-1 1 0 1", off), tmp_path)
+    with pytest.raises(InputError, match="two chirps of the frame, with the same two Tx"):
+        said(FALL_BPM.replace("-1 1 0 2", "-1 1 0 1"), tmp_path)
+    ddm, _ = said(DDM, tmp_path)
+    board = Radar.preset("awr2944").tx_positions_m
+    assert board is not None
+    assert (ddm.multiplexing, ddm.n_doppler_bands, ddm.cycles_per_frame) == ("ddm", 6, 768)
+    assert ddm.tx_positions_m == tuple(board[k] for k in (0, 2, 3, 1))
+
+
+def test_the_board_is_that_of_the_virtual_antennas(tmp_path: Path) -> None:
+    base = FALL_BPM.replace("% Platform: xWR68xx", "").replace("bpmCfg -1 1 0 2", "")
+    base = base.replace("0 0 0 0 0 5\n", "0 0 0 0 0 1\n", 1).replace(
+        "2 2 0 0 0 0 0 5", "2 2 0 0 0 0 0 4"
+    )
+    ods = "antGeometry0 0 0 -1 -1 -2 -2 -3 -3 -2 -2 -3 -3\n"
+    ods += "antGeometry1 0 -1 -1 0 0 -1 -1 0 -2 -3 -3 -2\n"
+    radar, warning = said(base + ods, tmp_path)
+    assert (radar.name, warning) == ("iwr6843ods a", "")
+    virtual = (radar.tx[:, None] + radar.rx[None]).reshape(-1, 3)[:, 1:] / 2.5e-3
+    columns = -np.array([0, 0, -1, -1, -2, -2, -3, -3, -2, -2, -3, -3])
+    rows = -np.array([0, -1, -1, 0, 0, -1, -1, 0, -2, -3, -3, -2])
+    expected = np.stack([columns, rows], axis=1)
+    np.testing.assert_allclose(virtual - virtual[0], expected, atol=1e-3)
+    radar, warning = said(base, tmp_path)
+    assert radar.name == "iwr6843 a"
+    assert "names no board" in warning
+    assert Radar.load(tmp_path / "a.cfg", board="iwr6843ods").name == "iwr6843ods a"
+
+
+def test_what_a_file_asks_of_the_processing_is_named_with_what_does_it(tmp_path: Path) -> None:
+    more = "clutterRemoval -1 1\ncfarCfg -1 0 2 8 4 3 0 15 1\nextendedMaxVelocity -1 0\n"
+    _, warning = said(VISUALIZER_16XX + more, tmp_path)
+    assert "clutterRemoval (line 13; --clutter-removal mean)" in warning
+    assert "cfarCfg (line 14; --detector and --pfa)" in warning
+    assert "extendedMaxVelocity" not in warning
+    assert said(VISUALIZER_16XX + "clutterRemoval -1 0\n", tmp_path)[1] == ""
+
+
+def test_the_place_of_the_sensor_is_that_of_the_radar(tmp_path: Path) -> None:
+    wall, _ = said(VISUALIZER_16XX + "sensorPosition 2 0 15\n", tmp_path)
+    assert (wall.position_m, wall.pitch_deg) == ((-4.0, 1.0, 2.0), -15.0)
+    ceiling, _ = said(VISUALIZER_16XX + "sensorPosition 2.9 0 90\n", tmp_path)
+    assert (ceiling.position_m, ceiling.pitch_deg) == ((0.0, 0.0, 2.9), -90.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("profileCfg 0 77", "profileCfg 0 60"), "xWR16xx of 76 to 81 GHz, and starts at 60 GHz"),
+        (("adcCfg 2 1", "adcCfg 99 1"), "the bits of a sample is 99"),
+        (("adcCfg 2 1", "adcCfg 1 1"), "samples must have 16 bits"),
+        (("adcbufCfg 0 1 0 1", "adcbufCfg 0 7 0 1"), "Q first and the interleaving must be 0 or 1"),
+        (("channelCfg 15 3", "channelCfg 15 4"), "Tx 1 transmits, but channelCfg"),
+    ],
+)
+def test_values_that_no_chip_takes_are_refused(
+    tmp_path: Path, change: tuple[str, str], says: str
+) -> None:
+    with pytest.raises(InputError, match=says):
+        said(VISUALIZER_16XX.replace(*change), tmp_path)

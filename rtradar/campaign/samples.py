@@ -229,7 +229,7 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
 def _plan(
     interval: _Interval, each: Combination, common: Mapping[str, Any], others: Others | None
 ) -> SamplePlan:
-    drawn, radar = interval.drawn, each.radar
+    drawn, radar = interval.drawn, each.scene.turn(each.radar)
     x, y = each.scene.person_position_m
     place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
     scene = replace(each.scene, person_position_m=place)

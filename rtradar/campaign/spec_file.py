@@ -348,14 +348,17 @@ def _comparable(value: object) -> object:
 
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
-    source = check_text("[each]", key, value)
-    if source.endswith(".toml") and inside(folder, source) is None:
-        raise InputError(
-            f"[each] {key} = {brief(source)} leaves the folder of the file; "
-            "put it beside it or below"
-        )
+    table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
+    source = check_text("[each]", key, table.get("base", table.get("board")))
+    if source.endswith((".toml", ".cfg")):
+        if inside(folder, source) is None:
+            raise InputError(
+                f"[each] {key} = {brief(source)} leaves the folder of the file; "
+                "put it beside it or below"
+            )
+        source = str(folder / source)
     try:
-        return load(folder / source if source.endswith(".toml") else source)
+        return load({**table, "base": source} if table is value else source)
     except InputError as error:
         raise InputError(f"[each] {key}: {error}") from None
 

@@ -16,6 +16,8 @@ from rtradar.cli.values import (
     QUIET_HELP,
     add_command,
     add_files,
+    add_pose,
+    add_radar,
     add_reading,
     breathing,
     decibels,
@@ -171,13 +173,13 @@ def _add_capture(command: OneLineParser) -> None:
         default=[],
     )
     add_reading(command)
-    command.option(
-        "--radar",
-        "NAME|TOML|CFG",
+    add_radar(
+        command,
         f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK (default: "
         "%(default)s)",
         default="paper-12ghz",
     )
+    add_pose(command)
     command.option(
         "--scene",
         "NAME|TOML",
@@ -363,7 +365,12 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     from rtradar.radar import Radar
     from rtradar.scene import Scene
 
-    radar, scene = Radar.load(options.radar), Scene.load(options.scene)
+    radar = Radar.load(options.radar, board=options.board)
+    pose = {"position_m": options.radar_position} | {
+        f"{name}_deg": getattr(options, name) for name in ("yaw", "pitch", "roll")
+    }
+    given_pose = {f"radar_{key}": value for key, value in pose.items() if value is not None}
+    scene = dataclasses.replace(Scene.load(options.scene), **given_pose)
     return settings | {
         "motion": _people(options, skeletons),
         "radar": radar,

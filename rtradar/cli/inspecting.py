@@ -8,7 +8,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import add_command, add_files, add_reading, path
+from rtradar.cli.values import add_command, add_files, add_radar, add_reading, path
 from rtradar.system.checks import read_toml
 from rtradar.system.files import check_place, write_json
 from rtradar.system.registries import READERS
@@ -40,7 +40,7 @@ def _add_inspect(command: OneLineParser) -> None:
     )
     command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
     add_reading(command)
-    command.option("--radar", "NAME|TOML|CFG", "the radar that received IF samples")
+    add_radar(command, "the radar that received IF samples")
     add_files(command, json="write what was found there as JSON")
     command.set_defaults(command=_inspect)
 
@@ -62,7 +62,7 @@ def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any],
     """Return the kind of a file, values of what was found, and text about it."""
     suffix = file.suffix.lower()
     if suffix in (".cfg", ".toml"):
-        return _described(file)
+        return _described(file, options)
     if suffix.removeprefix(".") not in READERS:
         from rtradar.exchange import IF_FORMATS
 
@@ -71,13 +71,13 @@ def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any],
     return _motion(file, options)
 
 
-def _described(file: Path) -> tuple[str, dict[str, Any], str]:
+def _described(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:
     """Look at a radar or a scene, of which a radar has fields beside its name."""
     from rtradar.radar import Radar
 
-    fields = {field.name for field in dataclasses.fields(Radar)} - {"name"}
+    fields = {field.name for field in dataclasses.fields(Radar)} - {"name"} | {"base", "board"}
     if file.suffix.lower() == ".cfg" or fields & read_toml(file, "file", "check the path").keys():
-        radar = Radar.load(file)
+        radar = Radar.load(file, board=options.board)
         values = {name: getattr(radar, name) for name in _OF_RADARS}
         return "radar", {"name": radar.name, **values}, repr(radar)
     from rtradar.scene import Scene
@@ -91,7 +91,7 @@ def _samples(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, An
     from rtradar.exchange import open_samples
     from rtradar.radar import Radar
 
-    given = None if options.radar is None else Radar.load(options.radar)
+    given = None if options.radar is None else Radar.load(options.radar, board=options.board)
     samples = open_samples(file, given)
     chirps, rx, of_chirp = samples.shape
     radar = None if samples.radar is None else samples.radar.name

@@ -7,7 +7,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 from rtradar.cli.captures import add_amount, add_settings, tell
-from rtradar.cli.values import add_command, add_files, path, there, whole
+from rtradar.cli.values import add_command, add_files, add_radar, path, there, whole
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
@@ -55,9 +55,8 @@ def _add_process(process: OneLineParser) -> None:
         "with --save-if",
         type=there,
     )
-    process.option(
-        "--radar",
-        "NAME|TOML|CFG",
+    add_radar(
+        process,
         f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK, which also "
         "says the order of a DCA1000's words (default: the one that the samples name)",
     )
@@ -135,8 +134,9 @@ def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca100
 
     layout = _layout(options)
     if options.radar is None or not options.radar.endswith(".cfg"):
-        return None if options.radar is None else Radar.load(options.radar), layout
-    said = read_ti_cfg(options.radar)
+        radar = None if options.radar is None else Radar.load(options.radar, board=options.board)
+        return radar, layout
+    said = read_ti_cfg(options.radar, getattr(options, "board", None))
     if layout is None and not options.samples.with_suffix(".json").exists():
         layout = Dca1000Layout(real=said.real, q_first=said.q_first, rx_mask=said.rx_mask)
     return said.radar, layout

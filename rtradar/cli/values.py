@@ -143,6 +143,33 @@ def add_files(command: OneLineParser, *, out: str = "", json: str) -> None:
     command.option("--json", "FILE", json, type=path)
 
 
+def add_radar(command: OneLineParser, text: str, *, default: str | None = None) -> None:
+    """Add the radar, and the board of its .cfg file."""
+    command.option("--radar", "NAME|TOML|CFG", text, default=default)
+    command.option(
+        "--board",
+        "NAME",
+        "preset whose antennas are those of a .cfg file (default: the one that the file names)",
+    )
+
+
+def add_pose(command: OneLineParser) -> None:
+    """Add where the radar is and how it is turned."""
+    command.option(
+        "--radar-position",
+        "X,Y,Z",
+        "position of the radar [m] (default: the scene's, else the radar's own)",
+        type=place_in_space,
+    )
+    for name, how in (("yaw", "to the left"), ("pitch", "up"), ("roll", "anticlockwise")):
+        command.option(
+            f"--{name}",
+            "DEGREES",
+            f"angle by which the radar is turned {how} (default: the scene's, else its own)",
+            type=number,
+        )
+
+
 def add_reading(command: OneLineParser) -> None:
     """Add what may be said of a recording whose file does not say it."""
     command.option(
@@ -237,6 +264,13 @@ def place_at(text: str) -> dict[str, Any]:
     if len(heading) > 1:
         raise ValueError
     return {"position_m": (x, y)} | ({"heading_deg": heading[0]} if heading else {})
+
+
+@_named("place X,Y,Z [m]")
+def place_in_space(text: str) -> tuple[float, ...]:
+    """Read a place, x, y and z [m]."""
+    x, y, z = (number(part) for part in text.split(","))
+    return x, y, z
 
 
 @_named(f"axis: {', '.join(UPWARD)}")

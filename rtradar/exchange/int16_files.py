@@ -6,14 +6,18 @@ import dataclasses
 import json
 import math
 import os
+import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange.dca1000 import Dca1000Layout, of_radar, pack, unpack, words_of
+from rtradar.exchange.packets import Packets, packets_in
 from rtradar.exchange.recording import (
     IF_AXES,
     IF_UNIT,
@@ -130,14 +134,18 @@ def open_int16(
         raise ValueError(f"scale is {scale:g}")
     if layout is None:
         return _open_plain(path, radar, scale, tuple(map(int, about["shape"])))
-    own, n_bytes = of_radar(layout, radar), path.stat().st_size
+    own, packets = of_radar(layout, radar), None if about else packets_in(path)
+    n_bytes = path.stat().st_size if packets is None else packets.size
     row = 2 * words_of(own, radar)
+    take: Callable[[int, int], NDArray[np.int16]] = partial(_words, path)
+    if packets is not None:
+        take, n_bytes = packets.words, _cut(packets, _whole(radar) * row)
     chirps, odd = divmod(n_bytes, row)
     if odd or not chirps or chirps % _whole(radar):
         raise InputError(_of_another_size(path, radar, own, n_bytes))
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
-        words = _words(path, first * row, (last - first) * row // 2)
+        words = take(first * row, (last - first) * row // 2)
         parts = unpack(words.reshape(last - first, -1), own, radar).astype(np.float64) * scale
         if own.real:
             return complex_of_real(parts[..., 0])
@@ -145,6 +153,18 @@ def open_int16(
 
     size = (chirps, radar.n_rx, radar.samples_per_chirp)
     return SampleFile(path, radar, size, read, "m" if about else "count")
+
+
+def _cut(packets: Packets, group: int) -> int:
+    """Bytes of whole frames or cycles, ``group`` bytes each, in packets; what lacks is said."""
+    kept = packets.size // group * group
+    said = [f"{len(packets.place)} packets with headers, which are left out"]
+    if packets.lost:
+        said.append(f"{packets.lost} were lost, and zeros stand for them")
+    if 0 < kept < packets.size:
+        said.append(f"the last {packets.size - kept} bytes are no whole frame and are left out")
+    warnings.warn(f"'{packets.path}': {'; '.join(said)}", ValidityWarning, stacklevel=4)
+    return kept or packets.size
 
 
 def _open_plain(path: Path, radar: Radar, scale: float, shape: tuple[int, ...]) -> SampleFile:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
 _MOST_ANTENNAS, _MOST_PLACE_M, _MOST_CHIRPS = 1024, 100.0, 2**31
+_MOST_SAMPLES = 16384  # of a chirp: four times as many as the chips of the boards take
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
 
 
@@ -38,11 +39,15 @@ def _same(value: Any) -> Any:
     return value
 
 
-_POSITIVE = FieldRule(
-    lambda value: _is_number(value) and value > _LEAST,
-    float,
-    "it must be a positive, finite number",
-)
+def _positive(least: float, most: float) -> FieldRule:
+    return FieldRule(
+        lambda value: _is_number(value) and least <= value <= most,
+        float,
+        f"it must be a positive, finite number, {least:g} to {most:g}",
+    )
+
+
+_POSITIVE = _positive(_LEAST, _LARGEST)._replace(requirement="it must be a positive, finite number")
 _ANTENNA = FieldRule(
     lambda value: isinstance(value, Antenna | None),
     _same,
@@ -74,7 +79,7 @@ def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
             (optional and value is None) or (_is_number(value) and least <= value <= most)
         ),
         lambda value: None if value is None else float(value),
-        f"it must lie between {least} and {most:g}",
+        f"it must lie between {least:g} and {most:g}",
     )
 
 
@@ -124,12 +129,14 @@ _ORDER = _list_of(is_whole, int, "it must be a list of whole numbers, each Tx on
 _TIMES = _list_of(_is_number, float, "it must be a list of times [s]")
 
 FIELD_RULES: dict[str, FieldRule] = {
-    **dict.fromkeys(("start_frequency_hz", "bandwidth_hz", "chirp_duration_s"), _POSITIVE),
+    "start_frequency_hz": _positive(1e9, 300e9),
+    "bandwidth_hz": _positive(1e6, 100e9),
+    "chirp_duration_s": _positive(_LEAST, 0.1),
     **dict.fromkeys(("frame_duration_s", "frame_hop_s"), _POSITIVE),
     **dict.fromkeys(("tx_spacing_wavelengths", "rx_spacing_wavelengths"), _POSITIVE),
     "samples_per_chirp": _count(1),
     "idle_s": _between(0, 1e3, optional=False),
-    "adc_start_s": _between(0, 1e3, optional=False),
+    "adc_start_s": _between(0, 0.1, optional=False),
     "adc_rate_hz": _or_none(_POSITIVE),
     "frame_period_s": _or_none(_POSITIVE),
     "chirps_per_frame": FieldRule(
@@ -165,6 +172,16 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     yield (
         r.n_tx and (r.rx_positions_m or r.rx_y + r.rx_z),
         "the array has no Tx or no Rx; give at least one of each",
+    )
+    yield (
+        r.samples_per_chirp <= _MOST_SAMPLES,
+        f"samples_per_chirp = {r.samples_per_chirp}; at most {_MOST_SAMPLES} are simulated, many "
+        "more than boards have",
+    )
+    yield (
+        r.bandwidth_hz < r.start_frequency_hz,
+        f"bandwidth_hz = {r.bandwidth_hz:g}; it must be below start_frequency_hz = "
+        f"{r.start_frequency_hz:g}",
     )
     yield (
         r.channels == "all"
@@ -316,9 +333,19 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
             except InputError as error:
                 raise InputError(f"{radar}: {field}: {error}") from None
         if not rule.allows(value):
-            raise InputError(f"{radar}: {field} = {brief(value)}; {rule.requirement}")
+            hint = _meant(field, value, rule)
+            raise InputError(f"{radar}: {field} = {brief(value)}; {rule.requirement}{hint}")
         found[field] = rule.convert(value)
     return found
+
+
+def _meant(field: str, value: Any, rule: FieldRule) -> str:
+    """Return a question where a frequency or a time is allowed in a unit that is often written."""
+    powers = {"hz": (9, 6), "_s": (-6, -3)}.get(field[-2:], ())
+    for power in powers:
+        if is_real(value) and abs(value) < _LARGEST and rule.allows(value * 10.0**power):
+            return f"; is that {value:g}e{power}?"
+    return ""
 
 
 def check_rules(radar: Radar) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,7 +23,7 @@ from rtradar.radar.array import Places
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.radar.schedule import FollowingCount, Schedule
 from rtradar.receiver import Receiver
-from rtradar.system.checks import check_keys, printable
+from rtradar.system.checks import brief, check_keys, printable
 from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table
 
 if TYPE_CHECKING:
@@ -235,13 +236,17 @@ class Radar(Schedule):
         return dataclasses.replace(radar, name=name)
 
     @classmethod
-    def load(cls, source: str | Path) -> Radar:
+    def load(cls, source: str | Path | Mapping[str, Any], *, board: str | None = None) -> Radar:
         """Make a preset by its name, or read a TOML file whose keys are the fields of this class.
 
         Parameters
         ----------
-        source : str or path
-            Name of a preset, or path of a ``.toml`` file or of a ``.cfg`` file (`from_ti_cfg`).
+        source : str, path or mapping
+            Name of a preset, path of a ``.toml`` file or of a ``.cfg`` file (`from_ti_cfg`), or a
+            table as in such a file. A key ``base`` is another such source, of which the other keys
+            replace fields; ``board`` is that of a ``.cfg`` file there, or a preset.
+        board : str, optional
+            Preset whose antennas are those of a ``.cfg`` file.
 
         Returns
         -------
@@ -252,15 +257,51 @@ class Radar(Schedule):
         InputError
             Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
+        if isinstance(source, Mapping):
+            return cls._of_table(source, Path(), board)
         path, table = Path(source), radar_table(source)
-        if table is None:
-            return cls.from_ti_cfg(path) if path.suffix == ".cfg" else cls.preset(str(source))
+        if table is not None:
+            try:
+                return cls._of_table({"name": printable(path.stem), **table}, path.parent, board)
+            except InputError as error:
+                raise InputError(f"radar file '{path}': {error}") from None
+        if path.suffix == ".cfg":
+            return cls.from_ti_cfg(path, board)
+        if board is not None:
+            raise InputError(
+                f"radar '{source}' has its own antennas; leave the board out (--board)"
+            )
+        return cls.preset(str(source))
+
+    @classmethod
+    def _of_table(cls, table: Mapping[str, Any], folder: Path, board: str | None) -> Radar:
+        """Make the radar of a table, whose ``base`` may lie below a folder."""
+        fields = dict(table)
+        base, named = fields.pop("base", None), fields.pop("board", None)
         keys = tuple(sorted(field.name for field in dataclasses.fields(cls)))
-        try:
-            check_keys("", table, (), keys)
-            return cls(**{"name": printable(path.stem), **table})
-        except InputError as error:
-            raise InputError(f"radar file '{path}': {error}") from None
+        check_keys("", fields, (), ("base", "board", *keys))
+        for key, value in (("base", base), ("board", named)):
+            if value is not None and not isinstance(value, str):
+                raise InputError(f"{key} = {brief(value)}; it must be a name or a path")
+        board = named if board is None else board
+        counts = fields.keys() & {"tx_y", "tx_z", "rx_y", "rx_z"}
+        if base is None and board is None:
+            # Who names the antennas of one line has none on the other.
+            lines = {"tx_y", "rx_y"}, {"tx_z", "rx_z"}
+            for own, other in (lines, lines[::-1]):
+                if not counts & other and any(fields.get(key) for key in own):
+                    fields |= dict.fromkeys(other, 0)
+            return cls(**fields)
+        if base is None or base in RADARS:
+            under = cls.load(base or board, board=board if base else None)
+        else:
+            under = cls.load(folder / base, board=board)
+        # What takes the place of another field does so here, too.
+        if counts:
+            fields = {"tx_positions_m": None, "rx_positions_m": None, "tx_order": None} | fields
+        if "frame_duration_s" in fields:
+            fields = {"frame_period_s": None, "chirps_per_frame": None} | fields
+        return dataclasses.replace(under, **fields)
 
     @classmethod
     def from_ti_cfg(cls, path: str | Path, board: str | None = None) -> Radar:

@@ -1,7 +1,8 @@
 """Configuration files of TI's mmWave SDK (``.cfg``), the commands of a chip, read as a radar.
 
 A file says how the chip transmits and samples; where its antennas are is known from its board. The
-commands are those of the user guide of the mmWave SDK, releases 1 to 3, and of the MCU+ SDK.
+commands are those of the user guide of the mmWave SDK, releases 1 to 3, of the MCU+ SDK, and of the
+MMWAVE-L-SDK for the low-power chips, whose files speak of bursts of chirps.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, Literal, NamedTuple, NoReturn
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar.radar import Radar
@@ -22,22 +23,38 @@ from rtradar.system.files import read_bytes
 
 _MOST_BYTES, _MOST_CHIRPS = 1_000_000, 512
 
+_CEILING_DEG = 45.0
+"""Tilt from which on a sensor looks down from a ceiling."""
+
 _BOARDS = {
     "xwr14xx": "iwr1443",
+    "xwr16xx": "iwr1642",
     "xwr18xx": "iwr1843",
     "xwr22xx": "awr2243",
     "xwr64xx": "iwr6843",
     "xwr68xx": "iwr6843",
+    "xwr68xx_ods": "iwr6843ods",
     "xwr64xx_aop": "iwr6843aop",
     "xwr68xx_aop": "iwr6843aop",
     "xwr294x": "awr2944",
     "awr294x": "awr2944",
+    "xwrl6432": "iwrl6432",
+    "xwrl64xx": "iwrl6432",
+    "xwrl684x": "iwrl6432",
+    "xwrl6844": "iwrl6432",
 }
 """Boards of the platforms that the first lines of a file name."""
 
+_GEOMETRIES: dict[tuple[int, ...], str] = {
+    (0, -1, -2, -3, -2, -3, -4, -5, -4, -5, -6, -7): "iwr6843",
+    (0, 0, -1, -1, -2, -2, -3, -3, -2, -2, -3, -3): "iwr6843ods",
+    (-1, -1, 0, 0, -3, -3, -2, -2, -1, -1, 0, 0): "iwr6843aop",
+}
+"""Boards by the places of their virtual antennas (antGeometry0), as people tracking is told."""
+
 _PLATFORM = re.compile(r"%\s*platform\s*:\s*(\S+)", re.IGNORECASE)
 
-_COUNTS = {
+_COUNTS: dict[str, Sequence[int]] = {
     "profileCfg": (14,),
     "chirpCfg": (8,),
     "frameCfg": (6, 7, 8),
@@ -46,17 +63,38 @@ _COUNTS = {
     "adcbufCfg": (4, 5),
     "dfeDataOutputMode": (1,),
     "bpmCfg": (3, 4),
+    "ddmPhaseShiftAntOrder": (1, 2, 3, 4),
+    "antGeometry0": (8, 12),
+    "sensorPosition": (3,),
+    "chirpComnCfg": (7,),
+    "chirpTimingCfg": (5,),
+    "antGeometryCfg": range(2, 100),
 }
 """Commands that are read, with the numbers of values that they may have."""
 
 _NEEDED = ("profileCfg", "chirpCfg", "frameCfg", "channelCfg", "adcCfg")
+_NEEDED_LOW_POWER = ("chirpComnCfg", "chirpTimingCfg", "frameCfg", "channelCfg")
 
-# These start, stop, calibrate or process, and leave the chirps and samples as they are.
+# These start, stop, calibrate or show, and leave chirps, samples and detection as they are.
 _WITHOUT_EFFECT = re.compile(
-    "sensorSt(art|op)|flushCfg|lowPower|guiMonitor|cfarCfg|peakGrouping|multiObjBeamForming|"
-    "clutterRemoval|calibDcRangeSig|extendedMaxVelocity|(comp|measure)RangeBiasAndRxChanPhase|"
-    "CQ(RxSat|SigImg)Monitor|analogMonitor|(aoa|cfar)FovCfg|nearFieldCfg|lvdsStreamCfg|calibData"
+    "sensorSt(art|op)|flushCfg|lowPower(Cfg)?|guiMonitor|calibDcRangeSig|analogMonitor|calibData|"
+    "(comp|measure)RangeBiasAndRxChanPhase|CQ(RxSat|SigImg)Monitor|lvdsStreamCfg|antGeometry1|"
+    "antPhaseRot|factoryCalibCfg|adcDataSource|adcLogging|baudRate|runtimeCalibCfg"
 )
+_PROCESSING = {
+    "clutterRemoval": "--clutter-removal mean",
+    "cfarCfg": "--detector and --pfa",
+    "extendedMaxVelocity": "nothing does it",
+    "aoaFovCfg": "nothing does it",
+    "cfarFovCfg": "nothing does it",
+    "multiObjBeamForming": "nothing does it",
+    "nearFieldCfg": "beams are focused where the near field asks for it",
+    "peakGrouping": "--detector ti-oob",
+    "rangeSelCfg": "nothing does it",
+}
+"""Commands of the processing on the chip, and what does it here; a last 0 switches one off."""
+
+_SWITCHES = ("clutterRemoval", "extendedMaxVelocity", "nearFieldCfg")
 _REFUSED = {
     "advFrameCfg": "frames of several kinds (advFrameCfg) are not simulated; use frameCfg",
     "subFrameCfg": "frames of several kinds (subFrameCfg) are not simulated; use frameCfg",
@@ -98,47 +136,170 @@ def read_ti_cfg(path: str | Path, board: str | None = None) -> TiProfile:
     """Read a configuration file; see `Radar.from_ti_cfg`."""
     path = Path(path)
     commands, platform = _commands(path)
-    for command in _NEEDED:
+    low_power = "chirpComnCfg" in commands
+    for command in _NEEDED_LOW_POWER if low_power else _NEEDED:
         if command not in commands:
             raise InputError(f"profile '{path}' has no {command}; it must say it")
+    try:
+        if low_power:
+            return _read_low_power(path, commands, platform, board)
+        return _read(path, commands, platform, board)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if str(path) in text else f"profile '{path}': {text}") from None
+
+
+def _read(
+    path: Path, commands: dict[str, list[_Line]], platform: str | None, board: str | None
+) -> TiProfile:
+    """Read the commands of the mmWave SDK."""
     mode = commands.get("dfeDataOutputMode", [])
     if mode and mode[-1].values[0] != 1:
         mode[-1].refuse("dfeDataOutputMode must be 1, frames of one kind; others are not simulated")
-    for line in commands.get("bpmCfg", []):
-        if line.values[1]:
-            line.refuse("binary phase modulation (bpmCfg) is not read; switch it off")
     frame, channels, adc = (commands[one][-1] for one in ("frameCfg", "channelCfg", "adcCfg"))
-    order, repeats, profile = _sequence(commands, frame, channels)
-    base = Radar.preset(board or _board(path, platform, profile.values[1]))
+    sequence = _sequence(commands, frame, channels)
+    order, profile = sequence.order, sequence.profile
+    base = Radar.preset(board or _board(path, commands, platform, profile.values[1]))
     most_tx, most_rx = base.n_tx, base.n_rx
     rx_mask = channels.whole(0, 1, 2**most_rx - 1, "the mask of Rx")
     if max(order) >= most_tx:
         channels.refuse(f"Tx {max(order) + 1} is on, and board {base.name} has {most_tx}")
+    if adc.whole(0, 0, 2, "the bits of a sample") != 2:
+        adc.refuse("samples must have 16 bits (2); others are not read")
     if adc.values[1] not in (0, 1):
         adc.refuse("the samples must be complex 1x (1) or real (0); others are not simulated")
-    buffer = commands["adcbufCfg"][-1].values[-4:] if "adcbufCfg" in commands else (0, 0, 0, 1)
+    buffer = commands["adcbufCfg"][-1] if "adcbufCfg" in commands else None
+    q_first = buffer is not None and buffer.values[-3] == 1
+    if buffer is not None and not set(buffer.values[-4:-1]) <= {0, 1}:
+        buffer.refuse("the order of samples, Q first and the interleaving must be 0 or 1 each")
     real = adc.values[1] == 0
     loops = frame.whole(2, 1, 65536, "the number of loops")
     period_ms = frame.values[5 if len(frame.values) == 8 else 4]
-    tx = sorted(order)
+    tx = order if sequence.multiplexing == "ddm" else sorted(order)
     positions = base.tx_positions_m, base.rx_positions_m
     assert positions[0] is not None  # every board lists its antennas
     assert positions[1] is not None
-    try:
-        radar = dataclasses.replace(
-            base,
-            name=f"{base.name} {printable(path.stem)}",
-            tx_positions_m=tuple(positions[0][one] for one in tx),
-            rx_positions_m=tuple(positions[1][k] for k in range(most_rx) if rx_mask >> k & 1),
-            tx_order=tuple(tx.index(one) for one in order),
-            chirps_per_frame=loops * repeats * len(order),
-            frame_period_s=1e-3 * period_ms,
-            transmit_power_dbm=_power(base, profile, tx),
-            **_waveform(profile, real),
+    tdm = sequence.multiplexing == "tdm"
+    radar = dataclasses.replace(
+        base,
+        name=f"{base.name} {printable(path.stem)}",
+        tx_positions_m=tuple(positions[0][one] for one in tx),
+        rx_positions_m=tuple(positions[1][k] for k in range(most_rx) if rx_mask >> k & 1),
+        tx_order=tuple(tx.index(one) for one in order) if tdm else None,
+        multiplexing=sequence.multiplexing,
+        chirps_per_frame=loops * sequence.cycles * len(order),
+        frame_period_s=1e-3 * period_ms,
+        transmit_power_dbm=_power(base, profile, tx),
+        **_waveform(profile, real),
+        **_pose(commands, base),
+    )
+    return TiProfile(radar, real, not real and q_first, rx_mask)
+
+
+def _read_low_power(
+    path: Path, commands: dict[str, list[_Line]], platform: str | None, board: str | None
+) -> TiProfile:
+    """Read the commands of the low-power chips (xWRL), whose samples are real."""
+    common, timing, frame, channels = (commands[one][-1] for one in _NEEDED_LOW_POWER)
+    name = (platform or "").lower()
+    if len(frame.values) != 6:
+        frame.refuse(f"frameCfg of a low-power chip has {len(frame.values)} values, not 6")
+    base = Radar.preset(board or _BOARDS.get(name, "iwrl6432"))
+    large = "684" in name
+    tx_places, rx_places = base.tx_positions_m, base.rx_positions_m
+    if "antGeometryCfg" in commands:
+        counts = (4, 4) if large else (base.n_tx, base.n_rx)
+        tx_places, rx_places = _virtual_places(commands["antGeometryCfg"][-1], *counts)
+    elif large:
+        raise InputError(f"profile '{path}' has no antGeometryCfg, which says where antennas are")
+    assert tx_places is not None  # every board lists its antennas
+    assert rx_places is not None
+    rx_mask = channels.whole(0, 1, 2 ** len(rx_places) - 1, "the mask of Rx")
+    tx_mask = channels.whole(1, 1, 2 ** len(tx_places) - 1, "the mask of Tx")
+    tx = [place for k, place in enumerate(tx_places) if tx_mask >> k & 1]
+    pattern = common.whole(4, 0, 4, "the pattern of the Tx")
+    if pattern not in (0, 1, 4) or (pattern == 4 and len(tx) != 2):
+        common.refuse("the Tx must take turns (1), or two be told apart by their signs (4)")
+    if pattern == 0 and len(tx) > 1:
+        common.refuse("several Tx transmit in one chirp; let them take turns (1)")
+    chirps = frame.whole(0, 1, 512, "the number of chirps in a burst")
+    if chirps % len(tx):
+        frame.refuse(f"{chirps} chirps in a burst are no multiple of {len(tx)} Tx")
+    bursts, burst_us = frame.whole(3, 1, 4096, "the number of bursts"), frame.values[2]
+    samples = common.whole(3, 2, 2048, "the number of samples")
+    if samples % 2:
+        common.refuse("the number of real samples is odd; half as many complex ones are made")
+    rate_hz = (200e6 if large else 100e6) / common.whole(0, 8, 100, "the divisor of the rate")
+    ramp_us, idle_us, slope = common.values[5], timing.values[0], timing.values[3]
+    if not (slope > 0 and ramp_us > 0 and chirps * (ramp_us + idle_us) <= burst_us * (1 + 1e-9)):
+        frame.refuse(
+            f"{chirps} chirps of {ramp_us + idle_us:g} us in a burst of {burst_us:g} us, with a "
+            f"slope of {slope:g} MHz/us; the sweep must rise and the chirps fit"
         )
-    except InputError as error:
-        raise InputError(f"profile '{path}': {error}") from None
-    return TiProfile(radar, real, not real and buffer[1] == 1, rx_mask)
+    if bursts > 1 and chirps * (ramp_us + idle_us) < burst_us * (1 - 1e-9):
+        warnings.warn(
+            f"profile '{path}': the {chirps} chirps of a burst are taken evenly over its "
+            f"{burst_us:g} us; the chip transmits one every {ramp_us + idle_us:g} us, and pauses",
+            ValidityWarning,
+            stacklevel=5,
+        )
+    radar = dataclasses.replace(
+        base,
+        name=f"{'iwrl6844' if large else base.name} {printable(path.stem)}",
+        tx_positions_m=tuple(tx),
+        rx_positions_m=tuple(rx_places[k] for k in range(len(rx_places)) if rx_mask >> k & 1),
+        tx_order=None,
+        multiplexing="bpm" if pattern == 4 else "tdm",
+        start_frequency_hz=1e9 * timing.values[4],
+        bandwidth_hz=1e6 * slope * ramp_us,
+        chirp_duration_s=1e-6 * ramp_us,
+        idle_s=1e-6 * (burst_us / chirps - ramp_us),
+        adc_start_s=timing.values[1] / rate_hz,
+        samples_per_chirp=samples // 2,
+        adc_rate_hz=rate_hz / 2,
+        chirps_per_frame=chirps * bursts,
+        frame_period_s=1e-3 * frame.values[4],
+        **_pose(commands, base),
+    )
+    return TiProfile(radar, True, False, rx_mask)
+
+
+_Places = tuple[tuple[float, float, float], ...]
+
+
+def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places]:
+    """Places of Tx and Rx by rows and columns of the virtual antennas, Tx by Tx, and spacings [mm].
+
+    The first row is the highest, and columns go to the left as the radar looks.
+    """
+    count = n_tx * n_rx
+    if len(line.values) != 2 * count + 2:
+        line.refuse(
+            f"antGeometryCfg has {len(line.values)} values, not {2 * count + 2}: rows and columns "
+            f"of {count} virtual antennas, and two spacings"
+        )
+    *steps, y_mm, z_mm = line.values
+    virtual = [
+        (1e-3 * y_mm * steps[k + 1], -1e-3 * z_mm * steps[k]) for k in range(0, 2 * count, 2)
+    ]
+    tx = [(y - virtual[0][0], z - virtual[0][1]) for y, z in virtual[::n_rx]]
+    rx = virtual[:n_rx]
+    for k, (y, z) in enumerate(virtual):
+        own, other = tx[k // n_rx], rx[k % n_rx]
+        if abs(own[0] + other[0] - y) + abs(own[1] + other[1] - z) > 1e-9:
+            line.refuse(f"virtual antenna {k + 1} is not where its Tx and its Rx put it")
+    return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
+
+
+def _pose(commands: dict[str, list[_Line]], base: Radar) -> dict[str, Any]:
+    """Height and tilt of the sensor where a file says them; beneath a ceiling it is above x = 0."""
+    if "sensorPosition" not in commands:
+        return {}
+    height_m, azimuth_deg, tilt_deg = commands["sensorPosition"][-1].values
+    x, y, _ = base.position_m
+    ceiling = abs(tilt_deg) > _CEILING_DEG
+    place = (0.0, 0.0, height_m) if ceiling else (x, y, height_m)
+    return {"position_m": place, "yaw_deg": -azimuth_deg, "pitch_deg": -tilt_deg}
 
 
 def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
@@ -151,6 +312,7 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
         raise InputError(f"profile '{path}' is larger than 1 MB: it is no .cfg file") from None
     found: dict[str, list[_Line]] = {}
     unknown: dict[str, int] = {}
+    processing: dict[str, int] = {}
     platform = None
     for number, whole in enumerate(text.splitlines(), 1):
         named = _PLATFORM.match(whole.strip())
@@ -162,13 +324,19 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
             _Line(path, number, ()).refuse(_REFUSED[command])
         if command in _COUNTS:
             found.setdefault(command, []).append(_line(path, number, command, words))
+        elif command in _PROCESSING:
+            if command not in _SWITCHES or not words or words[-1] not in ("0", "0.0"):
+                processing.setdefault(command, number)
         elif command and not _WITHOUT_EFFECT.fullmatch(command):
             unknown.setdefault(command, number)
-    if unknown:
-        listed = ", ".join(f"{brief(name)[1:-1]} (line {n})" for name, n in unknown.items())
-        listed = listed if len(listed) <= 400 else f"{listed[:397]}..."
+    listed = [f"{brief(name)[1:-1]} (line {n})" for name, n in unknown.items()]
+    for name, n in processing.items():
+        listed.append(f"{name} (line {n}; {_PROCESSING[name]})")
+    if listed:
+        text = ", ".join(listed)
         warnings.warn(
-            f"profile '{path}': what these lines say is not read: {listed}",
+            f"profile '{path}': what these lines say is not read: "
+            f"{text if len(text) <= 700 else text[:697] + '...'}",
             ValidityWarning,
             stacklevel=4,
         )
@@ -193,10 +361,16 @@ def _line(path: Path, number: int, command: str, words: Sequence[str]) -> _Line:
     return _Line(path, number, tuple(values))
 
 
-def _sequence(
-    commands: dict[str, list[_Line]], frame: _Line, channels: _Line
-) -> tuple[list[int], int, _Line]:
-    """Return the Tx of one cycle in the order of sending, the cycles of a loop, and the profile."""
+class _Sequence(NamedTuple):
+    """Tx of one cycle in the order of sending, cycles of a loop, the profile, and how Tx differ."""
+
+    order: list[int]
+    cycles: int
+    profile: _Line
+    multiplexing: Literal["tdm", "ddm", "bpm"]
+
+
+def _sequence(commands: dict[str, list[_Line]], frame: _Line, channels: _Line) -> _Sequence:
     chirps: dict[int, _Line] = {}
     for line in commands["chirpCfg"]:
         first = line.whole(0, 0, _MOST_CHIRPS - 1, "the first chirp")
@@ -205,45 +379,105 @@ def _sequence(
     first = frame.whole(0, 0, _MOST_CHIRPS - 1, "the first chirp")
     last = frame.whole(1, first, _MOST_CHIRPS - 1, "the last chirp")
     tx_on = channels.whole(1, 1, 15, "the mask of Tx")
-    order, profiles = [], set()
+    masks, profiles = [], set()
     for index in range(first, last + 1):
         if index not in chirps:
             frame.refuse(f"no chirpCfg says what chirp {index} is")
         line = chirps[index]
         mask = line.whole(7, 1, 15, "the mask of Tx")
-        if mask.bit_count() != 1:
-            line.refuse("several Tx transmit in one chirp, which is not read; give each its own")
-        if not mask & tx_on:
-            line.refuse(f"Tx {mask.bit_length()} transmits, but channelCfg switches it off")
+        if mask & ~tx_on:
+            off = (mask & ~tx_on).bit_length()
+            line.refuse(f"Tx {off} transmits, but channelCfg switches it off")
         if any(line.values[3:7]):
             line.refuse("the chirp differs from its profile, which is not simulated; give zeros")
         profiles.add(line.values[2])
-        order.append(mask.bit_length() - 1)
-    cycle = len(set(order))
-    if order != order[:cycle] * (len(order) // cycle) or len(set(order[:cycle])) != cycle:
-        frame.refuse("a Tx transmits twice before the others; each must have its turn in a cycle")
+        masks.append(mask)
     matching = [line for line in commands["profileCfg"] if line.values[0] in profiles]
     if len(profiles) > 1 or not matching:
         frame.refuse("its chirps must have one profileCfg in common")
-    return order[:cycle], len(order) // cycle, matching[-1]
+    profile = matching[-1]
+    signs = commands.get("bpmCfg", [])
+    if signs and signs[-1].values[0 if len(signs[-1].values) == 3 else 1]:
+        order, multiplexing = _with_signs(masks, first, signs[-1])
+    elif all(mask.bit_count() == 1 for mask in masks):
+        order, multiplexing = [mask.bit_length() - 1 for mask in masks], "tdm"
+    elif "ddmPhaseShiftAntOrder" in commands and len(set(masks)) == 1:
+        given = commands["ddmPhaseShiftAntOrder"][-1]
+        order = [given.whole(k, 0, 3, "a Tx") for k in range(len(given.values))]
+        order = [one for one in order if masks[0] >> one & 1]
+        if len(set(order)) != masks[0].bit_count():
+            given.refuse("it must name each Tx that transmits once")
+        return _Sequence(order, len(masks), profile, "ddm")
+    else:
+        chirps[first + next(k for k, mask in enumerate(masks) if mask.bit_count() > 1)].refuse(
+            "several Tx transmit in one chirp, and neither bpmCfg nor ddmPhaseShiftAntOrder tells "
+            "them apart; give each its own"
+        )
+    cycle = len(set(order))
+    if order != order[:cycle] * (len(order) // cycle) or len(set(order[:cycle])) != cycle:
+        frame.refuse("a Tx transmits twice before the others; each must have its turn in a cycle")
+    return _Sequence(order[:cycle], len(order) // cycle, profile, multiplexing)
 
 
-def _board(path: Path, platform: str | None, start_ghz: float) -> str:
-    """Choose the board by the platform that the file names, else by the band."""
+def _with_signs(
+    masks: Sequence[int], first: int, line: _Line
+) -> tuple[list[int], Literal["tdm", "bpm"]]:
+    """Tx of each chirp where two of the chirps are sent by two Tx, with signs + + and + -."""
+    chirps = [int(value) - first for value in line.values[-2:]]
+    inside = all(0 <= chirp < len(masks) for chirp in chirps)
+    pair = masks[chirps[0]] if inside else 0
+    if len(set(chirps)) != 2 or pair.bit_count() != 2 or masks[chirps[1]] != pair:
+        line.refuse(
+            "binary phase modulation (bpmCfg) must name two chirps of the frame, with the same two "
+            "Tx"
+        )
+    members = [one for one in range(4) if pair >> one & 1]
+    order = [mask.bit_length() - 1 for mask in masks]
+    for chirp, own in zip(chirps, members, strict=True):
+        order[chirp] = own
+    others = [mask for chirp, mask in enumerate(masks) if chirp not in chirps]
+    if any(mask.bit_count() > 1 for mask in others):
+        line.refuse("several Tx transmit in a chirp that bpmCfg does not name")
+    if not others and chirps == [0, 1]:
+        return order, "bpm"
+    warnings.warn(
+        f"profile '{line.path}', line {line.number}: Tx {members[0] + 1} and {members[1] + 1} "
+        "transmit together with signs of their own (BPM); here each has a chirp of its own, and 3 "
+        "dB less signal over noise",
+        ValidityWarning,
+        stacklevel=6,
+    )
+    return order, "tdm"
+
+
+def _board(
+    path: Path, commands: dict[str, list[_Line]], platform: str | None, start_ghz: float
+) -> str:
+    """Choose the board by its virtual antennas or the platform that the file names, or the band."""
+    if "antGeometry0" in commands:
+        board = _GEOMETRIES.get(tuple(map(int, commands["antGeometry0"][-1].values)))
+        if board is not None:
+            return board
     if platform is not None:
         board = _BOARDS.get(platform.lower())
         if board is None:
             raise InputError(
                 f"profile '{path}' is for platform {brief(platform)[1:-1]}, whose antennas are not "
-                f"known; name a board (board=), or one of: % Platform:{', '.join(_BOARDS)}"
+                f"known; name a board (board, --board), or one of: % Platform:{', '.join(_BOARDS)}"
+            )
+        low, high = (57, 64) if "6843" in board or "6432" in board else (76, 81)
+        if not low <= start_ghz <= high:
+            raise InputError(
+                f"profile '{path}' is for platform {brief(platform)[1:-1]} of {low} to {high} GHz, "
+                f"and starts at {start_ghz:g} GHz; mend one of both, or name a board (--board)"
             )
         return board
     board = "iwr6843" if start_ghz < 70 else "iwr1843"
     warnings.warn(
         f"profile '{path}' names no board: the antennas are those of {board}; another is named by "
-        "board=, or in the file by a line such as % Platform:xWR14xx",
+        "--board, or in the file by a line such as % Platform:xWR14xx",
         ValidityWarning,
-        stacklevel=4,
+        stacklevel=5,
     )
     return board
 

@@ -64,6 +64,11 @@ def room_rows(scene: Scene) -> dict[str, str]:
         rows["Room"] = f"{' × '.join(f'{length:.4g}' for length in size_m)} m"
     place = scene.radar_position_m
     rows["Radar"] = "at its own position" if place is None else f"at {_point(place)}"
+    if place is not None and scene.is_outside(place):
+        rows["Radar"] += ", outside of the room"
+    for name in ("yaw", "pitch", "roll"):
+        if (angle := getattr(scene, f"radar_{name}_deg")) is not None:
+            rows["Radar"] += f", {name} {angle:g}°"
     turned = f", turned by {scene.heading_deg:g}°" if scene.heading_deg else ""
     rows["Person"] = f"at {_point(scene.person_position_m)}{turned}"
     return rows

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 
 from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
 from rtradar.scene import display, people
 from rtradar.scene.materials import MATERIALS, Material, own_material
@@ -45,7 +46,7 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     table: (tuple(needed.split()), tuple(others.split()))
     for table, needed, others in (
         ("top", "", "name description"),
-        ("[radar]", "position_m", ""),
+        ("[radar]", "", "position_m yaw_deg pitch_deg roll_deg"),
         ("[person]", "", "position_m heading_deg"),
         ("[room]", "size_m corner_m", ""),
         ("a side of a room", "material thickness_m", "roughness_m openings"),
@@ -86,8 +87,11 @@ class Scene:
     people : tuple of Person
         People who are in the scene already, beside those whom a run is given.
     radar_position_m : tuple of float, optional
-        Position of the radar in this scene, world [m]; its axes stay parallel to the world's. The
-        radar keeps its own position where this is left out.
+        Position of the radar in this scene, world [m]. The radar keeps its own where this is left
+        out.
+    radar_yaw_deg, radar_pitch_deg, radar_roll_deg : float, optional
+        How the radar is turned in this scene, as the fields of `rtradar.Radar` [deg]. It keeps its
+        own angles where they are left out.
     person_position_m : tuple of float
         Mean position of the person, x and y [m].
     heading_deg : float
@@ -113,6 +117,9 @@ class Scene:
     objects: tuple[Object, ...] = ()
     people: tuple[Person, ...] = ()
     radar_position_m: Vector | None = None
+    radar_yaw_deg: float | None = None
+    radar_pitch_deg: float | None = None
+    radar_roll_deg: float | None = None
     person_position_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0
 
@@ -142,6 +149,10 @@ class Scene:
         if self.radar_position_m is not None:
             position = check_vector(where, "radar position_m", self.radar_position_m, 3)
             object.__setattr__(self, "radar_position_m", position)
+        for key in _ANGLES:
+            if (angle := getattr(self, f"radar_{key}")) is not None:
+                angle = check_number(where, f"radar {key}", angle, -360, 360)
+                object.__setattr__(self, f"radar_{key}", angle)
         most = PERSON_LIMITS["position_m"][1]
         place = check_vector(where, "person position_m", self.person_position_m, 2, most)
         object.__setattr__(self, "person_position_m", place)
@@ -244,7 +255,7 @@ class Scene:
         return not self._parts
 
     def place(self, radar: Radar) -> Radar:
-        """Move a radar to its position in this scene.
+        """Move a radar to its position in this scene, and turn it as it is there.
 
         Parameters
         ----------
@@ -261,8 +272,15 @@ class Scene:
             Where a material is not known over the sweep of the radar, or the radar is inside a wall
             or nearer than 0.3 m to furniture.
         """
-        place = self.radar_position_m
-        placed = radar if place is None else replace(radar, position_m=place)
+        place, placed = self.radar_position_m, self.turn(radar)
+        placed = placed if place is None else replace(placed, position_m=place)
+        if place is None and self.is_outside(radar.position_m):
+            warnings.warn(
+                f"scene '{self.name}': the radar at {radar.position_m} m, its own position, is "
+                "outside of the room; give one inside (--radar-position, [radar] position_m)",
+                ValidityWarning,
+                stacklevel=2,
+            )
         start = placed.start_frequency_hz
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
@@ -292,6 +310,44 @@ class Scene:
                 )
         return placed
 
+    def turn(self, radar: Radar) -> Radar:
+        """Turn a radar as it is turned in this scene.
+
+        Parameters
+        ----------
+        radar : Radar
+            Radar that keeps its own angles where the scene has none.
+
+        Returns
+        -------
+        Radar
+        """
+        given = {key: getattr(self, f"radar_{key}") for key in _ANGLES}
+        given = {key: value for key, value in given.items() if value is not None}
+        return replace(radar, **given) if given else radar
+
+    def is_outside(self, place: Sequence[float]) -> bool:
+        """Whether a place is outside of the room; where there is none, nothing is.
+
+        Parameters
+        ----------
+        place : (3,) sequence of float
+            World [m].
+
+        Returns
+        -------
+        bool
+        """
+        sides = [wall.corners for wall in self.walls if wall.name in ROOM_SIDES]
+        if len(sides) < len(ROOM_SIDES):
+            return False
+        corners = np.concatenate(sides)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        return bool((np.asarray(place) < low).any() or (np.asarray(place) > high).any())
+
+
+_ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
+
 
 def _fields(table: Table, path: Path) -> dict[str, Any]:
     """Turn the table of the file at ``path`` into the fields of a `Scene`."""
@@ -313,8 +369,10 @@ def _fields(table: Table, path: Path) -> dict[str, Any]:
     }
     if "radar" in table:
         radar = table_at("radar", table)
+        if not radar.keys() & {*_ANGLES}:
+            check_keys("[radar] ", radar, ("position_m",), _ANGLES)
         check_keys("[radar] ", radar, *KEYS["[radar]"])
-        fields["radar_position_m"] = radar["position_m"]
+        fields |= {f"radar_{key}": value for key, value in radar.items()}
     if "person" in table:
         person = table_at("person", table)
         check_keys("[person] ", person, *KEYS["[person]"])

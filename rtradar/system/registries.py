@@ -13,7 +13,10 @@ from rtradar.system.checks import Table, brief, read_toml
 from rtradar.system.files import shipped_folder, special_kind
 from rtradar.system.registry import Registry
 
-BOARDS = ("iwr1443", "iwr1843", "awr1843", "awr2243", "iwr6843", "iwr6843aop", "awr2944")
+BOARDS = (
+    "iwr1443", "iwr1642", "awr1642", "iwr1843", "awr1843", "awr2243", "iwr6843", "iwr6843ods",
+    "iwr6843aop", "iwrl6432", "awr2944",
+)  # fmt: skip
 """Radars that are boards of Texas Instruments."""
 
 RADARS = Registry(

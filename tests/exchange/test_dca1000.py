@@ -232,3 +232,42 @@ def test_the_command_refuses_in_one_line(
         assert says in said
         assert said.count("\n") == 1
         assert not out.exists()
+
+
+def packed(data: bytes, lost: tuple[int, ...] = (), header: int = 10) -> bytes:
+    """Words in packets, as the board sends them: number, (length,) bytes before, 1456 bytes."""
+    found = []
+    for number, begin in enumerate(range(0, len(data), 1456), start=1):
+        if number in lost:
+            continue
+        own = data[begin : begin + 1456]
+        middle = len(own).to_bytes(4, "little") if header == 14 else b""
+        found.append(number.to_bytes(4, "little") + middle + begin.to_bytes(6, "little") + own)
+    return b"".join(found)
+
+
+@pytest.mark.parametrize("header", [10, 14])
+def test_headers_of_packets_are_left_out(tmp_path: Path, header: int) -> None:
+    words = np.random.default_rng(3).integers(-999, 999, 90 * words_of(Dca1000Layout(2), RADAR))
+    data = words.astype("<i2").tobytes()
+    (tmp_path / "plain.bin").write_bytes(data)
+    plain = open_samples(tmp_path / "plain.bin", RADAR)
+    (tmp_path / "packets.bin").write_bytes(packed(data, header=header))
+    with pytest.warns(rt.ValidityWarning, match=r"\d packets with headers, which are left out$"):
+        found = open_samples(tmp_path / "packets.bin", RADAR)
+    assert found.shape == plain.shape
+    np.testing.assert_array_equal(found.read(1, 60), plain.read(1, 60))
+    (tmp_path / "lost.bin").write_bytes(packed(data, lost=(2,), header=header))
+    with pytest.warns(rt.ValidityWarning, match="1 were lost, and zeros stand for them"):
+        found = open_samples(tmp_path / "lost.bin", RADAR)
+    there, ours = (one.read(0, one.shape[0]).ravel() for one in (plain, found))
+    gone = slice(1456 // 4, 2 * 1456 // 4)
+    assert not ours[gone].any()
+    assert np.count_nonzero(ours != there) <= 1456 // 4
+
+
+def test_a_capture_that_stops_in_a_frame_ends_with_the_frame_before(tmp_path: Path) -> None:
+    words = np.random.default_rng(3).integers(-999, 999, 91 * words_of(Dca1000Layout(2), RADAR))
+    (tmp_path / "a.bin").write_bytes(packed(words.astype("<i2").tobytes()))
+    with pytest.warns(rt.ValidityWarning, match="the last 64 bytes are no whole frame"):
+        assert open_samples(tmp_path / "a.bin", RADAR).shape[0] == 90

@@ -28,6 +28,10 @@ def power(samples: NDArray[np.complexfloating]) -> float:
     return float((np.abs(samples) ** 2).mean())
 
 
+BEHIND = pytest.mark.filterwarnings("ignore:.*clutter power is from behind the antennas")
+
+
+@BEHIND
 @pytest.mark.parametrize(
     "multiplexing",
     ["tdm", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("fdm", "ddm"))],
@@ -41,6 +45,7 @@ def test_error_is_below_the_tolerance(multiplexing: Any) -> None:
         assert 0 < error < 10 ** (tolerance_db / 10)
 
 
+@BEHIND
 def test_exact_ghosts_are_asked_for_by_none_or_minus_infinity() -> None:
     none, infinite = (simulated(path_tolerance_db=db) for db in (None, -math.inf))
     assert np.array_equal(none.samples, infinite.samples)

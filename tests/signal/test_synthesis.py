@@ -195,8 +195,8 @@ def test_if_is_the_chirp_times_the_conjugate_of_what_comes_back(
 
 def test_conjugate_of_the_if_is_the_received_spectrum() -> None:
     # H(f) = sum conj(amplitude) exp(-j 2 pi f L / c): what a vector network analyser would read. A
-    # chirp of 10 s is one: the term s tau^2 / 2 is then 1e-7 turns.
-    slow = dataclasses.replace(LONE, chirp_duration_s=10.0, frame_duration_s=10.0)
+    # chirp of 0.1 s over 40 MHz is one: the term s tau^2 / 2 is then 1e-7 turns.
+    slow = dataclasses.replace(LONE, chirp_duration_s=0.1, frame_duration_s=0.1, bandwidth_hz=40e6)
     length = np.array([1.0, 7.3, 12.0])
     scattering = np.array([1j, -0.4 + 0.2j, 0.8])
     echoes = make_echoes(length[None, None], np.conj(scattering)[None, None, None])

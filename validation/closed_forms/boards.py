@@ -55,11 +55,15 @@ class Datasheet:
 
 DATASHEETS = {
     "iwr1443": Datasheet("SWRS211C", (77, 81), 100, 18.75, 15, 15),
+    "iwr1642": Datasheet("SWRS212D", (77, 81), 100, 6.25, 15, None),
+    "awr1642": Datasheet("SWRS203C", (77, 81), 100, 6.25, 15, None),
     "iwr1843": Datasheet("SWRS228B", (77, 81), 100, 12.5, 15, 15),
     "awr1843": Datasheet("SWRS228B", (77, 81), 100, 12.5, 15, 15),
     "awr2243": Datasheet("SWRS223D", (76, 81), 266, 22.5, None, 15),
     "iwr6843": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, 15),
+    "iwr6843ods": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, None),
     "iwr6843aop": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, None),
+    "iwrl6432": Datasheet("SWRS276A", (57, 64), None, 6.25, None, None),
     "awr2944": Datasheet("SWRS273D", (76, 81), None, 18.75, None, None),
 }
 """Of the 77 GHz chips that say so a sweep lies in 76 to 78 or 77 to 81 GHz."""

@@ -42,7 +42,7 @@ K = 2 * np.pi * FREQUENCY / C
 RADIUS = 0.05
 PLACE = np.array([-4.0, 1.0, 1.0])
 UP = np.array([0.0, 0.0, 1.0])
-RADAR = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, start_frequency_hz=FREQUENCY, bandwidth_hz=1e5)
+RADAR = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, start_frequency_hz=FREQUENCY, bandwidth_hz=1e6)
 """One Tx and one Rx, without a sweep to speak of: edges count alike at any detour."""
 
 

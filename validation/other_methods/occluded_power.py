@@ -61,7 +61,7 @@ def occluded(level: str, radar: rt.Radar, body: rt.Body) -> float:
 def measure(quick: bool) -> Iterator[Row]:
     """Yield the occluded fraction of each level and recording."""
     radar = rt.Radar.preset("paper-12ghz")
-    for name, (motion, start) in recordings().items():
+    for motion, start in recordings().values():
         body = rt.Body.from_motion(place(motion, start_s=start, duration_s=0.1 if quick else 0.5))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rt.ValidityWarning)
