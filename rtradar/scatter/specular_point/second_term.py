@@ -4,6 +4,10 @@ The first term is that of a curved mirror. The second has two parts. One is of t
 of an ellipsoid's section at the depth z below its specular point grows as z (1 - z / 2p), where p
 is the distance of the tangent plane from the centre. The other is of the currents, which are other
 where the surface bends more along the electric field than across it.
+
+Where Tx and Rx stand apart, with i half the angle between them as the part sees them, the first
+part is (1 - tan^2 i) / cos i times as much for a field across their plane and (1 + tan^2 i) / cos i
+times for one in it: exactly so for a sphere, by the series of Mie.
 """
 
 from __future__ import annotations
@@ -21,10 +25,10 @@ from rtradar.scatter.common.poses import ChirpPoses
 
 Array = NDArray[np.float64]
 
-_FADES_DEG = (60.0, 90.0)
-"""Angles between Tx and Rx from which and to which the term fades. Conducting spheres of 4 and 6 cm
-at 12 to 16 GHz are nearer to full wave with it up to the first
-(`validation/other_methods/levels_against_full_wave.py`)."""
+_FADES_DEG = (90.0, 120.0)
+"""Angles between Tx and Rx from which and to which the term fades. With it spheres of ka 15 to 40
+are nearer to the series of Mie up to the first, or as near, for both fields
+(`validation/closed_forms/sphere.py`)."""
 
 
 def check_terms(terms: int) -> None:
@@ -43,7 +47,7 @@ def with_second_term(
 
     The result (chirp, rx, part) is that of scattering lengths, for exp(+j omega t); ``wavenumber``
     [rad/m] is one for all, or (chirp, 1, 1). Equation :eq:`second-term` of the
-    theory page. Where Tx and Rx are over 90 degrees apart, as a part sees them, it is 1.
+    theory page. Where Tx and Rx are over 120 degrees apart, as a part sees them, it is 1.
     """
     ways = [unit(a - points) for a in (at.tx[:, None, None], at.rx[:, :, None])]
     turned = np.swapaxes(at.frames, -1, -2)[:, None]
@@ -62,7 +66,11 @@ def with_second_term(
         for direction in (along, np.cross(normal, along))
     ]
     cosine = np.sum(in_axes(ways[0] + ways[1]) * normal, axis=-1) / 2
-    shape = size / np.maximum(cosine, 1e-12)
+    # Antennas in one direction have no plane, and no need of one.
+    across = in_axes(unit(np.cross(ways[0], ways[1])))
+    tangent = (1 - cosine**2) / np.maximum(cosine, 1e-12) ** 2
+    turned_by = 1 + tangent * (1 - 2 * np.sum(field * across, axis=-1) ** 2)
+    shape = size * turned_by / np.maximum(cosine, 1e-12)
     apart = np.degrees(2 * np.arccos(np.clip(cosine, 0.0, 1.0)))
     first, last = _FADES_DEG
     left = 1 - smoothstep(np.clip((apart - first) / (last - first), 0.0, 1.0))

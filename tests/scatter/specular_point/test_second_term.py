@@ -91,7 +91,22 @@ def test_far_apart_antennas_have_the_first_term_alone() -> None:
         one, two = fields(TORSO, [4, 0, 0], rx)
         return float(abs(two[0] / one[0] - 1))
 
-    assert change([0, 4, 0]) < 1e-6 < change([1, 4, 0]) < change([4, 2, 0])
+    assert change([-3, 4, 0]) < 1e-6 < change([-1, 4, 0]) < change([1, 4, 0])
+
+
+@pytest.mark.parametrize(("polarization", "sign"), [("v", -1), ("h", 1)])
+def test_antennas_apart_have_the_coefficient_of_the_exact_series(
+    polarization: Literal["v", "h"], sign: int
+) -> None:
+    """(1 -+ tan^2 i) / cos i, with i half the angle between Tx and Rx, which stand level."""
+    radius, k, half = 0.1, 2 * np.pi * 12e9 / SPEED_OF_LIGHT_MPS, np.radians(32.0)
+    sphere = rt.Ellipsoids([np.zeros(3)], [np.eye(3)], [(radius,) * 3])
+    tx, rx = (1e6 * np.array([[np.cos(half), way * np.sin(half), 0.0]]) for way in (-1, 1))
+    place = target_geometry(sphere, tx, rx)
+    points = solve_specular_points(place, points=True)[2]
+    found = with_second_term(place, points, polarization, np.array(k))
+    coefficient = (1 + sign * np.tan(half) ** 2) / np.cos(half)
+    np.testing.assert_allclose(found, 1 + 0.5j * coefficient / (k * radius), rtol=0, atol=1e-5)
 
 
 def test_without_a_specular_point_there_is_nothing() -> None:
