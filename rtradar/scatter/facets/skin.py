@@ -90,7 +90,9 @@ def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
     sphere, faces = unit_sphere(levels - 1)
     smooth, finer = loop_subdivision(faces, len(sphere))
     fine = smooth @ sphere
-    fine *= np.linalg.norm(sphere, axis=1).mean() / np.linalg.norm(fine, axis=1, keepdims=True)
+    # As far out as the facets of ellipsoids are where nobody has a mesh.
+    radius = float(np.linalg.norm(unit_sphere(levels)[0], axis=1).mean())
+    fine *= radius / np.linalg.norm(fine, axis=1, keepdims=True)
     parts = len(person.semi_axes)
 
     def posed(time: float) -> tuple[Array, Array]:
