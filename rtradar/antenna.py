@@ -83,6 +83,11 @@ class Antenna:
                 raise InputError(
                     f"antenna: {name}_deg and {name}_db must be as many, and the angles ascend"
                 )
+            if levels and max(levels) < 0:
+                raise InputError(
+                    f"antenna: the largest of {name}_db is {max(levels):g} dB; it must be 0, for "
+                    "gain_dbi is the gain there"
+                )
         if self.pattern == "table" and not (self.azimuth_deg or self.elevation_deg):
             raise InputError(
                 "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and "

@@ -202,6 +202,16 @@ class RunSettings:
                 f"pfa = {brief(self.pfa)}; a false-alarm rate is a number between 0 and 1, "
                 "both excluded (--pfa)"
             )
+        for name in ("spreading", "keep_all", "save_if"):
+            if type(value := getattr(self, name)).__name__ not in ("bool", "bool_"):
+                raise InputError(f"{name} = {brief(value)}; it must be True or False")
+        for name in ("fidelity", "variant", "body_material", "clutter_removal", "detector"):
+            if not isinstance(value := getattr(self, name), str):
+                raise InputError(f"{name} = {brief(value)}; it must be a name, in quotes")
+        for name in ("start_s", "heading_deg", "duration_s"):
+            value = getattr(self, name)
+            if not (is_real(value) or (value is None and name == "duration_s")):
+                raise InputError(f"{name} = {brief(value)}; it must be a number")
         MODELS.check(self.fidelity)
         DETECTORS.check(self.detector)
         check_seed("", self.seed)

@@ -59,7 +59,7 @@ class Store:
         bar = {"desc": "looking for samples", "unit": "sample", "leave": False}
         for plan in tqdm(plans, disable=None, **bar):
             path = sample_path(folder, plan.identity)
-            if not is_whole(path):
+            if not is_whole(path, plan.parameters):
                 missing.append(plan)
                 damaged += path.exists()
         return cls(folder, tuple(missing), len(plans) - len(missing), damaged)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rtradar.cli.captures import add_amount, add_settings, tell
@@ -118,8 +119,21 @@ def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
     from rtradar.exchange import Dca1000Layout
 
     names = [field.name for field in dataclasses.fields(Dca1000Layout)]
-    given = {name: value for name in names if (value := getattr(options, name))}
+    said = {name: getattr(options, name) for name in names}
+    given = {
+        name: value for name, value in said.items() if value is not None and value is not False
+    }
     asked = given or getattr(options, "format", None) == "dca1000"
+    file = getattr(options, "samples", None)
+    if (
+        given
+        and file is not None
+        and (suffix := Path(file).suffix) in (".npy", ".nc", ".mat", ".zarr")
+    ):
+        first = "--" + next(iter(given)).replace("_", "-")
+        raise InputError(
+            f"{first} is of the .bin of a DCA1000, and not of a {suffix}; leave it out"
+        )
     return Dca1000Layout(**given) if asked else None
 
 

@@ -176,14 +176,23 @@ def check_size(maps: Mapping[str, NDArray[Any]]) -> None:
         )
 
 
-def is_whole(path: Path) -> bool:
-    """Return whether a sample's file exists and its digest matches its content."""
+def is_whole(path: Path, parameters: Mapping[str, Any] | None = None) -> bool:
+    """Return whether a sample's file exists and its digest matches its content.
+
+    With ``parameters``, whether its provenance has them, too: a copy of another sample has not.
+    """
     try:
         with open_regular(path) as file:
             content = memoryview(file.read())
     except OSError:
         return False
-    return len(content) > _DIGEST and _digest(content[:-_DIGEST]) == content[-_DIGEST:]
+    if len(content) <= _DIGEST or _digest(content[:-_DIGEST]) != content[-_DIGEST:]:
+        return False
+    if parameters is None:
+        return True
+    found = read_sample(path, "about")["provenance"]
+    wanted = json.loads(json.dumps(parameters))
+    return all(name in found and found[name] == value for name, value in wanted.items())
 
 
 def _digest(content: memoryview) -> bytes:

@@ -194,8 +194,10 @@ def _describe(file: Any, data: Any, axes: tuple[str, ...], unit: str, meaning: s
 def open_netcdf(path: Path) -> SampleFile:
     """Open what `write_netcdf` wrote."""
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
-        shape = stored(file, "if_real", compressed=True).shape
+        shape, other = (stored(file, name, compressed=True).shape for name in _PARTS)
         text = str(file.attrs.get("radar", ""))
+    if shape != other:
+        raise ValueError(f"if_real is {shape}, and if_imag {other}")
 
     def read(first: int, last: int) -> NDArray[np.complex64]:
         with open_regular(path) as raw, h5py.File(raw, "r") as file:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rtradar.antenna import Antenna
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar.schedule import FollowingCount
 from rtradar.receiver import Receiver
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
 _MOST_ANTENNAS, _MOST_PLACE_M, _MOST_CHIRPS = 1024, 100.0, 2**31
 _MOST_SAMPLES = 16384  # of a chirp: four times as many as the chips of the boards take
+_MOST_BEAM_TERMS = 8e6  # four times those of an imaging radar of 12 Tx and 16 Rx
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
 
 
@@ -178,6 +180,12 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"samples_per_chirp = {r.samples_per_chirp}; at most {_MOST_SAMPLES} are simulated, many "
         "more than boards have",
     )
+    terms = _beam_terms(r)
+    yield (
+        terms <= _MOST_BEAM_TERMS,
+        f"{r.n_tx} Tx and {r.n_rx} Rx need {terms:.2g} beams times elements, more "
+        f"than {_MOST_BEAM_TERMS:.2g}; set them nearer, or take fewer",
+    )
     yield (
         r.bandwidth_hz < r.start_frequency_hz,
         f"bandwidth_hz = {r.bandwidth_hz:g}; it must be below start_frequency_hz = "
@@ -228,6 +236,16 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         f"frame_duration_s = {r.frame_duration_s} holds {samples:.2g} samples, more than "
         f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps",
     )
+
+
+def _beam_terms(r: Radar) -> float:
+    """Beams of a grid four times as fine as the array resolves, times its elements."""
+    if r.tx_positions_m is None or r.rx_positions_m is None:
+        return 0.0
+    places = np.array(r.tx_positions_m), np.array(r.rx_positions_m)
+    size = sum(np.ptp(own[:, 1:], axis=0) for own in places)
+    size = size * r.start_frequency_hz / SPEED_OF_LIGHT_MPS
+    return float(np.prod(np.where(size > 0, 8 * size + 3, 1)) * len(places[0]) * len(places[1]))
 
 
 def _path_rules(r: Radar) -> Iterator[tuple[Any, str]]:

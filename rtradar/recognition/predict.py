@@ -12,6 +12,7 @@ import numpy as np
 from rtradar.errors import InputError
 from rtradar.recognition.recogniser import OTHER, Recogniser
 from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
+from rtradar.system.checks import printable
 from rtradar.system.files import read_arrays, read_json
 
 _TOLERANCE = 0.2  # relative difference of a radar's resolution that is not worth a warning
@@ -141,7 +142,7 @@ def _of_scene(summary: Mapping[str, Any], card: Mapping[str, Any]) -> Iterator[s
     if scene is None:
         yield "measured samples: the weights have learnt from simulated ones only"
     elif scene != "free-space":
-        yield f"scene '{scene}': the weights have learnt in free space"
+        yield f"scene '{printable(str(scene))}': the weights have learnt in free space"
     people = summary.get("people")
     if isinstance(people, list) and len(people) > 1:
         yield f"{len(people)} people: the weights have learnt from one alone"

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 WARN_FRACTION = 0.05
 """Limits that concern less of the echo power than this are counted, without a Python warning."""
 
+_BEAMS = 181
+"""Sines from -1 to 1 in which the largest beam of an array is sought."""
+
 _STEP_S = 1e-3
 """Interval over which the range rate of a part is measured [s]."""
 
@@ -131,21 +134,38 @@ def folded_angle_deg(radar: Radar) -> float:
 
     With a range rate that is wrong by twice the unambiguous velocity, the phase of one Tx after the
     other is wrong by 1 / n_tx of a turn. On a line of Tx with spacing d this is the phase of a
-    direction whose sine differs by lambda / (n_tx d). The error is 0 if Tx do not take turns, or no
-    line has two of them.
+    direction whose sine differs by lambda / (n_tx d). In a listed array the wrong phases are no
+    plane wave: the direction is that of the largest beam, over the half space ahead. The error is 0
+    if Tx do not take turns, or no line has two of them.
     """
     taking_turns = radar.tx_delay_s[-1] > 0
     on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
     if not (taking_turns and (on_a_line or not radar.is_cross)):
         return 0.0
+    if not radar.is_cross:
+        # Tx at one place are polarisations.
+        return _beam_of_turns_deg(radar) if np.ptp(radar.tx_m, axis=0).any() else 0.0
     spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
-    if radar.tx_positions_m is not None:
-        # Two Tx at one place are two polarisations.
-        apart = np.linalg.norm(np.diff(radar.tx_m, axis=0), axis=1)
-        if not apart.any():
-            return 0.0
-        spacing_m = float(np.median(apart[apart > 0]))
     return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
+
+
+def _beam_of_turns_deg(radar: Radar) -> float:
+    """Angle from broadside to the largest beam where each Tx is wrong by its share of a turn [deg].
+
+    Of two beams alike, such as those above and below an array without height, the nearer one.
+    """
+    sines = np.linspace(-1, 1, _BEAMS)
+    y, z = (axis.ravel() for axis in np.meshgrid(sines, sines, indexing="ij"))
+    ahead = y**2 + z**2 <= 1
+    y, z = y[ahead], z[ahead]
+    order = np.argsort(radar.tx_order if radar.tx_order is not None else np.arange(radar.n_tx))
+    turns = np.repeat(order / radar.n_tx, radar.n_channels // radar.n_tx)
+    field = np.zeros(len(y), dtype=np.complex128)
+    for place, turn in zip(radar.virtual_m / radar.wavelength_m, turns, strict=True):
+        field += np.exp(2j * np.pi * (y * place[1] + z * place[2] - turn))
+    power = np.abs(field)
+    best = power > power.max() * (1 - 1e-3)
+    return math.degrees(math.asin(float(np.sqrt((y[best] ** 2 + z[best] ** 2).min()))))
 
 
 # -- distance --------------------------------------------------------------------------------------

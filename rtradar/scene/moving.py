@@ -26,6 +26,9 @@ from rtradar.system.checks import Vector, brief, check_keys, check_number, check
 Array: TypeAlias = NDArray[np.float64]
 
 _LEAST_AXIS = 1e-9
+
+_MOST_FACES = 200_000
+"""Triangles of a mesh that moves: each has a place at several instants, 2 GB for so many."""
 MOST_WAY_POINTS = 10_000
 MOTION_LIMITS: Limits = {
     "rate_hz": (-1000.0, 1000.0),
@@ -323,6 +326,11 @@ class Object(Furniture):
     def shape(self) -> Triangles:
         """Mesh in its own axes, scaled and relative to the pivot [m]."""
         own = self._own_triangles()
+        if len(own.faces) > _MOST_FACES:
+            raise InputError(
+                f"{self._where}: its mesh has {len(own.faces)} triangles; {_MOST_FACES} are "
+                "allowed of what moves: take a coarser one"
+            )
         vertices = own.vertices - np.array(self.pivot_m)
         vertices.setflags(write=False)
         return Triangles(vertices, own.faces, own.closed)

@@ -157,6 +157,8 @@ def test_what_is_not_turned_shows_where_it_is() -> None:
     ):
         assert folded_angle_deg(Radar(**fields)) == 0
     assert folded_angle_deg(Radar(tx_y=0)) > 0
+    # On a planar board the wrong turns are no plane wave: the largest beam is far off.
+    assert folded_angle_deg(Radar.preset("iwr1843")) == pytest.approx(77, abs=1)
     # Two Tx at one place, for two polarisations.
     twice = {"tx_positions_m": ((0.0, 0.0, 0.0),) * 2, "rx_positions_m": ((0.0, 0.01, 0.0),) * 1}
     assert folded_angle_deg(Radar(**twice)) == 0

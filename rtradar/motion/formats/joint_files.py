@@ -32,7 +32,7 @@ LEAST_FRAMES = 5
 """Least number of frames, which the low-pass needs."""
 
 _NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
-_MOST_JOINTS = 1000
+_MOST_JOINTS, _MOST_PLACES = 1000, 5_000_000
 _FARTHEST, _LEAST_STEP_S = 1e9, 1e-6
 
 _LEAST_STEP = 0.1
@@ -95,12 +95,17 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
             if len(cells) != len(header):
                 raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
             if "up" in columns:
-                up = cells[columns["up"]]
-                cells[columns["up"]] = ""
+                own = cells[columns["up"]]
+                if rows and own != up:
+                    raise text.fail(f"up is {brief(own)}, and was {brief(up)}; it must not change")
+                up, cells[columns["up"]] = own, ""
             seen = [k for k, cell in enumerate(cells) if cell.lower() not in ("", "nan")]
             row = [math.nan] * len(cells)
             for k, value in zip(seen, text.numbers([cells[k] for k in seen]), strict=True):
                 row[k] = value
+            rate = columns.get("rate_hz", -1)
+            if rate >= 0 and rows and row[rate] != rows[0][rate]:
+                raise text.fail(f"rate_hz is {row[rate]:g}, and was {rows[0][rate]:g}; give time_s")
             rows.append(row)
             text.check_size(len(joints), len(rows))
     values = np.array(rows).reshape(len(rows), len(header))
@@ -167,6 +172,11 @@ def checked(
         raise InputError(
             f"{path}: {len(given)} frames of {given.shape[1]} joints; there must be at least "
             f"{LEAST_FRAMES} frames, and at most {_MOST_JOINTS} joints"
+        )
+    if given.shape[0] * given.shape[1] > _MOST_PLACES:
+        raise InputError(
+            f"{path}: {given.shape[0]} frames of {given.shape[1]} joints; at most "
+            f"{_MOST_PLACES} places of joints are read: cut it into shorter ones"
         )
     names = tuple(map(str, named))
     known = [plain(name) for name in names]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -210,9 +211,18 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
     (out / "history.csv").write_text(_csv([*what, "epoch", *HISTORY], history), encoding="utf-8")
 
 
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.]+$)")
+"""Beginning of a formula, and of no number."""
+
+
+def _inert(row: Sequence[object]) -> list[object]:
+    """Quote what a spreadsheet would run as a formula; numbers stay as they are."""
+    return [f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell for cell in row]
+
+
 def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([head, *rows])
+    csv.writer(text, lineterminator="\n").writerows([_inert(row) for row in (head, *rows)])
     return text.getvalue()
 
 
