@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number, check_order, is_real
+from rtradar.system.checks import brief, check_number, check_order, is_real, is_whole
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -95,12 +95,17 @@ class ProcessingOptions(_Seed, total=False):
     detector_options: Mapping[str, Any] | None
     range_window: str | tuple[str, float]
     doppler_window: str | tuple[str, float]
+    spectrogram_cycles: int | None
+    spectrogram_overlap: float
 
 
 class RunOptions(SimulationOptions, ProcessingOptions, total=False):
     """The options that `run` and `compare` take by name; `RunSettings` documents them."""
 
     save_if: bool
+
+
+_MOST_CYCLES, _MOST_OVERLAP = 65536, 0.999
 
 
 @dataclass(frozen=True)
@@ -162,6 +167,11 @@ class RunSettings:
     range_window, doppler_window : str or (str, float)
         Window function, such as ``blackman``, or its name and parameter. See
         `rtradar.process.WindowFunctions`.
+    spectrogram_cycles : int, optional
+        Number of cycles in a window of the spectrogram, 2 or more. By default 128, or a frame where
+        there are gaps between frames.
+    spectrogram_overlap : float
+        Part of a window of the spectrogram that the next one shares, 0 to below 1.
     noise_power_m2 : float, optional
         Noise power per sample [m^2], in place of ``snr_db``: for runs with the same noise.
 
@@ -193,6 +203,8 @@ class RunSettings:
     detector_options: Mapping[str, Any] | None = field(default_factory=dict)
     range_window: str | tuple[str, float] = "hann"
     doppler_window: str | tuple[str, float] = "hann"
+    spectrogram_cycles: int | None = None
+    spectrogram_overlap: float = 0.95
     noise_power_m2: float | None = None
 
     def __post_init__(self) -> None:
@@ -212,6 +224,17 @@ class RunSettings:
             value = getattr(self, name)
             if not (is_real(value) or (value is None and name == "duration_s")):
                 raise InputError(f"{name} = {brief(value)}; it must be a number")
+        cycles, overlap = self.spectrogram_cycles, self.spectrogram_overlap
+        if cycles is not None and not (is_whole(cycles) and 2 <= cycles <= _MOST_CYCLES):
+            raise InputError(
+                f"spectrogram_cycles = {brief(cycles)}; it must be a whole number from 2 to "
+                f"{_MOST_CYCLES} (--spectrogram-cycles)"
+            )
+        if not (is_real(overlap) and 0 <= overlap <= _MOST_OVERLAP):
+            raise InputError(
+                f"spectrogram_overlap = {brief(overlap)}; it is the part of a window that the next "
+                f"one shares, 0 to {_MOST_OVERLAP} (--spectrogram-overlap)"
+            )
         MODELS.check(self.fidelity)
         DETECTORS.check(self.detector)
         check_seed("", self.seed)

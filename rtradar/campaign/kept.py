@@ -14,7 +14,6 @@ from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
 from rtradar.process import (
-    SlidingSpectrogram,
     angle_grid,
     measured_angles,
     range_azimuth,
@@ -91,12 +90,10 @@ class MapKeeper:
         source_of: SourceOfCells | None = None,
         angles: bool = True,
     ) -> None:
-        self._processing, self._keep, radar = processing, keep, processing.radar
+        self._processing, self._keep = processing, keep
         self._clouds = CloudMaker(processing, source_of, angles)
         self.max_chirps = self._clouds.max_chirps
-        self._spectrogram = SlidingSpectrogram(
-            radar, removal=processing.removal, window_functions=processing.window_functions
-        )
+        self._spectrogram = processing.spectrogram()
         self._steps: defaultdict[str, list[NDArray[np.floating]]] = defaultdict(list)
 
     def push(self, spectra: NDArray[np.complex64], first: int) -> None:
@@ -125,19 +122,20 @@ class MapKeeper:
         if not self._keep:
             return {}
         maps = {name: np.concatenate(self._steps.pop(name)) for name in list(self._steps)}
-        return maps | _axes(self._processing.radar, maps)
+        return maps | _axes(self._processing, maps)
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
         return self._clouds.finish()
 
 
-def _axes(radar: Radar, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:
+def _axes(processing: Processing, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:
     """Return the axes beside time that these maps have."""
+    radar = processing.radar
     known = {
         "range": radar.range_m,
         "velocity": radar.velocity_mps(radar.cycles_per_frame),
-        "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
+        "spectrogram_velocity": radar.velocity_mps(processing.window_cycles),
         "azimuth": angle_grid(radar) if measured_angles(radar) else np.zeros(0),
     }
     needed = {axis for name in maps for axis in ARRAYS[name].dims}

@@ -38,7 +38,8 @@ NAMED = {
 }
 WINDOWS = ("range_window", "doppler_window")
 SWITCHES = ("keep_all", "spreading")
-RUN_KEYS = ("pfa", *NAMED, *WINDOWS, "order", *SWITCHES)
+SPECTROGRAM = ("spectrogram_cycles", "spectrogram_overlap")
+RUN_KEYS = ("pfa", *NAMED, *WINDOWS, *SPECTROGRAM, "order", *SWITCHES)
 """Settings of a run that a file may give for all samples."""
 
 

@@ -27,8 +27,10 @@ from rtradar.process import (
     power_map,
     range_spectrum,
     takes_channels,
+    window_cycles,
 )
 from rtradar.process.side_lobes import RangeSideLobes, SeenRanges
+from rtradar.process.spectrogram import OVERLAP, SlidingSpectrogram
 from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
@@ -74,7 +76,7 @@ class Processing:
 
     ``detect`` marks the cells of a frame, ``removal`` removes static clutter before Doppler,
     ``seed`` is that of the sampling of clouds, ``stages`` record the time, and ``unit`` is that of
-    the samples.
+    the samples. ``spectrogram_cycles`` and ``spectrogram_overlap`` are those of `RunSettings`.
     """
 
     radar: Radar
@@ -84,6 +86,23 @@ class Processing:
     seed: int = 0
     stages: Stages = field(default_factory=Stages)
     unit: str = "m"
+    spectrogram_cycles: int | None = None
+    spectrogram_overlap: float = OVERLAP
+
+    @property
+    def window_cycles(self) -> int:
+        """Number of cycles in a window of the spectrogram."""
+        return self.spectrogram_cycles or window_cycles(self.radar)
+
+    def spectrogram(self) -> SlidingSpectrogram:
+        """Return what makes the spectrogram of the range spectra."""
+        return SlidingSpectrogram(
+            self.radar,
+            removal=self.removal,
+            window=self.window_cycles,
+            overlap=self.spectrogram_overlap,
+            window_functions=self.window_functions,
+        )
 
     @classmethod
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
@@ -95,6 +114,8 @@ class Processing:
             clutter_removal(settings.clutter_removal, radar),
             window_functions,
             settings.seed,
+            spectrogram_cycles=settings.spectrogram_cycles,
+            spectrogram_overlap=settings.spectrogram_overlap,
         )
 
     def range_spectra(

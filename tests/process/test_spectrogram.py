@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
+import rtradar as rt
 from rtradar.errors import InputError
 from rtradar.process import WindowFunctions, clutter_removal, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, spectrogram
@@ -251,3 +252,16 @@ def test_there_is_no_such_channel(channel: int) -> None:
 def test_a_block_of_another_radar_is_refused() -> None:
     with pytest.raises(InputError, match="needs"):
         SlidingSpectrogram(LOW).push(np.zeros((12, 8, 255), np.complex64))
+
+
+def test_a_run_has_the_window_and_the_overlap_that_are_asked_of_it() -> None:
+    walk = rt.synthetic_motion("walk", seed=0, duration_s=0.5)
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=32, bandwidth_hz=0.5e9)
+    found = rt.run(
+        walk, radar, fidelity="analytic", spectrogram_cycles=64, spectrogram_overlap=0.5
+    ).maps["spectrogram"]
+    cycles = radar.chirps_in(0.5) // 2
+    assert found.shape == (1 + (cycles - 64) // 32, 32, 64)
+    for name, value in (("spectrogram_cycles", 1), ("spectrogram_overlap", 1.0)):
+        with pytest.raises(InputError, match=name):
+            rt.run(walk, radar, **{name: value})

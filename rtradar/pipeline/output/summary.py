@@ -192,7 +192,8 @@ def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
     message = (
         f"detections nearer than {ranges.low_m:.1f} m or farther than {ranges.high_m:.1f} m, which "
         "may be range side lobes of stronger echoes: past the last range they go on from the "
-        "first; range_window = 'hann' keeps them low"
+        "first; a window function with lower ones does away with them, such as --range-window "
+        "blackmanharris"
     )
     share = ranges.side_lobes / ranges.detections
     return [dataclasses.asdict(Limit("range_side_lobes", share, message))]

@@ -26,13 +26,11 @@ from rtradar.pipeline.processing import (
 )
 from rtradar.process import (
     SlidingRangeTime,
-    SlidingSpectrogram,
     angle_grid,
     measured_angles,
     power_map,
     range_azimuth,
     range_elevation,
-    window_cycles,
 )
 from rtradar.radar import Radar
 from rtradar.signal.multiplexing import chirps_together
@@ -80,21 +78,19 @@ class RunWriter:
         self._processing = processing
         radar, removal = processing.radar, processing.removal
         self._clouds = CloudMaker(processing, source_of)
-        self._spectrogram = SlidingSpectrogram(
-            radar, removal=removal, window_functions=processing.window_functions
-        )
+        self._spectrogram = processing.spectrogram()
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.max_chirps = self._clouds.max_chirps
         self._angle_names = measured_angles(radar)
         axes = {
             "range": radar.range_m,
             "velocity": radar.velocity_mps(radar.cycles_per_frame),
-            "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
+            "spectrogram_velocity": radar.velocity_mps(processing.window_cycles),
         } | {name: angle_grid(radar) for name in self._angle_names}
         removed = {
             "time": removal.description(radar.cycles_per_frame),
             "slow_time": removal.description(self._range_time.window_cycles),
-            "spectrogram_time": removal.description(window_cycles(radar)),
+            "spectrogram_time": removal.description(processing.window_cycles),
         }
         self._received = None
         if len(frame_starts) and removed["time"] != "none":

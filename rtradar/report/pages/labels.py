@@ -39,6 +39,8 @@ _LABELS = {
     "detector": "Detector",
     "detector_options": "Options of the detector",
     "range_window": "Window function over range",
+    "spectrogram_cycles": "Cycles in a window of the spectrogram",
+    "spectrogram_overlap": "Overlap of its windows",
     "doppler_window": "Window function over velocity",
     "unit": "Unit of the samples",
     "noise_power_given_m2": "Noise power given",
