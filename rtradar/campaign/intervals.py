@@ -98,6 +98,18 @@ class Intervals:
             return 1
         return 1 + math.floor((end - self.start_s - self.duration_s + _SLACK_S) / self.hop_s)
 
+    def lacks(self, name: str, length_s: float) -> str | None:
+        """Say that a recording of this length [s] is too short for one interval; else None."""
+        end = length_s if self.end_s is None else self.end_s
+        needed = self.start_s + (self.duration_s or 1e-3)
+        if max(end, needed) <= length_s + _SLACK_S:
+            return None
+        return (
+            f"recording '{name}' has {length_s:.6g} s, "
+            f"too short for an interval from {self.start_s:g} to "
+            f"{max(end, needed):.6g} s; shorten it (start_s, duration_s, end_s)"
+        )
+
     def of(
         self, name: str, length_s: float, seed: int = 0, motion: Callable[[], Motion] | None = None
     ) -> list[tuple[float, float]]:
@@ -106,14 +118,9 @@ class Intervals:
         ``seed`` is that of their places, and ``motion`` makes what strikes are sought in. An
         InputError is raised if the recording is too short for one interval.
         """
+        if (text := self.lacks(name, length_s)) is not None:
+            raise InputError(text)
         end = length_s if self.end_s is None else self.end_s
-        needed = self.start_s + (self.duration_s or 1e-3)
-        if max(end, needed) > length_s + _SLACK_S:
-            raise InputError(
-                f"recording '{name}' has {length_s:.6g} s, "
-                f"too short for an interval from {self.start_s:g} to "
-                f"{max(end, needed):.6g} s; shorten it (start_s, duration_s, end_s)"
-            )
         if self.duration_s is None:
             return [(self.start_s, round(end - self.start_s, 6))]
         if self.place == "regular":

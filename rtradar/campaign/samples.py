@@ -33,7 +33,7 @@ from rtradar.campaign.spec import (
     check_samples,
 )
 from rtradar.clouds.sample_files import FORMAT, Sample
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError, InputErrors, ValidityWarning
 from rtradar.motion import Motion, cut, load_motion, synthetic_motion
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
@@ -132,13 +132,20 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     """
     intervals = [interval for actor in spec.actors for interval in _takes(spec, actor)]
     read = cache(load_motion)  # a recording of two activities is given twice
-    hide = None if spec.recordings else True
+    hide, short = None if spec.recordings else True, list[str]()
     for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
         motion = read(recorded.path, skeleton=recorded.skeleton, **recorded.said)
+        if (text := recorded.intervals.lacks(recorded.name, motion.duration_s)) is not None:
+            short.append(text)
+            continue
         copies = 1 + (spec.augmented.copies if spec.augmented else 0)
         count = len(intervals) + copies * recorded.intervals.most(motion.duration_s)
         check_samples(count, len(spec.combinations))
         intervals += _intervals(spec, recorded, motion)
+    if short and (not spec.skip_short or not intervals):
+        raise InputErrors([f"{text}, or leave it out (skip_short = true)" for text in short])
+    for text in short:
+        warnings.warn(f"{text.partition(';')[0]}: left out", ValidityWarning, stacklevel=2)
     run = asdict(spec.run)
     usual = asdict(RunSettings())
     common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}

@@ -104,7 +104,8 @@ class Spec(NamedTuple):
     """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
 
     ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
-    Without ``angles`` spatial clouds are empty.
+    Without ``angles`` spatial clouds are empty. With ``skip_short`` recordings that are too short
+    for an interval are left out.
     """
 
     run: RunSettings
@@ -117,6 +118,7 @@ class Spec(NamedTuple):
     others: Others | None = None
     augmented: Augmented | None = None
     angles: bool = True
+    skip_short: bool = False
 
 
 def check_samples(intervals: int, combinations: int) -> None:

@@ -79,6 +79,7 @@ _TOP = (
     "seed",
     *RUN_KEYS,
     "keep",
+    "skip_short",
     "angles",
     "folder",
     "windows",
@@ -143,6 +144,8 @@ def _spec(table: Table, folder: Path) -> Spec:
         key: wrong.of(_range, key, drawn_table.get(key, usual), least, most) or (0.0, 0.0)
         for key, (usual, least, most) in DRAWN.items()
     }
+    if not isinstance(table.get("skip_short", False), bool):
+        wrong.lines.append(f"skip_short = {brief(table['skip_short'])}; allowed: true, false")
     keep = wrong.of(_keep, table) or ()
     angles = wrong.of(_angles, table, keep)
     run = wrong.of(_run_settings, table)
@@ -163,7 +166,17 @@ def _spec(table: Table, folder: Path) -> Spec:
         lengths |= {intervals.duration_s} if actors else set()
         check_equal_sizes(keep, lengths, combinations)
     return Spec(
-        run, intervals, combinations, drawn, actors, recordings, keep, others, augmented, angles
+        run,
+        intervals,
+        combinations,
+        drawn,
+        actors,
+        recordings,
+        keep,
+        others,
+        augmented,
+        angles,
+        table.get("skip_short", False),
     )
 
 

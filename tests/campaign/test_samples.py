@@ -331,3 +331,23 @@ def test_others_without_meaning_are_refused(
         text = text.replace("[-1, 1]", "[0, 0.1]")
     with pytest.raises(InputError, match=message):
         planned(tmp_path, HEAD + text + actors(1, "kick"))
+
+
+def test_every_recording_that_is_too_short_is_named_or_left_out(tmp_path: Path) -> None:
+    both = recording(tmp_path, duration_s=2.0)
+    for name, frames in (("short", 11), ("shorter", 6)):
+        text = BVH.replace("Frames: 31", f"Frames: {frames}").partition("0 90 0")[0]
+        (tmp_path / f"{name}.bvh").write_text(text + "0 90 0 0 0 0\n" * frames)
+        both += recording(tmp_path, duration_s=2.0).replace("walk.bvh", f"{name}.bvh")
+    with pytest.raises(InputError) as caught:
+        planned(tmp_path, HEAD + both)
+    lines = str(caught.value).splitlines()
+    assert [line.partition(", too")[0] for line in lines] == [
+        f"recording '{name}' has {length} s"
+        for name, length in (("short.bvh", 1), ("shorter.bvh", 0.5))
+    ]
+    assert all("skip_short = true" in line for line in lines)
+    with pytest.warns(rt.ValidityWarning) as said:
+        found = planned(tmp_path, "skip_short = true\n" + HEAD + both)
+    assert [plan.parameters["recording"] for plan in found] == ["walk.bvh"]
+    assert sum("left out" in str(one.message) for one in said) == 2
