@@ -88,6 +88,17 @@ def stature_of(nodes: Array) -> float:
     return (sum(legs) / 2 + trunk + head) / (1 - _ANKLE_OF_STATURE)
 
 
+_ALOFT_M, _FALL_FRAMES, _HALF_OR_TWICE = 0.06, 8, ((0.4, 0.65), (1.6, 2.6))
+"""Height of the feet of who is in the air [m], least number of frames for a fall, and how many
+times too slow or too fast it is where the rate is half or twice as much."""
+
+_LOOKED_AT_S = 20.0
+"""Beginning of a recording in which falls and steps are sought [s]."""
+
+_STEPS_HZ, _LEAST_STEPS = 3.2, 4
+"""Steps a second of who walks are fewer, and how many are counted at least."""
+
+
 # -- the unit --------------------------------------------------------------------------------------
 
 
@@ -299,6 +310,47 @@ def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: f
     return Finding("largest_speed_mps", round(fastest, 3), text)
 
 
+def warn_of_rate(where: str, nodes: Array, rate_hz: float) -> None:
+    """Warn where free fall, or steps of who walks, say that the rate is half or twice as much.
+
+    ``nodes (frame, node, 3)`` are in the world [m]. Who is in the air falls with 9.8 m/s^2; who
+    walks, with a foot on the floor at all times, makes fewer than 3.2 steps a second.
+    """
+    feet = nodes[:, [NODES.index(f"{side}_{at}") for side in "lr" for at in ("ankle", "toe")], 2]
+    lowest = feet.min(axis=1)
+    aloft = lowest > np.quantile(lowest, 0.05) + _ALOFT_M
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], aloft, [0]])))
+    falls = []
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - begin >= _FALL_FRAMES:
+            times = np.arange(end - begin) / rate_hz
+            falls.append(-2 * np.polyfit(times, nodes[begin:end, 0, 2], 2)[0])
+    apart = of_node(nodes, "l_ankle") - of_node(nodes, "r_ankle")
+    passes = int((np.diff(np.sign(apart @ _mean_way(nodes))) != 0).sum())
+    duration_s = len(nodes) / rate_hz
+    says = ""
+    if falls and not aloft[[0, -1]].any():
+        ratio = float(np.sqrt(np.median(falls) / 9.81)) if np.median(falls) > 0 else 1.0
+        if any(low < ratio < high for low, high in _HALF_OR_TWICE):
+            says = f"who jumps falls with {np.median(falls):.1f} m/s^2, {ratio:.1f} times as fast"
+    elif not aloft.any() and passes > max(_STEPS_HZ * duration_s, _LEAST_STEPS):
+        says = f"{passes / duration_s:.1f} steps a second with a foot on the floor are too many"
+    if says:
+        warnings.warn(
+            f"{where}: the rate of {rate_hz:g} frames a second may be wrong: {says}; give it "
+            "(rate_hz, --rate)",
+            ValidityWarning,
+            stacklevel=4,
+        )
+
+
+def _mean_way(nodes: Array) -> Array:
+    """Unit vector of the way that the person goes; none for who stays."""
+    way = (nodes[-1, 0] - nodes[0, 0]) * [1, 1, 0]
+    size = float(np.linalg.norm(way))
+    return np.asarray(way / size if size > 1.0 else 0 * way)
+
+
 # -- motions of skeletons --------------------------------------------------------------------------
 
 
@@ -351,6 +403,8 @@ def settled(
         found.append(Finding("t_pose_frames", dropped, text))
         made = _of_frames(made, itemgetter(slice(dropped, None)))
     found.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))
+    begin = slice(round(_LOOKED_AT_S * made.rate_hz) + 2)
+    warn_of_rate(where, to_nodes(_of_frames(made, itemgetter(begin))).positions, made.rate_hz)
     return replace(made, girth=motion.girth, findings=tuple(found))
 
 

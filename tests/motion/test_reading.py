@@ -728,3 +728,30 @@ def test_damaged_tables_of_points_are_refused(
     file.write_text(file.read_text().replace(*change))
     with pytest.raises(InputError, match=says):
         load_motion(file)
+
+
+# -- the rate --------------------------------------------------------------------------------------
+
+
+def hopper(rate_hz: float) -> str:
+    """A BVH file, at 60 Hz in truth, of who hops three times, half a second in the air each."""
+    lines = walker(frames=180, swing_deg=0.0, way=(0.0, 0.0, 0.0)).splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("Frame Time")) + 1
+    for frame, k in enumerate(range(first, len(lines))):
+        words = lines[k].split()
+        air_s = frame / 60 % 1.0 - 0.25
+        height = max(0.0, 9.81 / 2 * air_s * (0.5 - air_s))
+        words[1] = f"{float(words[1]) + 100 * height:.6f}"
+        lines[k] = " ".join(words)
+    lines[first - 1] = f"Frame Time: {1 / rate_hz:.8f}"
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize(("rate_hz", "says"), [(60, ""), (120, "2.0 times"), (30, "0.5 times")])
+def test_free_fall_tells_of_half_or_twice_the_rate(
+    tmp_path: Path, rate_hz: float, says: str
+) -> None:
+    motion, said = read(tmp_path, hopper(rate_hz))
+    assert motion.rate_hz == rate_hz
+    assert says in " ".join(said)
+    assert bool(says) == bool(said)
