@@ -294,7 +294,8 @@ class Object(Furniture):
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
             object.__setattr__(self, "material", material(self.material))
-        if not (self._is_mesh or isinstance(self.mesh, str | Path)):
+        lengths = isinstance(self.mesh, list | tuple) and len(self.mesh) == 3
+        if not (self._is_mesh or lengths or isinstance(self.mesh, str | Path)):
             raise InputError(
                 f"object {brief(self.name)}: mesh = {brief(self.mesh)}; it must be a name, a file, "
                 "or a trimesh.Trimesh"

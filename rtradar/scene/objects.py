@@ -299,8 +299,9 @@ class Furniture:
     ----------
     name : str
         Name that reports show.
-    mesh : str or Path
-        Name of a mesh that comes with rtradar, or a file: ``.ply``, ``.obj``, ``.stl`` or ``.glb``.
+    mesh : str, Path or (float, float, float)
+        Name of a mesh that comes with rtradar, or a file: ``.ply``, ``.obj``, ``.stl`` or ``.glb``;
+        or the lengths of a box along x, y and z [m], whose origin is in the middle of its bottom.
     material : Material
         Material of the surface.
     position_m : tuple of float
@@ -323,7 +324,7 @@ class Furniture:
     """
 
     name: str
-    mesh: Any  # str or Path; an `Object` may have a mesh itself
+    mesh: Any  # str, Path or lengths; an `Object` may have a mesh itself
     material: Material
     _: KW_ONLY
     position_m: Vector
@@ -342,6 +343,14 @@ class Furniture:
         _check(self, where, FURNITURE_LIMITS)
         if not isinstance(self.sheet, bool):
             raise InputError(f"{where}: sheet = {brief(self.sheet)}; it must be true or false")
+        if isinstance(self.mesh, list | tuple):
+            lengths = check_vector(where, "box", self.mesh, 3)
+            if not all(SMALLEST_M <= length <= LARGEST_M for length in lengths):
+                raise InputError(
+                    f"{where}: box = {brief(self.mesh)}; lengths are {SMALLEST_M:g} to "
+                    f"{LARGEST_M:g} m each"
+                )
+            object.__setattr__(self, "mesh", lengths)
         if not self._settled and not isinstance(self.mesh, str | Path):
             raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be a name or a file")
         if self._built_in and self.mesh not in mesh_names():
@@ -372,7 +381,7 @@ class Furniture:
     @property
     def _settled(self) -> bool:
         """Whether the mesh itself says its unit, and whether it is a sheet."""
-        return self._built_in
+        return self._built_in or isinstance(self.mesh, tuple)
 
     @property
     def path(self) -> Path:
@@ -431,7 +440,14 @@ class Furniture:
         return Triangles(vertices, read.faces, read.closed)
 
     def _read(self) -> Triangles:
-        return read_mesh(self.path)
+        if not isinstance(self.mesh, tuple):
+            return read_mesh(self.path)
+        import trimesh  # slow to import
+
+        box = trimesh.creation.box(self.mesh)
+        vertices = np.array(box.vertices)
+        vertices[:, 2] += self.mesh[2] / 2
+        return Triangles(vertices, np.array(box.faces, dtype=np.int64), closed=True)
 
 
 def _check(thing: Any, where: str, limits: Limits) -> None:

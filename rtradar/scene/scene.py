@@ -55,11 +55,15 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             "name corner_m edge_u_m edge_v_m material thickness_m",
             "roughness_m openings",
         ),
-        ("[[furniture]]", "name mesh material position_m", "yaw_deg scale metres_per_unit sheet"),
+        (
+            "[[furniture]]",
+            "name material position_m",
+            "mesh box yaw_deg scale metres_per_unit sheet",
+        ),
         (
             "[[objects]]",
-            "name mesh material motion",
-            "position_m pivot_m yaw_deg scale metres_per_unit sheet",
+            "name material motion",
+            "mesh box position_m pivot_m yaw_deg scale metres_per_unit sheet",
         ),
         ("[[people]]", "motion", people.KEYS),
         ("[materials.NAME]", "source low_hz high_hz a", "b c d"),
@@ -417,14 +421,28 @@ def _pieces(
     for where, entry in tables_at(key, table):
         check_keys(where, entry, *KEYS[f"[[{key}]]"])
         own: dict[str, Any] = {}
-        if "mesh" in entry:
-            own["mesh"] = _mesh(where, entry["mesh"], folder)
+        if kind is not Wall:
+            own["mesh"] = _shape(where, entry, folder)
+            entry = {name: value for name, value in entry.items() if name != "box"}
         chosen = _material(where, entry["material"], materials)
         with _prefixed(where):
             if "motion" in entry:
                 own["motion"] = motion_of(entry["motion"])
             found.append(kind(**{**entry, **own, "material": chosen}))
     return tuple(found)
+
+
+def _shape(where: str, entry: Table, folder: Path) -> Any:
+    """Return the mesh of an entry, or the lengths of its box."""
+    if "box" not in entry:
+        if "mesh" not in entry:
+            raise InputError(f"{where}mesh is missing; give a mesh, or box = [x, y, z] in metres")
+        return _mesh(where, entry["mesh"], folder)
+    if "mesh" in entry:
+        raise InputError(f"{where}mesh and box are given; leave one out")
+    if not isinstance(entry["box"], list):
+        raise InputError(f"{where}box = {brief(entry['box'])}; it must be [x, y, z] in metres")
+    return entry["box"]
 
 
 def _mesh(where: str, value: object, folder: Path) -> str | Path:

@@ -12,7 +12,8 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.system.registries import scene_files
 
@@ -339,3 +340,43 @@ def test_any_damage_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObjec
         at = data.draw(st.integers(0, len(whole) - 1))
         whole[at : at + data.draw(st.integers(0, 6))] = data.draw(st.binary(max_size=4))
     _only_input_errors(tmp_path, bytes(whole))
+
+
+def test_a_box_stands_on_its_position(tmp_path: Path) -> None:
+    table = '[[furniture]]\nname = "cabinet"\nmaterial = "metal"\nposition_m = [1, 2, 0.1]\n'
+    file = tmp_path / "a.toml"
+    file.write_text(table + "box = [0.8, 0.4, 1.9]\n")
+    (cabinet,) = Scene.load(file).furniture
+    box = cabinet.triangles()
+    assert box.closed
+    np.testing.assert_allclose(box.vertices.min(axis=0), [0.6, 1.8, 0.1])
+    np.testing.assert_allclose(box.vertices.max(axis=0), [1.4, 2.2, 2.0])
+    for more, says in (
+        ("", r"mesh is missing; give a mesh, or box = \[x, y, z\]"),
+        ("box = [1, 1, 1]\nmesh = 'bed'", "mesh and box are given"),
+        ("box = 3", "box = 3; it must be"),
+        ("box = [1, 1]", "box = .* 3 numbers"),
+        ("box = [1, 1, 0]", "lengths are"),
+        ("box = [1, 1, 1]\nmetres_per_unit = 0.01", "both settled"),
+    ):
+        file.write_text(f"{table}{more}\n")
+        with pytest.raises(InputError, match=says):
+            Scene.load(file)
+
+
+def test_a_radar_is_turned_as_the_scene_says(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text("[radar]\nposition_m = [0, 0, 2.6]\npitch_deg = -90\n")
+    placed = Scene.load(file).place(Radar(roll_deg=3))
+    assert (placed.position_m, placed.pitch_deg, placed.roll_deg) == ((0.0, 0.0, 2.6), -90.0, 3.0)
+
+
+def test_a_radar_at_its_own_position_outside_of_the_room_is_warned_of(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(
+        "[room]\nsize_m = [2, 2, 2.5]\ncorner_m = [-1, -1]\n[room.walls]\n"
+        'material = "concrete"\nthickness_m = 0.1\n[room.floor]\nmaterial = "concrete"\n'
+        'thickness_m = 0.1\n[room.ceiling]\nmaterial = "concrete"\nthickness_m = 0.1\n'
+    )
+    with pytest.warns(ValidityWarning, match="its own position, is outside of the room"):
+        Scene.load(file).place(Radar())
