@@ -255,9 +255,13 @@ class RunSettings:
                 "snr_db = physical needs the loss with distance; "
                 "leave out --no-spreading (spreading=False)"
             )
-        # A copy, which no one else can change.
-        object.__setattr__(self, "model_options", dict(self.model_options or {}))
-        object.__setattr__(self, "detector_options", dict(self.detector_options or {}))
+        for name in ("model_options", "detector_options"):
+            try:
+                # A copy, which no one else can change.
+                object.__setattr__(self, name, dict(getattr(self, name) or {}))
+            except (TypeError, ValueError):
+                value = brief(getattr(self, name))
+                raise InputError(f"{name} = {value}; it must be names with values") from None
 
     def parameters(self) -> dict[str, Any]:
         """Return the settings as ``summary.json`` lists them under ``parameters``.

@@ -141,3 +141,30 @@ def test_the_layout_of_a_board_is_not_taken_for_an_array(
 def test_a_run_of_another_type_says_so_in_json(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="snr_db"):
         RunSettings(snr_db=json.loads("[1]"))
+
+
+WALK = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: rt.load_motion([]),
+        lambda: rt.load_motion("a\0.bvh"),
+        lambda: rt.Radar.preset([]),
+        lambda: rt.Radar.load(3),
+        lambda: rt.Radar.load(None),
+        lambda: rt.Scene.load([]),
+        lambda: rt.synthetic_motion([]),
+        lambda: rt.run(WALK, rt.Radar(), fidelity="analytic", out="\0"),
+        lambda: rt.run(WALK, rt.Radar(), fidelity="analytic", out=3),
+        lambda: rt.compare(WALK, rt.Radar(), out=3),
+        lambda: rt.run(WALK, rt.Radar(), detector_options=3),
+        lambda: rt.run(WALK, rt.Radar(), model_options=3),
+        lambda: rt.motion.place(WALK, start_s="a"),
+        lambda: rt.rcs.ellipsoid(1, 1, 1, None, 0),
+    ],
+)
+def test_another_type_is_refused_in_one_line(call: Any) -> None:
+    with pytest.raises(ValueError, match=r"^[^\n]*$"):
+        call()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.system.checks import brief, is_real
 from rtradar.system.row_files import column
 
 MARGIN_FRAMES = 16
@@ -74,6 +75,13 @@ def place(
 
 
 def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg: float) -> None:
+    for what, value in (
+        ("start_s", start_s),
+        ("duration_s", duration_s),
+        ("heading_deg", heading_deg),
+    ):
+        if not (is_real(value) or (value is None and what == "duration_s")):
+            raise InputError(f"{motion.name}: {what} = {brief(value)}; it must be a number")
     there = f"{motion.name} has {motion.duration_s:.6g} s"
     if not 0 <= start_s <= motion.duration_s:
         raise InputError(f"start {start_s:g} s is not inside the recording: {there}")

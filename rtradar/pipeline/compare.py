@@ -30,6 +30,7 @@ from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings_of
+from rtradar.system.checks import check_path
 from rtradar.system.output_folder import atomic_folder
 
 MEASURES = (
@@ -136,7 +137,7 @@ def compare(
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     settings = settings_of("compare", RunOptions, options)
     kind = files_of_runs("compare.json", _FILES, list(MODELS))
-    with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
+    with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
         scene = Scene() if scene is None else scene
         results: dict[str, Result] = {}
         occluded: dict[str, _Occluded] = {}

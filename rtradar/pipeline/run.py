@@ -27,6 +27,7 @@ from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, settings_of
+from rtradar.system.checks import check_path
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
 
@@ -95,7 +96,13 @@ def run(
     if out is None:
         return _run_in_memory(motion, radar, Scene() if scene is None else scene, settings)
     return run_into(
-        Path(out), motion, radar, Scene() if scene is None else scene, settings, overwrite, pictures
+        check_path("out", out),
+        motion,
+        radar,
+        Scene() if scene is None else scene,
+        settings,
+        overwrite,
+        pictures,
     )
 
 

@@ -259,7 +259,8 @@ class Radar(Schedule):
         """
         if isinstance(source, Mapping):
             return cls._of_table(source, Path(), board)
-        path, table = Path(source), radar_table(source)
+        table = radar_table(source)
+        path = Path(source)
         if table is not None:
             try:
                 return cls._of_table({"name": printable(path.stem), **table}, path.parent, board)

@@ -60,6 +60,8 @@ def ellipsoid(
     a, b, c, theta, phi = (np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
     if not all((axis > 0).all() for axis in (a, b, c)):
         raise ValueError("rcs.ellipsoid: semi-axes must be positive [m]")
+    if np.isnan(theta).any() or np.isnan(phi).any():
+        raise ValueError("rcs.ellipsoid: angles must be numbers [rad]")
     sine = np.sin(theta)
     # Scaled by the largest axis: squares of squares of tiny or huge axes would leave the range of
     # float64.

@@ -107,6 +107,13 @@ def check_text(where: str, key: str, value: object) -> str:
     raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
 
 
+def check_path(what: str, value: object) -> Path:
+    """Return a path that a file may have."""
+    if isinstance(value, str | Path) and "\0" not in str(value):
+        return Path(value)
+    raise InputError(f"{what} = {brief(value)}; it must be the path of a file or a name")
+
+
 def check_order(order: object) -> None:
     """Refuse what is no number of reflections at walls on a path."""
     if not is_whole(order) or order not in range(4):

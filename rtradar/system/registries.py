@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.system.checks import Table, brief, read_toml
+from rtradar.system.checks import Table, brief, check_path, read_toml
 from rtradar.system.files import shipped_folder, special_kind
 from rtradar.system.registry import Registry
 
@@ -95,7 +95,7 @@ def radar_table(source: str | Path) -> Table | None:
     InputError
         Where the file cannot be read or is not TOML, or no radar has the name.
     """
-    path, name = Path(source), str(source)
+    path, name = check_path("radar", source), str(source)
     if path.suffix == ".toml" and name not in RADARS:
         return read_toml(path, "radar", f"give a TOML file or one of: {', '.join(RADARS)}")
     if path.suffix != ".cfg":
@@ -111,7 +111,7 @@ def scene_table(source: str | Path) -> tuple[Path, Table]:
     InputError
         Where the file cannot be read or is not TOML, or no scene has the name.
     """
-    path, known = Path(source), scene_files()
+    path, known = check_path("scene", source), scene_files()
     if path.suffix != ".toml":
         if str(source) not in known:
             raise InputError(
@@ -124,7 +124,7 @@ def scene_table(source: str | Path) -> tuple[Path, Table]:
 
 def check_activity(asked: str) -> None:
     """Raise InputError where no synthetic actor does what is asked for, traits as text left out."""
-    activity = asked.partition(",")[0]
+    activity = asked.partition(",")[0] if isinstance(asked, str) else brief(asked)
     if activity not in ACTIVITY_NAMES:
         raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITY_NAMES)}")
 
@@ -137,7 +137,7 @@ def reader_of(path: str | Path, skeleton: str | Path | None = None) -> str:
     InputError
         Where no reader takes such a file, or it is no file, or none without a ``skeleton``.
     """
-    file = Path(path)
+    file = check_path("recording", path)
     name = file.suffix.lower().removeprefix(".")
     if name == "asf" and name not in READERS:
         raise InputError(

@@ -91,7 +91,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
 
     def check(self, name: str, *, instead: str = "") -> None:
         """Raise InputError, as `find` does, if there is none of that name; load nothing."""
-        if name not in self:
+        if not isinstance(name, str) or name not in self:
             raise InputError(
                 f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}"
             )

@@ -59,7 +59,8 @@ def load_motion(
     ExtensionError
         Where the reader comes from another package, and fails.
     """
-    file, name = Path(path), reader_of(path, skeleton)
+    name = reader_of(path, skeleton)
+    file = Path(path)
     read, where = READERS[name], str(file)
     given = {
         "skeleton": None if skeleton is None else Path(skeleton),
