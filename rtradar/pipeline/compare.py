@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -111,7 +112,8 @@ def compare(
         The same as for `run`.
     out : path
         Folder for a run of each model, in a folder of its name, and for ``compare.json``,
-        ``compare.html`` and pictures.
+        ``compare.html`` and pictures. The reference runs once more with the next seed: what
+        differs between both is noise and the draw of points, and no difference of models.
     fidelities : sequence of str
         Two models or more, each once; `rtradar.scatter.MODELS` has their names.
     overwrite : bool
@@ -148,6 +150,10 @@ def compare(
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, occluded, radar, names[-1])
+        with TemporaryDirectory() as again:
+            own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
+            other = run_into(Path(again, "again"), motion, radar, scene, own, pictures=False)
+            summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]], radar)
         pictures, unit = _draw(results, occluded, folder, radar, names[-1])
         views = {name: load_run_view(folder / name) for name in names}
         comparison.write_comparison(
@@ -165,9 +171,13 @@ def comparison_rows(
     """Return a comparison as text: a heading row, then a row a measure with a column a model."""
     found = summary["fidelities"] if "fidelities" in summary else summary["folders"]
     headings = [f"{name} (reference)" if name == summary["reference"] else name for name in found]
+    columns = list(found.values())
+    if "other_seed" in summary:
+        headings.append(f"{summary['reference']}, other seed")
+        columns.append(summary["other_seed"])
     rows = [["", *headings]]
     for key, heading, digits in measures:
-        values = [figures[key] for figures in found.values()]
+        values = [figures[key] for figures in columns]
         texts = ("-" if value is None else f"{value:.{digits}f}" for value in values)
         rows.append([heading, *texts])
     return rows

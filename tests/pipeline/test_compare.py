@@ -46,6 +46,16 @@ def test_the_reference_differs_in_nothing_from_itself(compared: rt.Comparison) -
     assert [found[key] for key in alike] == pytest.approx([1] * 3, abs=1e-12)
 
 
+def test_another_seed_is_what_differences_are_held_against(compared: rt.Comparison) -> None:
+    again = compared.summary["other_seed"]
+    # No model differs, so no power does; noise and points do.
+    assert again["power_rms_db"] == 0
+    assert 0 < again["rdt_chamfer_bins"] < 3
+    assert 0.9 < again["range_doppler_correlation"] < 1
+    assert "specular, other seed" in compared.table().splitlines()[0]
+    assert not list(compared.out.glob("*again*"))
+
+
 def test_only_what_traces_hides(compared: rt.Comparison) -> None:
     found = compared.summary["fidelities"]
     assert found["analytic"]["occluded_share"] == found["analytic-paper"]["occluded_share"] == 0
@@ -106,7 +116,8 @@ def test_files_and_table(compared: rt.Comparison) -> None:
     assert not re.search(r"(src|href)=[\"']?https?:", page)
     lines = compared.table().splitlines()
     assert len({len(line) for line in lines}) == 1
-    assert lines[0].split() == ["analytic-paper", "analytic", "specular", "(reference)"]
+    headings = "analytic-paper analytic specular (reference) specular, other seed"
+    assert " ".join(lines[0].split()) == headings
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,7 @@ def _people(capture: Capture) -> list[dict[str, Any]]:
             {
                 "name": name,
                 "motion": person.motion.name,
+                "findings": [one.text for one in person.motion.findings],
                 "position_m": person.position_m,
                 "heading_deg": person.heading_deg + settings.heading_deg,
                 "start_s": person.start_s + settings.start_s,
