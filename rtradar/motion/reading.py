@@ -151,6 +151,7 @@ class _Stance:
     sway: float
     floor: float
     free: bool
+    travels: bool
 
     @property
     def steady(self) -> bool:
@@ -181,6 +182,7 @@ def _stances(nodes: Array) -> dict[str, _Stance]:
             float(most - least) / size,
             abs(float(middle)) / size,
             bool((free > _FREE * size).all() or free.max() > _TRAVELS * size),
+            bool(free.max() > _TRAVELS * size),
         )
     return found
 
@@ -250,6 +252,13 @@ def _up_of_format(
         )
     (best,) = good
     if best is own:
+        if own.upright < _SOMETIMES and own.travels and not own.on_zero:
+            warnings.warn(
+                f"{where}: with {own.up} up, as the format has it, the person never stands, and "
+                "moves along above the floor; who walks needs another axis (--up)",
+                ValidityWarning,
+                stacklevel=4,
+            )
         return own.up, f"up: {own.up}, as the format has it; the person lies on a floor"
     text = f"up: {best.up}, not {own.up} as the format has it, for along it the person stands"
     warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=4)

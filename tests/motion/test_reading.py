@@ -609,6 +609,14 @@ def test_rotations_of_body_models_are_the_joints_of_a_mean_person(
     assert "body: rotations on the skeleton of a mean person" in turned.findings[0].text
 
 
+def test_rotations_by_which_a_walker_lies_are_warned_of(tmp_path: Path) -> None:
+    rotations, trans, _ = model_walk(0.0)
+    rotations[:, :3] = 0  # the axes of the model in place of those of the file
+    np.savez(tmp_path / "a.npz", trans=trans, poses=rotations, mocap_framerate=120.0)
+    with pytest.warns(ValidityWarning, match="never stands, and moves along above the floor"):
+        load_motion(tmp_path / "a.npz")
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
