@@ -22,6 +22,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ import rtradar as rt
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.link_budget import link_budget
+from rtradar.scatter.link_budget import link_budget, power_of_parts_alone
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
@@ -41,6 +42,8 @@ from helpers import power_db
 Array = NDArray[np.float64]
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
 TOLERANCE_DB = 0.1
+VISIBLE = 1e-6
+"""Fraction of its power alone that a part may lack and still be fully visible: rounding."""
 STEP = 1e-4
 FAR = 1e6  # distance of the source of a plane wave, over that of the radar
 
@@ -165,8 +168,8 @@ def compared_rows(preset: str) -> Iterator[Row]:
     near, far = near_and_far(radar, body, n_chirps)
     factor = dict(zip(body.part_names, near.mean(axis=0) / far.mean(axis=0), strict=True))
     claim = f"compare, standing, {preset}"
-    hidden = by_fidelity["specular"]["part_hidden_share"]
-    seen = [part for part, fraction in hidden.items() if fraction == 0]
+    hidden = by_fidelity["specular"]["part_occluded_share"]
+    seen = [part for part, fraction in hidden.items() if abs(fraction) < VISIBLE]
     for part in seen:
         ratio = (
             by_fidelity["specular"]["part_power_m2"][part]
@@ -213,8 +216,9 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
         }
     near, far = near_and_far(radar, body, n_chirps)
     analytic, specular = (found[fidelity].power_at for fidelity in ("analytic", "specular"))
-    hidden = found["specular"].hidden_at
-    seen = hidden == 0
+    alone = power_of_parts_alone(partial(build_model, "specular", radar), radar, body, n_chirps)
+    hidden = 1 - specular / alone
+    seen = np.abs(hidden) < VISIBLE
     claim = f"{activity}, {preset}, {duration_s:g} s"
     error = power_db(specular[seen] / analytic[seen]) - power_db(near[seen] / far[seen])
     count = f"{seen.sum()} of {seen.size} parts and instants"
