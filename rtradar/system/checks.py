@@ -107,9 +107,9 @@ def check_text(where: str, key: str, value: object) -> str:
     raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
 
 
-def check_path(what: str, value: object) -> Path:
-    """Return a path that a file may have."""
-    if isinstance(value, str | Path) and "\0" not in str(value):
+def check_path(what: str, value: object, *, or_name: bool = False) -> Path:
+    """Return a path that a file may have; of a name whatever there may be in it."""
+    if isinstance(value, str | Path) and (or_name or "\0" not in str(value)):
         return Path(value)
     raise InputError(f"{what} = {brief(value)}; it must be the path of a file or a name")
 

@@ -95,7 +95,7 @@ def radar_table(source: str | Path) -> Table | None:
     InputError
         Where the file cannot be read or is not TOML, or no radar has the name.
     """
-    path, name = check_path("radar", source), str(source)
+    path, name = check_path("radar", source, or_name=True), str(source)
     if path.suffix == ".toml" and name not in RADARS:
         return read_toml(path, "radar", f"give a TOML file or one of: {', '.join(RADARS)}")
     if path.suffix != ".cfg":
@@ -111,7 +111,7 @@ def scene_table(source: str | Path) -> tuple[Path, Table]:
     InputError
         Where the file cannot be read or is not TOML, or no scene has the name.
     """
-    path, known = check_path("scene", source), scene_files()
+    path, known = check_path("scene", source, or_name=True), scene_files()
     if path.suffix != ".toml":
         if str(source) not in known:
             raise InputError(
