@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -136,11 +135,6 @@ def test_the_layout_of_a_board_is_not_taken_for_an_array(
     assert f"{option.partition('=')[0]} is of the .bin of a DCA1000" in said
     assert len(said.splitlines()) == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_a_run_of_another_type_says_so_in_json(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="snr_db"):
-        RunSettings(snr_db=json.loads("[1]"))
 
 
 WALK = rt.synthetic_motion("walk", seed=0, duration_s=0.3)

@@ -84,13 +84,13 @@ _WITHOUT_EFFECT = re.compile(
 _PROCESSING = {
     "clutterRemoval": "--clutter-removal mean",
     "cfarCfg": "--detector and --pfa",
-    "extendedMaxVelocity": "nothing does it",
-    "aoaFovCfg": "nothing does it",
-    "cfarFovCfg": "nothing does it",
-    "multiObjBeamForming": "nothing does it",
+    "extendedMaxVelocity": "not simulated",
+    "aoaFovCfg": "not simulated",
+    "cfarFovCfg": "not simulated",
+    "multiObjBeamForming": "not simulated",
     "nearFieldCfg": "beams are focused where the near field asks for it",
     "peakGrouping": "--detector ti-oob",
-    "rangeSelCfg": "nothing does it",
+    "rangeSelCfg": "not simulated",
 }
 """Commands of the processing on the chip, and what does it here; a last 0 switches one off."""
 

@@ -28,7 +28,7 @@ Array: TypeAlias = NDArray[np.float64]
 _LEAST_AXIS = 1e-9
 
 _MOST_FACES = 200_000
-"""Triangles of a mesh that moves: each has a place at several instants, 2 GB for so many."""
+"""Triangles of a mesh that moves, fewer than of one that stands: each has many places at once."""
 MOST_WAY_POINTS = 10_000
 MOTION_LIMITS: Limits = {
     "rate_hz": (-1000.0, 1000.0),

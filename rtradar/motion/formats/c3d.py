@@ -67,7 +67,8 @@ class Points(NamedTuple):
     """Content of a file: labels, points (frame, point, 4), and what the file says of them.
 
     A point is three coordinates and a residual, negative where it was not seen. ``unit`` and
-    ``upward`` are in the words of the file; ``usual`` is the axis that is up where it has none.
+    ``upward`` are in the words of the file, ``keys`` what it calls its unit and its rate; ``usual``
+    is the axis that is up where it says none.
     """
 
     labels: list[str]
@@ -77,6 +78,7 @@ class Points(NamedTuple):
     unit: str
     upward: str
     usual: str = "z"
+    keys: tuple[str, str] = ("POINT:UNITS", "POINT:RATE")
 
 
 def load_c3d(
@@ -127,7 +129,7 @@ def _motion_of(
 
 def _motion_of_joints(path: Path, read: Points, unit_m: float | None, up: str | None) -> Motion:
     """Read points that are joints, as archives and tables hold them."""
-    _check(path, read, 1.0 if unit_m is None else unit_m, "z")
+    _check_frames(path, read)
     points = read.points[..., :3].astype(np.float64)
     points[read.points[..., 3] < 0] = np.nan
     given = {
@@ -206,30 +208,18 @@ def _read_trc(path: Path) -> Points:
     places = np.array(rows).reshape(len(rows), len(labels), 3)
     unseen = np.isnan(places).any(axis=2)
     points = np.concatenate([np.nan_to_num(places), np.where(unseen, -1.0, 0.0)[..., None]], axis=2)
-    return Points(labels, points, rate, 1, said["Units"], "", usual="y")
+    return Points(labels, points, rate, 1, said["Units"], "", "y", ("Units", "DataRate"))
 
 
-def _check(path: Path, read: Points, scale: float, upward: str, unit: str = "") -> None:
-    """Refuse points without frames, a rate, a unit or an axis."""
-    for wrong, what in (
-        (not len(read.points), "no frame of markers in this file; export it again"),
-        (
-            not 1.0 <= read.rate_hz <= 100_000.0,
-            f"POINT:RATE is {read.rate_hz:g} frames a second; it must be 1 to 100000, mend the "
-            "file",
-        ),
-        (
-            upward not in UPWARD,
-            f"POINT:Y_SCREEN is {read.upward[:20]!r}, and no axis; give up, one of "
-            f"{', '.join(UPWARD)} (--up)",
-        ),
-        (
-            not 0 < scale < np.inf,
-            f"{unit}; {', '.join(_UNITS_M)} are understood, give the unit (unit, --unit)",
-        ),
-    ):
-        if wrong:
-            raise InputError(f"{path}: {what}")
+def _check_frames(path: Path, read: Points) -> None:
+    """Refuse points without frames or a rate."""
+    if not len(read.points):
+        raise InputError(f"{path}: no frame of markers in this file; export it again")
+    if not 1.0 <= read.rate_hz <= 100_000.0:
+        raise InputError(
+            f"{path}: {read.keys[1]} is {read.rate_hz:g} frames a second; it must be 1 to 100000, "
+            "mend the file"
+        )
 
 
 def _chosen(
@@ -238,8 +228,17 @@ def _chosen(
     """Choose some markers, in the world."""
     scale = unit_m if unit_m is not None else _UNITS_M.get(read.unit.lower(), 0.0)
     upward = _upward(read, up)
-    unit = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {read.unit[:20]!r}"
-    _check(path, read, scale, upward, unit)
+    _check_frames(path, read)
+    if upward not in UPWARD:
+        raise InputError(
+            f"{path}: POINT:Y_SCREEN is {read.upward[:20]!r}, and no axis; give up, one of "
+            f"{', '.join(UPWARD)} (--up)"
+        )
+    if not 0 < scale < np.inf:
+        unit = f"{read.keys[0]} is {read.unit[:20]!r}" if unit_m is None else f"unit_m is {unit_m}"
+        raise InputError(
+            f"{path}: {unit}; {', '.join(_UNITS_M)} are understood, give the unit (unit, --unit)"
+        )
     chosen = read.points[:, [_column(path, read.labels, name) for name in names]]
     # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
     unseen = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)

@@ -26,9 +26,9 @@ from rtradar.scatter.common.poses import ChirpPoses
 Array = NDArray[np.float64]
 
 _FADES_DEG = (90.0, 120.0)
-"""Angles between Tx and Rx from which and to which the term fades. With it spheres of ka 15 to 40
-are nearer to the series of Mie up to the first, or as near, for both fields
-(`validation/closed_forms/sphere.py`)."""
+"""Angles between Tx and Rx from which and to which the term fades. From 60 degrees to the first,
+spheres of ka 10 to 40 are nearer to the series of Mie with it, in rms over the angles, for both
+fields (`validation/closed_forms/sphere.py`)."""
 
 
 def check_terms(terms: int) -> None:
