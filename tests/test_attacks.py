@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +23,9 @@ from rtradar.exchange import open_samples
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
 from rtradar.recognition.predict import _of_scene
-from rtradar.report.pages.evaluation import _csv
+from rtradar.scene.mesh_files import read_mesh
 from rtradar.settings import RunSettings
+from rtradar.system.csv_text import csv_text
 
 
 @pytest.mark.parametrize(
@@ -79,7 +83,7 @@ def test_a_name_of_a_stranger_has_no_escape_sequence() -> None:
 
 def test_a_spreadsheet_runs_no_name() -> None:
     rows = [["=1+1", "@x", "+cmd", "-2+3", "plain", "-1.5", 4]]
-    assert _csv(["name"], rows).splitlines()[1] == "'=1+1,'@x,'+cmd,'-2+3,plain,-1.5,4"
+    assert csv_text(["name"], rows).splitlines()[1] == "'=1+1,'@x,'+cmd,'-2+3,plain,-1.5,4"
 
 
 def test_parts_of_samples_that_differ_in_shape_are_refused(tmp_path: Path) -> None:
@@ -162,3 +166,44 @@ WALK = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
 def test_another_type_is_refused_in_one_line(call: Any) -> None:
     with pytest.raises(ValueError, match=r"^[^\n]*$"):
         call()
+
+
+# -- messages that say what was wrong --------------------------------------------------------------
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_a_pipe_is_told_as_one(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "adc.bin")
+    with pytest.raises(InputError, match="pipe"):
+        open_samples(tmp_path / "adc.bin", rt.Radar.preset("iwr1443"))
+
+
+@pytest.mark.parametrize(
+    ("power", "says"), [(np.inf, "finite samples"), (np.nan, "finite samples"), (-1.0, "decibels")]
+)
+def test_what_is_wrong_with_a_power_is_said(power: float, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        rt.process.os_cfar(np.full((64, 64), power))
+
+
+def test_a_mesh_whose_triangles_are_in_another_file_is_told(tmp_path: Path) -> None:
+    header = json.dumps(
+        {"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri": "other.bin"}]}
+    ).encode()
+    header += b" " * (-len(header) % 4)
+    size = 20 + len(header)
+    head = struct.pack("<4sIIII", b"glTF", 2, size, len(header), 0x4E4F534A)
+    (tmp_path / "a.glb").write_bytes(head + header)
+    with pytest.raises(InputError, match=r"another file, 'other\.bin'"):
+        read_mesh(tmp_path / "a.glb")
+
+
+def test_a_profile_named_after_its_board_names_it_once(tmp_path: Path) -> None:
+    text = (
+        "% Platform:xWR68xx\nsensorStop\nflushCfg\nchannelCfg 15 5 0\nadcCfg 2 1\n"
+        "adcbufCfg -1 0 1 1 1\nprofileCfg 0 60 50 7 60 0 0 90 1 256 7000 0 0 158\n"
+        "chirpCfg 0 0 0 0 0 0 0 1\nchirpCfg 1 1 0 0 0 0 0 4\nframeCfg 0 1 32 0 50 1 0\n"
+    )
+    for stem, name in (("iwr6843", "iwr6843"), ("hall", "iwr6843 hall")):
+        (tmp_path / f"{stem}.cfg").write_text(text)
+        assert rt.Radar.load(tmp_path / f"{stem}.cfg").name == name

@@ -101,7 +101,7 @@ def limit_names() -> set[str]:
         for folder in ("scatter", "pipeline")
         for path in (ROOT / "rtradar" / folder).rglob("*.py")
     ]
-    given = r'Limit\(\s*"(\w+)"|\("(inside_\w+)"|"name": "(\w+)", "share"'
+    given = r'Limit\(\s*"(\w+)"|\("(inside_\w+)"|"name": "(\w+)",\s*"share"'
     found = set(re.findall(given, "".join(sources)))
     budget = (ROOT / "rtradar/scatter/link_budget.py").read_text(encoding="utf-8")
     concerned = re.search(r"concerned = dict\.fromkeys\((\(.*?\)), 0\.0\)", budget, re.S)

@@ -91,12 +91,13 @@ def add(commands: Subcommands) -> None:
     add_command(
         commands,
         "compare",
-        "simulate one recording by several models with the same noise, or take folders of run and "
-        "process, and show what differs",
+        "simulate recordings, each by several models with the same noise, or take folders of run "
+        "and process, and show what differs",
         _add_compare,
         (
             "rtradar compare synthetic:kick --out out/kick",
             "rtradar compare walk.bvh --fidelities analytic,specular,fresnel --out out/levels",
+            "rtradar compare walk.bvh kick.bvh jump.bvh --out out/mean  # mean and interval",
             "rtradar compare out/measured out/simulated --out out/both",
         ),
     )
@@ -319,20 +320,27 @@ def _compare(options: argparse.Namespace) -> int:
 
     fidelities = [name.strip() for name in options.fidelities.split(",")]
     check_fidelities(fidelities)
-    capture = _capture(options)
-    from rtradar.pipeline import compare
+    several = len(options.motion) > 1 and not options.at
+    capture = _capture(options, alone=several)
+    from rtradar.pipeline import compare, compare_recordings
     from rtradar.pipeline.timing import lines_shown
 
     with lines_shown():
-        found = compare(**capture, fidelities=fidelities)
+        if several:
+            found = compare_recordings(capture.pop("motion"), **capture, fidelities=fidelities)
+        else:
+            found = compare(**capture, fidelities=fidelities)
     if options.json is not None:
         write_json(options.json, found.summary)
-    if options.verbose:
+    if options.verbose and not several:
         for name, figures in found.summary["fidelities"].items():
             details = figures["stages"], found.summary["versions"], figures["variant"]
             say(options, f"{name}:\n{_details(*details)}")
     say(options, found.table())
-    _show(options, "compare.html")
+    if several:
+        say(options, f"the table is {options.out / 'compare.csv'}, each recording in its folder")
+    else:
+        _show(options, "compare.html")
     return 0
 
 
@@ -350,8 +358,8 @@ def _compare_folders(options: argparse.Namespace) -> int:
     return 0
 
 
-def _capture(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments that `run` and `compare` share."""
+def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, Any]:
+    """Return the arguments that `run` and `compare` share; of several recordings each is alone."""
     check_place(options.json)
     from rtradar.settings import RunSettings
     from rtradar.system.registries import radar_table, scene_table
@@ -363,7 +371,7 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     RunSettings(**settings)
     radar_table(options.radar)
     scene_table(options.scene)
-    skeletons = _checked_people(options)
+    skeletons = _checked_people(options, alone)
     from rtradar.radar import Radar
     from rtradar.scene import Scene
 
@@ -382,10 +390,10 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _checked_people(options: argparse.Namespace) -> dict[str, Path]:
+def _checked_people(options: argparse.Namespace, alone: bool) -> dict[str, Path]:
     """Return the skeletons of recordings by name; InputError where there cannot be such people."""
     names, places = options.motion, options.at
-    if len(places) != len(names) and (places or len(names) > 1):
+    if len(places) != len(names) and (places or len(names) > 1) and not alone:
         raise InputError(
             f"{len(names)} MOTION and {len(places)} --at; several people need places: give "
             "--at X,Y once for each MOTION, in the same order"

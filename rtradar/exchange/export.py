@@ -27,6 +27,7 @@ from rtradar.exchange.recording import (
 )
 from rtradar.radar import Radar
 from rtradar.signal.multiplexing import chirps_together
+from rtradar.system.files import open_regular
 from rtradar.system.output_folder import check_whole
 
 IF_FORMATS: Mapping[
@@ -158,6 +159,8 @@ def open_samples(
             f"'{path}': IF samples are read from {', '.join(IF_FORMATS)}; give such a file"
         )
     try:
+        if not os.path.isdir(place):
+            open_regular(place).close()  # not at a pipe, which would seem empty
         if suffix == ".bin":
             return int16_files.open_int16(place, radar, dca1000)
         found = IF_FORMATS[suffix][1](place)

@@ -1,6 +1,6 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.compare import Comparison, compare
+from rtradar.pipeline.compare import Comparison, compare, compare_recordings
 from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
@@ -13,6 +13,7 @@ __all__ = [
     "Result",
     "Simulation",
     "compare",
+    "compare_recordings",
     "process_samples",
     "run",
     "simulate",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,11 +13,12 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
 from rtradar.errors import InputError
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
-from rtradar.pipeline.output.writer import files_of_runs
+from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import Moving, power_alone
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
@@ -32,12 +34,14 @@ from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings_of
 from rtradar.system.checks import check_path
-from rtradar.system.output_folder import atomic_folder
+from rtradar.system.csv_text import csv_text
+from rtradar.system.output_folder import OutputFiles, atomic_folder
 
 MEASURES = (
     # key, heading, digits
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
+    ("field_error", "Field of the echoes, rms difference over rms", 3),
     ("occluded_share", "Echo power that other parts occlude, fraction", 3),
     ("range_doppler_correlation", "Range-Doppler correlation [dB maps]", 3),
     ("range_doppler_mean_db", "Range-Doppler, mean difference [dB]", 2),
@@ -61,7 +65,9 @@ _PICTURES = {
     "Spectrogram": "compare_spectrogram.png",
     "Range-Doppler-time clouds": "compare_cloud.png",
 }
-_FILES = ("compare.html", "compare.json", *_PICTURES.values())
+_FILES = ("compare.html", "compare.json", "compare.csv", *files_of_pictures(_PICTURES.values()))
+_SEVERAL = OutputFiles("compare.json", r"compare\.(json|csv)")
+_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -159,28 +165,137 @@ def compare(
         comparison.write_comparison(
             folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
         )
-        summary["files"] = kind.list_of(folder)
-        text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
-        (folder / "compare.json").write_text(text, encoding="utf-8")
+        write_figures(folder, summary, kind)
     return Comparison(summary, Path(out))
+
+
+def compare_recordings(
+    motions: Sequence[Moving],
+    radar: Radar,
+    scene: Scene | None = None,
+    *,
+    out: str | Path,
+    fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
+    overwrite: bool = False,
+    **options: Unpack[RunOptions],
+) -> Comparison:
+    """Compare models on several recordings, each by itself, and tell the mean and its interval.
+
+    Parameters
+    ----------
+    motions : sequence
+        Recordings, two or more, each as for `compare`.
+    out : path
+        Folder for a comparison of each recording, in a folder of its number and name, and for
+        ``compare.json`` and ``compare.csv`` with the mean over recordings of each figure and the
+        interval that holds it with a confidence of 95 %, by Student's t of as many recordings.
+    radar, scene, fidelities, overwrite, **options
+        As for `compare`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        As of `compare`, and where there is one recording.
+    BackendError
+        As of `compare`.
+    """
+    if len(motions) < 2:
+        raise InputError(f"{len(motions)} recordings; give two or more, or use compare")
+    place = check_path("out", out)
+    names = [f"{number:02d}-{_file_name(own)}" for number, own in enumerate(motions, start=1)]
+    found = []
+    for name, motion in zip(names, motions, strict=True):
+        each = {"out": place / name, "fidelities": fidelities, "overwrite": overwrite}
+        found.append(compare(motion, radar, scene, **each, **options).summary)
+    first = found[0]
+    summary: dict[str, Any] = {name: first[name] for name in ("reference", "versions")}
+    summary |= {"recordings": names, "confidence": _CONFIDENCE}
+    summary["fidelities"] = {
+        model: _means([one["fidelities"][model] for one in found]) for model in first["fidelities"]
+    }
+    summary["other_seed"] = _means([one["other_seed"] for one in found])
+    with atomic_folder(place, _SEVERAL, overwrite=overwrite) as folder:
+        write_figures(folder, summary, _SEVERAL)
+    return Comparison(summary, place)
+
+
+def _file_name(motion: Moving) -> str:
+    """Return the name of a recording as one of a file."""
+    everyone = motion if isinstance(motion, Sequence) else [motion]
+    names = [getattr(one, "motion", one).name for one in everyone]
+    return re.sub(r"[^\w.-]+", "-", "-".join(names))[:40]
+
+
+def _means(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the mean of each figure over recordings, and its interval; None where one has none."""
+    means: dict[str, Any] = {}
+    for key, *_ in MEASURES:
+        values = [one[key] for one in found]
+        means[key] = None
+        if None not in values:
+            mean, count = float(np.mean(values)), len(values)
+            half = float(stdtrit(count - 1, (1 + _CONFIDENCE) / 2) * np.std(values, ddof=1))
+            half /= math.sqrt(count)
+            means[key] = {"mean": mean, "low": mean - half, "high": mean + half}
+    return means
+
+
+def write_figures(
+    folder: Path,
+    summary: dict[str, Any],
+    kind: OutputFiles,
+    measures: Sequence[tuple[str, str, int]] = MEASURES,
+) -> None:
+    """Write what a comparison found as ``compare.json``, and its table as ``compare.csv``.
+
+    The table has a row for each measure and column; over several recordings that is the mean, with
+    both ends of its interval. The files of the folder are added to the summary.
+    """
+    several = "recordings" in summary
+    rows = [
+        (key, name, *((value or {}).values() if several else (value,)))
+        for name, figures in _columns(summary)
+        for key, value in ((key, figures[key]) for key, *_ in measures)
+    ]
+    head = ("measure", "of", *(("mean", "low", "high") if several else ("value",)))
+    (folder / "compare.csv").write_text(csv_text(head, rows), encoding="utf-8")
+    summary["files"] = kind.list_of(folder)
+    text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
+    (folder / "compare.json").write_text(text, encoding="utf-8")
+
+
+def _columns(summary: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any]]]:
+    """Yield the heading and the figures of each column of a comparison."""
+    yield from (summary["fidelities"] if "fidelities" in summary else summary["folders"]).items()
+    if "other_seed" in summary:
+        yield f"{summary['reference']}, other seed", summary["other_seed"]
 
 
 def comparison_rows(
     summary: Mapping[str, Any], measures: Sequence[tuple[str, str, int]] = MEASURES
 ) -> list[list[str]]:
     """Return a comparison as text: a heading row, then a row a measure with a column a model."""
-    found = summary["fidelities"] if "fidelities" in summary else summary["folders"]
-    headings = [f"{name} (reference)" if name == summary["reference"] else name for name in found]
-    columns = list(found.values())
-    if "other_seed" in summary:
-        headings.append(f"{summary['reference']}, other seed")
-        columns.append(summary["other_seed"])
-    rows = [["", *headings]]
+    headings, columns = zip(*_columns(summary), strict=True)
+    reference = summary["reference"]
+    told = (f"{name} (reference)" if name == reference else name for name in headings)
+    rows = [["", *told]]
     for key, heading, digits in measures:
-        values = [figures[key] for figures in columns]
-        texts = ("-" if value is None else f"{value:.{digits}f}" for value in values)
-        rows.append([heading, *texts])
+        rows.append([heading, *(_shown(figures[key], digits) for figures in columns)])
     return rows
+
+
+def _shown(value: float | Mapping[str, float] | None, digits: int) -> str:
+    """Return a figure as text, or a mean with half its interval."""
+    if value is None:
+        return "-"
+    if isinstance(value, Mapping):
+        half = value["high"] - value["mean"]
+        return f"{value['mean']:.{digits}f} ± {half:.{digits}f}"
+    return f"{value:.{digits}f}"
 
 
 class _Occluded(NamedTuple):
@@ -235,6 +350,7 @@ def _figures(
     return {
         "power_mean_db": _finite(float(power.mean())),
         "power_rms_db": _finite(float(np.sqrt((power**2).mean()))),
+        "field_error": _field_error(_budget(result).field_at, _budget(reference).field_at),
         "occluded_share": occluded.share,
         **map_figures(_maps_of(result), _maps_of(reference)),
         "detections": summary["detections"],
@@ -248,6 +364,11 @@ def _figures(
         **{name: summary[name] for name in ("limits", "part_power_m2")},
         "part_occluded_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
     }
+
+
+def _field_error(field: NDArray[np.complex128], reference: NDArray[np.complex128]) -> float | None:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return _finite(float(np.linalg.norm(field - reference) / np.linalg.norm(reference)))
 
 
 # -- pictures --------------------------------------------------------------------------------------

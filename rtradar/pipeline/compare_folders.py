@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -20,8 +19,9 @@ from rtradar.pipeline.compare import (
     chamfer_bins,
     comparison_rows,
     map_figures,
+    write_figures,
 )
-from rtradar.pipeline.output.writer import files_of_runs
+from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.view import run_maps, run_points, run_summary
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
@@ -36,7 +36,8 @@ _PICTURES = {
     "Spectrogram": "compare_spectrogram.png",
     "Range-Doppler-time clouds": "compare_cloud.png",
 }
-_FILES = files_of_runs("compare.json", ("compare.html", "compare.json", *_PICTURES.values()), ())
+_OWN = ("compare.html", "compare.json", "compare.csv", *files_of_pictures(_PICTURES.values()))
+_FILES = files_of_runs("compare.json", _OWN, ())
 _COMPARED = (
     "range_doppler_correlation", "range_doppler_mean_db", "range_doppler_rms_db", "detections",
     "detection_overlap", "spectrogram_correlation", "spectrogram_rms_db", "rdt_chamfer_bins",
@@ -119,9 +120,7 @@ def compare_folders(
         pictures = _draw(read, place)
         rows = comparison_rows(summary, _ROWS)
         comparison.write_folders(place / "compare.html", summary, rows, pictures)
-        summary["files"] = _FILES.list_of(place)
-        text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
-        (place / "compare.json").write_text(text, encoding="utf-8")
+        write_figures(place, summary, _FILES, _ROWS)
     return Comparison(summary, Path(out), _ROWS)
 
 

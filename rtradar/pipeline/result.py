@@ -21,6 +21,7 @@ from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
 from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.inline import InlinePage
+from rtradar.report.pages.labels import signal_to_noise
 from rtradar.scatter.link_budget import LinkBudget
 
 if TYPE_CHECKING:
@@ -147,13 +148,13 @@ class Result:
             nearest, farthest = summary.get("detected_range_m") or (low[1], high[1])
             rows["range"] = f"{nearest:.1f} to {farthest:.1f} m"
             rows["velocity"] = f"{low[2]:+.1f} to {high[2]:+.1f} m/s, positive: receding"
-        if "noise_power_m2" in summary:
-            echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
-            snr = f"{10 * np.log10(echo / noise):.1f} dB" if echo and noise else "no noise"
-            rows["SNR"] = snr if echo else "nobody is visible"
+        if ratio := signal_to_noise(summary):
+            rows["SNR"] = ratio
         frames = f"in {summary['windows']} frames of {summary['capture_s']:.2f} s of radar"
         rows["detections"] = f"{summary['detections']} {frames}"
-        rows["points"] = f"{len(self.points)} (time, range, velocity)"
+        rows["points"] = (
+            f"{len(self.points)} (time, range, velocity), drawn on the surface about the detections"
+        )
         rows["spatial"] = f"{len(self.spatial.points)} points (x, y, z)"
         return rows
 

@@ -321,10 +321,12 @@ def checked_power(where: str, power: ArrayLike) -> NDArray[np.floating]:
         )
     kind = np.float32 if cells.dtype == np.float32 else np.float64
     cells = np.ascontiguousarray(cells, dtype=kind)
-    if not (cells >= 0).all() or not np.isfinite(cells).all():
+    if (cells < 0).any():
+        raise InputError(f"{where}: power is negative; give linear power, not decibels")
+    if not np.isfinite(cells).all():
         raise InputError(
-            f"{where}: power holds NaN, infinity or a negative value; give linear power, not "
-            "decibels"
+            f"{where}: power holds NaN or infinity; give finite samples, whose squares do not "
+            f"exceed {np.finfo(np.float32).max:.1g}"
         )
     return cells
 

@@ -182,7 +182,7 @@ def _read(
     tdm = sequence.multiplexing == "tdm"
     radar = dataclasses.replace(
         base,
-        name=f"{base.name} {printable(path.stem)}",
+        name=_named(base.name, path),
         tx_positions_m=tuple(positions[0][one] for one in tx),
         rx_positions_m=tuple(positions[1][k] for k in range(most_rx) if rx_mask >> k & 1),
         tx_order=tuple(tx.index(one) for one in order) if tdm else None,
@@ -245,7 +245,7 @@ def _read_low_power(
         )
     radar = dataclasses.replace(
         base,
-        name=f"{'iwrl6844' if large else base.name} {printable(path.stem)}",
+        name=_named("iwrl6844" if large else base.name, path),
         tx_positions_m=tuple(tx),
         rx_positions_m=tuple(rx_places[k] for k in range(len(rx_places)) if rx_mask >> k & 1),
         tx_order=None,
@@ -511,3 +511,9 @@ def _waveform(profile: _Line, real: bool) -> dict[str, Any]:
         "samples_per_chirp": samples // 2 if real else samples,
         "adc_rate_hz": 1e3 * rate_ksps / (2 if real else 1),
     }
+
+
+def _named(board: str, path: Path) -> str:
+    """Name a radar by its board and its file, once where the file is named after the board."""
+    name = printable(path.stem)
+    return name if board in name.lower() else f"{board} {name}"

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.people import OnePart
-from rtradar.conventions import MINIMUM_KA
+from rtradar.conventions import MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
+from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
 from rtradar.scatter.inside_people import InsidePeople
@@ -44,7 +45,8 @@ class LinkBudget:
     ``power`` is the sum of |amplitude|^2 over the visible echoes, averaged over rx and one chirp
     every 10 ms, ``part_power`` the same by name of body part and ``person_power`` (person,) by
     person [m^2]; ``visible`` says whether there is any echo. At ``times (time,)`` since the start
-    of the capture [s], ``power_at (time, part)`` is the power [m^2].
+    of the capture [s], ``power_at (time, part)`` is the power [m^2] and ``field_at (time, rx)`` the
+    complex sum of all echoes at the centre of the sweep [m].
     """
 
     power: float
@@ -53,6 +55,7 @@ class LinkBudget:
     person_power: tuple[float, ...]
     times: Array
     power_at: Array
+    field_at: NDArray[np.complex128]
     limits: tuple[Limit, ...]
 
 
@@ -75,7 +78,7 @@ def link_budget(
     issued if more than 5 % of the echo power is concerned by a limit, or nobody is visible.
     """
     chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
-    powers = FileBackedRows()
+    powers, fields = FileBackedRows(), FileBackedRows()
     scene, there = in_world(scene or Scene(), body)
     solid, others = Inside(scene, body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
@@ -90,6 +93,7 @@ def link_budget(
         ever_sampled[body.owner[echoes.part[inside.any(axis=(0, 1))]]] = True
         by_part = _by_part(echoes, len(body.part_names))
         powers.append(by_part)
+        fields.append(_field(echoes, radar.centre_frequency_hz).view(np.float64))
         for look in (solid.look, others.look):
             look(times, there.at(times), by_part)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
@@ -111,7 +115,8 @@ def link_budget(
     person_power = np.bincount(body.owner, weights=power_at.mean(axis=0)).tolist()
     in_solids = [*solid.found(power_at.sum(axis=0)), *others.found()]
     release_pages(power_at)
-    kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at
+    field_at = fields.rows().view(np.complex128)
+    kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at, field_at
     if power == 0:
         return LinkBudget(_reference_power(radar, spreading), False, *kept, ())
     names = [name for name, small in zip(body.part_names, small_parts, strict=True) if small]
@@ -148,6 +153,13 @@ def _by_part(echoes: Echoes, n_parts: int) -> Array:
     by_part = np.zeros((len(power), n_parts))
     np.add.at(by_part.T, echoes.part, power.T)
     return by_part
+
+
+def _field(echoes: Echoes, frequency_hz: float) -> NDArray[np.complex128]:
+    """Sum of the echoes (chirp, rx) at one frequency [m]."""
+    (amplitude,) = at_nodes(echoes.amplitude, echoes.frequency, np.array([frequency_hz]))
+    turns = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length)
+    return np.ascontiguousarray((amplitude * turns).sum(axis=-1), dtype=np.complex128)
 
 
 def _reference_power(radar: Radar, spreading: bool) -> float:

@@ -18,6 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model
+from rtradar.scatter.inside_walls import objects_inside
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
@@ -50,19 +51,24 @@ class World:
     """
 
     def __init__(
-        self, person: EchoModel, parts: int, objects: Sequence[Sequence[RigidEchoes]]
+        self,
+        person: EchoModel,
+        parts: int,
+        objects: Sequence[Sequence[RigidEchoes]],
+        limits: Sequence[Limit] = (),
     ) -> None:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
-        self.variant = person.variant
+        self._limits, self.variant = tuple(limits), person.variant
 
     @property
     def limits(self) -> tuple[Limit, ...]:
         """Limits of validity that the objects come near or go past."""
-        return tuple(limit for own in self.objects for path in own for limit in path.limits)
+        of_paths = (limit for own in self.objects for path in own for limit in path.limits)
+        return (*self._limits, *of_paths)
 
     def with_person(self, person: EchoModel) -> World:
         """Return the same objects with another model of the people."""
-        return World(person, self._parts, self.objects)
+        return World(person, self._parts, self.objects, self._limits)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
@@ -141,6 +147,7 @@ def build_world(
     Without objects it is what `build_model` makes, whose parameters and errors these are. A level
     that traces nothing lets nothing occlude an object either.
     """
+    overlaps = objects_inside(scene, body.duration_s) if scene.objects else []
     radar, body, scene = in_radar_axes(radar, body, scene)
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
@@ -162,7 +169,7 @@ def build_world(
         [rigid(moving=moving, duration_s=body.duration_s, path=path) for path in paths]
         for moving in scene.objects
     ]
-    return World(model, len(body.part_names), objects)
+    return World(model, len(body.part_names), objects, overlaps)
 
 
 def model_of_people(model: EchoModel) -> EchoModel:

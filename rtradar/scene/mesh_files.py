@@ -167,10 +167,16 @@ def _check_glb_header(where: str, content: bytes) -> None:
             f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed"
         )
     try:
-        accessors = json.loads(content[20 : 20 + length]).get("accessors", [])
-        count = sum(abs(int(accessor["count"])) for accessor in accessors)
+        header = json.loads(content[20 : 20 + length])
+        count = sum(abs(int(accessor["count"])) for accessor in header.get("accessors", []))
+        outside = [one["uri"] for one in header.get("buffers", []) if "uri" in one]
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         raise InputError(f"{broken}: its header cannot be read") from None
+    if outside and not str(outside[0]).startswith("data:"):
+        raise InputError(
+            f"{where} keeps its triangles in another file, {brief(outside[0])}; save it with all "
+            "in one file"
+        )
     # An accessor without data is filled with as many zeros as it names, and one whose rows overlap
     # grows.
     if count > _NUMBERS_A_FACE * MOST_FACES:

@@ -113,7 +113,7 @@ def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
     return Figure(figsize=size, dpi=dpi, facecolor=LIGHT.page, layout="constrained")
 
 
-def save_figure(figure: Any, file: Path | BinaryIO) -> None:
+def save_figure(figure: Any, file: Path | BinaryIO, *, pdf: Path | None = None) -> None:
     """Save a figure as PNG, and clear it.
 
     Figure and axes refer to each other. Without clearing, the memory of one picture could
@@ -125,12 +125,16 @@ def save_figure(figure: Any, file: Path | BinaryIO) -> None:
         Figure of `new_figure`, in which no text is read as a formula.
     file : Path or binary file
         Path, or file open for writing.
+    pdf : Path, optional
+        Path of the same picture as PDF, whose lines and letters stay sharp in a paper.
     """
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):  # names of files, radars and walls may have dollar signs
         text.set_parse_math(False)
     write_png(figure, file)
+    if pdf is not None:
+        figure.savefig(pdf, metadata={"CreationDate": None})
     figure.clear()
 
 

@@ -15,6 +15,9 @@ from rtradar.errors import InputError
 from rtradar.full_wave import ClosedMesh, ConductingSurface
 from rtradar.full_wave.surfaces_quadrature import rules
 
+solves = pytest.mark.slow
+"""What solves compiles for 40 s, and no level of a run does."""
+
 RADIUS_M = 0.1
 FAR = np.array([[1e5, 0.0, 0.0]])
 
@@ -39,6 +42,7 @@ def decibels(ratio: Any) -> float:
 
 
 # 2.7437 and 4.4934 are resonances of the inside: TM 101 and TE 101.
+@solves
 @pytest.mark.parametrize(("ka", "tolerance_db"), [(1.0, 0.05), (2.7437, 0.1), (3.0, 0.1)])
 @pytest.mark.parametrize("polarization", ["v", "h"])
 def test_a_sphere_scatters_as_mie_has_it(ka: float, tolerance_db: float, polarization: Any) -> None:
@@ -50,6 +54,7 @@ def test_a_sphere_scatters_as_mie_has_it(ka: float, tolerance_db: float, polariz
     assert abs(found[0] / mie - 1) <= 0.02
 
 
+@solves
 def test_the_error_falls_with_the_square_of_the_edges() -> None:
     frequency = frequency_of(2.5)
     errors = [
@@ -63,6 +68,7 @@ def test_the_error_falls_with_the_square_of_the_edges() -> None:
     assert 3 < errors[0] / errors[1] < 5
 
 
+@solves
 def test_mirror_planes_change_nothing_but_the_cost() -> None:
     """A turn about z leaves one of the three mirror planes of the mesh."""
     turned = ball(1)
@@ -82,6 +88,7 @@ def test_mirror_planes_change_nothing_but_the_cost() -> None:
     assert fields[0] == pytest.approx(fields[1], rel=1e-4)
 
 
+@solves
 def test_tx_and_rx_may_be_exchanged() -> None:
     block = trimesh.creation.box((0.1, 0.07, 0.05)).subdivide().subdivide()
     surface = ConductingSurface(closed(block), 1e9)
@@ -91,6 +98,7 @@ def test_tx_and_rx_may_be_exchanged() -> None:
     assert there == pytest.approx(surface.scattering_length(rx, tx, "v"), rel=0.01)
 
 
+@solves
 def test_near_antennas_see_what_the_modes_give() -> None:
     sphere = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], np.full((1, 3), RADIUS_M))
     near, beside = [0.4, 0.1, 0.2], [0.2, 0.35, -0.1]
@@ -110,6 +118,7 @@ def test_coarse_meshes_are_divided() -> None:
     assert volume == pytest.approx(1e-3)
 
 
+@solves
 def test_integrals_of_touching_triangles() -> None:
     """Polynomials exactly, and the mean of 1/R on one triangle by its closed form.
 
@@ -156,6 +165,7 @@ def test_meshes_must_be_closed_and_face_outward() -> None:
         ClosedMesh(vertices, faces[:, ::-1])
 
 
+@solves
 def test_two_bodies_are_one_problem() -> None:
     """Far apart they scatter as the sum of both, each with its own phase."""
     frequency, place = frequency_of(1.0), np.array([0.0, 40 * RADIUS_M, 0.0])

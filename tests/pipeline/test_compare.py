@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 from pathlib import Path
@@ -107,7 +108,9 @@ def test_files_and_table(compared: rt.Comparison) -> None:
         *MODELS,
         "compare.json",
         "compare.html",
+        "compare.csv",
         *pictures,
+        *(name.replace(".png", ".pdf") for name in pictures),
     }
     assert json.loads((compared.out / "compare.json").read_text()) == compared.summary
     page = (compared.out / "compare.html").read_text()
@@ -158,6 +161,44 @@ def test_the_command_prints_the_table(
     assert said.count("\n") == 1
     assert "perfect" in said
     assert not (tmp_path / "no").exists()
+
+
+def test_the_field_of_the_echoes_is_compared(compared: rt.Comparison) -> None:
+    found = compared.summary["fidelities"]
+    # What is occluded is part of the difference, and the paper's ranges turn every phase.
+    error = {name: found[name]["field_error"] for name in MODELS}
+    assert error["specular"] == compared.summary["other_seed"]["field_error"] == 0
+    assert 0.05 < error["analytic"] < 0.8 < error["analytic-paper"]
+
+
+def test_the_table_is_kept_for_other_programs(compared: rt.Comparison) -> None:
+    with (compared.out / "compare.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["of"] for row in rows} == {*MODELS, "specular, other seed"}
+    found = {(row["measure"], row["of"]): row["value"] for row in rows}
+    detections = compared.summary["fidelities"]["analytic"]["detections"]
+    assert found["detections", "analytic"] == str(detections)
+    assert (compared.out / "compare_power.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_over_recordings_it_is_the_mean_and_its_interval(
+    small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compare", "synthetic:punch", "synthetic:kick", "--radar", str(small_file)]
+    words += ["--duration", "0.2", "--fidelities", "analytic-paper,analytic"]
+    out = tmp_path / "out"
+    assert main([*words, "--out", str(out)]) == 0
+    summary = json.loads((out / "compare.json").read_text())
+    each = [json.loads((out / name / "compare.json").read_text()) for name in summary["recordings"]]
+    assert [one["parameters"]["motion"] for one in each] == ["synthetic:punch", "synthetic:kick"]
+    one, two = (own["fidelities"]["analytic-paper"]["power_rms_db"] for own in each)
+    found = summary["fidelities"]["analytic-paper"]["power_rms_db"]
+    assert found["mean"] == pytest.approx((one + two) / 2)
+    # Student's t of one degree of freedom, 12.706, times half the difference of two.
+    assert found["high"] - found["mean"] == pytest.approx(12.706 * abs(one - two) / 2, rel=1e-4)
+    assert "±" in capsys.readouterr().out
+    header = (out / "compare.csv").read_text().splitlines()[0]
+    assert header == "measure,of,mean,low,high"
 
 
 def test_a_capture_too_short_for_a_spectrogram_is_compared_without(

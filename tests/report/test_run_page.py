@@ -304,10 +304,11 @@ def test_limits_are_those_of_the_sweep_centre() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "kind"), [(0.008, "note"), (0.05, "note"), (0.051, "warning"), (0.0, "warning")]
+    ("share", "kind"),
+    [(0.008, "note"), (0.05, "note"), (0.051, "warning"), (0.0, "warning"), (None, "note")],
 )
-def test_a_limit_is_a_warning_where_it_matters(share: float, kind: str) -> None:
-    # A fraction of 5 % is 0.2 dB. None at all is nobody visible.
+def test_a_limit_is_a_warning_where_it_matters(share: float | None, kind: str) -> None:
+    # A fraction of 5 % is 0.2 dB. None of 0 is nobody visible, and one that is not known is told.
     assert grade({"name": "beyond_range", "share": share, "message": "m"}) == kind
 
 
@@ -376,3 +377,16 @@ def test_people_have_a_row_each() -> None:
     assert "<td>17.3 dB</td>" in text
     assert "<td>-</td>" in text
     assert "<tbody></tbody>" in _people([])
+
+
+@pytest.mark.parametrize(
+    ("echo", "noise", "shown"),
+    [(1e-3, 1e-6, "30.0 dB"), (1e-3, 0.0, "no noise"), (0.0, 1e-6, "nobody is visible")],
+)
+def test_the_headline_has_the_ratio_that_a_run_had(
+    tmp_path: Path, echo: float, noise: float, shown: str
+) -> None:
+    summary = {"echo_power_m2": echo, "noise_power_m2": noise, "parameters": {"snr_db": "physical"}}
+    page = write(tmp_path / "r.html", summary=summary)
+    assert f"{shown}signal to noise, of one IF sample" in page.text
+    assert "physical dB" not in page.text

@@ -180,7 +180,7 @@ def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
 
 def test_people_and_objects_have_names_colours_and_truth() -> None:
     view = linked([(0.1, 4.5, 0.5)])
-    assert view.source_names == ["walk <1>", "fan", "nobody"]
+    assert view.source_names == ["walk <1>", "fan", "room or noise"]
     assert len(set(view.source_colours)) == 3
     assert view.colour == "person"
     data = view_data(view)

@@ -13,7 +13,7 @@ from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.inside_walls import Inside
+from rtradar.scatter.inside_walls import Inside, objects_inside
 from rtradar.scatter.link_budget import link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.system.registries import scene_files
@@ -159,3 +159,32 @@ def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, acti
     solid = Inside(scene, body.part_names, body.owner)
     solid.look(times, body.at(times), np.ones((len(times), len(body.part_names))))
     assert solid.found(np.ones(len(body.part_names))) == []
+
+
+def box(name: str, x: float, motion: rt.FollowingPath | None = None) -> rt.Object:
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.creation.box((0.4, 0.4, 0.4))
+    return rt.Object(name, mesh, "wood", position_m=(x, 0.0, 1.0), motion=motion)
+
+
+def test_parts_in_an_object_that_moves_are_told_while_they_are_in_it() -> None:
+    # It comes to where the person is half-way, and goes on.
+    path = rt.FollowingPath(velocity_mps=(4, 0, 0))
+    solid = Inside(Scene(objects=(box("cart", -2.0, path),)), BODY.part_names, BODY.owner)
+    power = np.full((len(TIMES), len(BODY.part_names)), 1e-3)
+    solid.look(TIMES, BODY.at(TIMES), power)
+    ((name, within, message),) = solid.found(power.sum(axis=0))
+    assert name == "inside_object"
+    assert "the middle torso in 'cart' from 0.50 s" in message
+    assert 0 < within < 0.3 * power.sum()
+
+
+def test_objects_in_one_another_are_told_and_what_touches_is_not() -> None:
+    path = rt.FollowingPath(velocity_mps=(1, 0, 0))
+    both = box("cart", -0.4, path), box("crate", 0.0)
+    (limit,) = objects_inside(Scene(objects=both), 1.0)
+    assert limit.name == "objects_overlap"
+    # At 7 of 10 instants: it touches at the first, and has gone through at the last two.
+    assert limit.share == pytest.approx(0.7)
+    assert "'cart' in 'crate' from 0.11 s" in limit.message
+    assert objects_inside(Scene(objects=(box("cart", -0.4), box("crate", 0.0))), 1.0) == []

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, TextFile
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternions_to_world, to_world
@@ -214,6 +215,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
             f"{path}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)"
         )
     known = load_skeleton(skeleton)
+    _warn_of_another_person(path, skeleton)
     roots, rotations = FileBackedRows(), FileBackedRows()
     with TextFile(path, "AMC motion") as text:
         frames = _frames(text, known)
@@ -238,6 +240,21 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
         rate_hz=_RATE_HZ if rate_hz is None else rate_hz,
     )
     return settled(str(path), motion, unit_m=1.0, up=up, unit_by="metres by the skeleton")
+
+
+def _warn_of_another_person(path: Path, skeleton: Path) -> None:
+    """Warn where a skeleton beside a recording has its name, and another is given.
+
+    Skeletons of one source fit each other's recordings: only names tell whose is whose.
+    """
+    own = [one.stem for one in path.parent.glob("*.asf") if path.stem.startswith(f"{one.stem}_")]
+    if own and skeleton.stem not in own:
+        warnings.warn(
+            f"{path}: beside it is {max(own, key=len)}.asf, of its name, and {skeleton} is given; "
+            "bones of another person make other ranges and speeds",
+            ValidityWarning,
+            stacklevel=3,
+        )
 
 
 def _posed(

@@ -177,12 +177,23 @@ def _plain(value: object) -> Any:
     raise TypeError(f"a {type(value).__name__} has no place in summary.json")
 
 
+_SINGLE_REFLECTIONS = {
+    "name": "single_reflections",
+    "share": None,
+    "message": "what parts of a body reflect to one another is left out, which near each other "
+    "changes both by decibels; bounces=2 (--model-option bounces=2) adds it",
+}
+"""A limit of every run without it, whose share only such a run could tell."""
+
+
 def _limits(capture: Capture) -> list[dict[str, Any]]:
     of_room = capture.inside.limits if capture.inside else ()
     limits = [dataclasses.asdict(limit) for limit in (*capture.link_budget.limits, *of_room)]
     if not capture.link_budget.visible:
         invisible = {"name": "nobody_visible", "share": 0.0}
         limits += [invisible | {"message": message} for message in capture.warned]
+    elif (capture.settings.model_options or {}).get("bounces", 1) == 1:
+        limits.append(_SINGLE_REFLECTIONS)
     return limits
 
 

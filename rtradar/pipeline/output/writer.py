@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -47,6 +47,11 @@ _RUN_FOLDERS = r"if\.zarr(/c(/\d+)*)?"
 
 RUN_FILES = OutputFiles("summary.json", _RUN_FILES, _RUN_FOLDERS)
 """Files of `run`."""
+
+
+def files_of_pictures(names: Iterable[str]) -> list[str]:
+    """Return PNG files and the PDF files of the same names."""
+    return [file for name in names for file in (name, name.replace(".png", ".pdf"))]
 
 
 def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> OutputFiles:

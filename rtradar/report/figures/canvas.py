@@ -149,7 +149,8 @@ def draw_view(
     """Draw ``level_db`` (up, across) within the limits of a ``view``, coloured for what it shows.
 
     ``view`` has the limits across, None for the whole axis, and up. Returns the image, and a
-    sentence on the floor and the ceiling of its colours, as `colour_limits` sets them.
+    sentence on the floor and the ceiling of its colours, as `colour_limits` sets them, and on what
+    removing the loss with range does to an echo that is not at the range of its cell.
     """
     x_limits, y_limits = view[0] or bin_edges(across), view[1]
     seen = level_db[np.ix_(_inside(up, y_limits), _inside(across, x_limits))]
@@ -162,7 +163,8 @@ def draw_view(
         else "3 dB below the median of the view"
     )
     words = f"Colours: ceiling {round(high)} {unit.decibels}, the strongest cell; "
-    return image, f"{words}floor {round(low)} {unit.decibels}, {floor}."
+    lifted = " What leaks or folds over from near shows R^4 higher." * (np.size(unit.scale) > 1)
+    return image, f"{words}floor {round(low)} {unit.decibels}, {floor}.{lifted}"
 
 
 def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArray[np.bool_]:

@@ -67,7 +67,7 @@ def draw_power_over_time(
     below.set(xlabel="Time [s]", ylabel=f"Less {reference} [dB]")
     dress(above, title=title)
     dress(below)
-    save_figure(figure, path)
+    save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 
 def draw_part_power(
@@ -99,7 +99,7 @@ def draw_part_power(
     right.set(xlabel="Occluded [% of\nthe part's power]", xlim=(0, 100))
     dress(left, title=title, across=1.4)
     dress(right)
-    save_figure(figure, path)
+    save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 
 def draw_maps(
@@ -129,7 +129,7 @@ def draw_maps(
         ylim=fitted_limits(shown.sum(axis=1), up[1]),
     )
     add_colour_bar(image, list(panels), label)
-    save_figure(figure, path)
+    save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 
 def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title: str) -> None:
@@ -146,7 +146,7 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
         axes.set_box_aspect((1.6, 1, 1), zoom=0.95)
         dress(axes, title=f"{name}: {len(points)} points")
     write_heading(figure, title)
-    save_figure(figure, path)
+    save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 
 def write_comparison(
@@ -231,7 +231,9 @@ def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
     """Return the data of the page: body and maps, on the same axes and in the same colours.
 
     ``limits_db`` are the highest floor and the highest peak of all maps, and ``difference_db`` the
-    colours' limit of differences, which one cell in a thousand exceeds.
+    colours' limit of differences, which a twentieth of the cells exceed that are 10 dB above the
+    highest floor by either model: where neither has an echo nothing differs, and deep fades do by
+    tens of decibels, which would hide all else.
     """
     thinned = {name: view.thinned(MOST_STEPS, _STEPS_HZ) for name, view in views.items()}
     maps = {name: view.range_doppler for name, view in thinned.items()}
@@ -239,17 +241,23 @@ def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
     high = max(levels.high_db for levels in maps.values())
     boxes = np.array([view.shown_box() for view in thinned.values()])
     decibels = [np.maximum(one.low_db + one.step_db * one.level, low) for one in maps.values()]
-    most = max(float(np.percentile(np.abs(one - decibels[-1]), 99.9)) for one in decibels[:-1])
+    most = max(_spread(one, decibels[-1], low + 10) for one in decibels[:-1])
     snapshots = next(iter(thinned.values())).snapshots
     radar = next(iter(thinned.values())).radar
     parts = snapshots.part_names.tolist()
     return {
-        "figure": posed_figure(parts, snapshots.times, snapshots.poses, radar),
+        "figure": posed_figure(parts, snapshots.times, snapshots.poses, radar, alone=True),
         "models": [{"name": name, "map": levels.packed()} for name, levels in maps.items()],
         "limits_db": [low, high],
         "difference_db": max(float(np.ceil(most)), 1.0),
         "box": np.stack([boxes[..., 0].min(axis=0), boxes[..., 1].max(axis=0)], axis=1).tolist(),
     }
+
+
+def _spread(one: NDArray[np.float64], other: NDArray[np.float64], floor_db: float) -> float:
+    """Return what a twentieth of the differences exceed, where either is above the floor [dB]."""
+    differences = np.abs(one - other)[np.maximum(one, other) > floor_db]
+    return float(np.percentile(differences, 95)) if len(differences) else 0.0
 
 
 def _panels(models: Sequence[str]) -> str:

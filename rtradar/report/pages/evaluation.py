@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +17,7 @@ from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.trainings import draw_confusion, draw_learning, draw_transfer
 from rtradar.system.checks import printable
+from rtradar.system.csv_text import csv_text
 from rtradar.system.figure_style import LIGHT, WIDTH_IN, dress, new_figure, save_figure
 from rtradar.system.output_folder import OutputFiles
 
@@ -207,23 +205,9 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
                 [title, one.name, epoch, *(f"{row[name]:.6g}" for name in HISTORY)]
                 for epoch, row in enumerate(one.history, start=1)
             ]
-    (out / "trainings.csv").write_text(_csv(head, trainings), encoding="utf-8")
-    (out / "history.csv").write_text(_csv([*what, "epoch", *HISTORY], history), encoding="utf-8")
-
-
-_FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.]+$)")
-"""Beginning of a formula, and of no number."""
-
-
-def _inert(row: Sequence[object]) -> list[object]:
-    """Quote what a spreadsheet would run as a formula; numbers stay as they are."""
-    return [f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell for cell in row]
-
-
-def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([_inert(row) for row in (head, *rows)])
-    return text.getvalue()
+    (out / "trainings.csv").write_text(csv_text(head, trainings), encoding="utf-8")
+    head = [*what, "epoch", *HISTORY]
+    (out / "history.csv").write_text(csv_text(head, history), encoding="utf-8")
 
 
 def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:

@@ -216,10 +216,10 @@ def grade(limit: Mapping[str, Any]) -> str:
     """Return "warning" for a limit that may change what a reader concludes, or else "note".
 
     A limit that concerns at most 5 % of the echo power changes it by at most 0.2 dB: a note. One
-    without a fraction, as where nobody is visible, concerns everything.
+    of 0, as where nobody is visible, concerns everything, and one of None is not known.
     """
-    share = float(limit.get("share", 0.0))
-    return "note" if 0 < share <= WARN_FRACTION else "warning"
+    share = limit.get("share", 0.0)
+    return "note" if share is None or 0 < share <= WARN_FRACTION else "warning"
 
 
 def limits_list(limits: Sequence[Mapping[str, Any]]) -> str:
@@ -228,7 +228,7 @@ def limits_list(limits: Sequence[Mapping[str, Any]]) -> str:
         return '<p class="note">Nothing came near the end of a model\'s validity.</p>'
     items = []
     for limit in sorted(limits, key=lambda limit: -"note warning".index(grade(limit))):
-        share, message = float(limit.get("share", 0.0)), str(limit["message"])
+        share, message = float(limit.get("share") or 0.0), str(limit["message"])
         if share > 0:
             message = f"{share:.1%} of the {message}"
         kind = grade(limit)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from typing import Any
+
 _LABELS = {
     # what was found
     "windows": "Frames",
@@ -144,9 +148,22 @@ def with_unit(value: object, unit: str) -> str:
         shown = f"{value:.5g}"
     else:
         shown = str(value)
-        if not shown.lstrip("-").isalnum() or not unit:
+        if shown not in ("inf", "-inf"):
             unit = ""
     return shown + ("" if unit in ("", "°") else " ") + unit
+
+
+def signal_to_noise(summary: Mapping[str, Any]) -> str | None:
+    """Return the signal-to-noise ratio of one IF sample that a run had, such as "31.6 dB".
+
+    It is None where a summary knows no noise, as of measured samples.
+    """
+    if "noise_power_m2" not in summary:
+        return None
+    echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
+    if not echo:
+        return "nobody is visible"
+    return f"{10 * math.log10(echo / noise):.1f} dB" if noise else "no noise"
 
 
 def grouped(number: int) -> str:

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
+from rtradar.report.figures.canvas import field_unit
 from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages import html
 from rtradar.report.pages.html import mapping_table, picture, table, write_page
-from rtradar.report.pages.labels import grouped, minus, with_unit
+from rtradar.report.pages.labels import grouped, minus, signal_to_noise
 from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
 from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import rdt_data, spatial_data
@@ -137,16 +138,15 @@ def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterat
             minus(f"{low[2]:+.1f} to {high[2]:+.1f} m/s"),
             "velocity of what was detected, positive: receding",
         )
-    parameters = summary.get("parameters", {})
-    if "snr_db" in parameters:
-        level = str(parameters["snr_db"])
-        without = level in ("inf", "None")
-        shown = "no noise" if without else with_unit(parameters["snr_db"], "dB")
-        yield shown, "signal to noise" if without else "signal to noise, of one IF sample"
+    if ratio := signal_to_noise(summary):
+        yield ratio, "signal to noise, of one IF sample"
     if "detections" in summary:
         frames = f" in {summary['windows']} frames" if "windows" in summary else ""
         yield grouped(summary["detections"]), f"detections{frames}"
-    yield grouped(len(points)), "points of the range-Doppler-time cloud"
+    yield (
+        grouped(len(points)),
+        "points of the range-Doppler-time cloud, drawn on the surface about the detections",
+    )
     if "capture_s" in summary:
         yield f"{summary['capture_s']:.2f} s", "of radar"
 
@@ -201,9 +201,15 @@ def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
     models = {**modelled.get("ways", {}), **modelled.get("why", {})}
     power = summary.get("part_power_m2", {})
     total = sum(power.values()) or 1.0
+    # In the unit of the picture of the parts.
+    unit = field_unit(
+        radar,
+        spreading=parameters.get("spreading", True),
+        strongest_m2=max(power.values(), default=1.0),
+    )
     powers = (
-        (name.capitalize(), f"{value:.3g} m²", f"{value / total:.1%}")
-        for name, value in power.items()
+        (name.capitalize(), f"{level:.1f}" if value else "-", f"{value / total:.1%}")
+        for (name, value), level in zip(power.items(), unit.level([*power.values()]), strict=True)
     )
     fractions = ((name, f"{value:.1%}") for name, value in models.items())
     doubles = (
@@ -223,7 +229,7 @@ def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
             "Reflections from part to part",
             table(doubles, ("First", "Last", "Power over all single reflections")),
         ),
-        ("Echo power by part", table(powers, ("", "Mean, with spreading loss", "Of all"))),
+        ("Echo power by part", table(powers, ("", unit.label("mean"), "Of all"))),
     )
 
 

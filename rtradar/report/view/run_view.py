@@ -51,9 +51,9 @@ _LINKED = """<div class="linked $style">
 <p class="note">$bodies Lines are paths from the middle of
 the array to the specular point of the part, and back; dots on the map are the same echoes,
 diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are occluded from
-the radar; grey points of the cloud belong to nobody.$objects A click on the spectrogram goes to its
-time; the pointer shows range, velocity and level of what is below it. World axes: x from the radar
-to the person, y to the left seen from the radar, z up.</p>
+the radar; grey points of the cloud are of the room or of noise.$objects A click on the spectrogram
+goes to its time; the pointer shows range, velocity and level of what is below it. World axes: x
+from the radar to the person, y to the left seen from the radar, z up.</p>
 """
 
 GROUPS = {
@@ -166,7 +166,7 @@ class RunView:
     @property
     def source_names(self) -> list[str]:
         """Names of people, then of objects, and at the end of nobody."""
-        return [*self.snapshots.sources, "nobody"]
+        return [*self.snapshots.sources, "room or noise"]
 
     @property
     def source_colours(self) -> list[str]:

@@ -51,13 +51,19 @@ def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def posed_figure(
-    part_names: Sequence[str], times: NDArray[np.float64], poses: NDArray[np.floating], radar: Radar
+    part_names: Sequence[str],
+    times: NDArray[np.float64],
+    poses: NDArray[np.floating],
+    radar: Radar,
+    *,
+    alone: bool = False,
 ) -> dict[str, Any]:
     """Return what pages draw of a moving body before a radar, as plain values for JSON.
 
     ``poses`` is float32 (frame, part, 4, xyz): centre and the three semi-axes of each part in world
     coordinates [m]; ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx``
-    [m] of every frame, or once of a radar at rest; ``ranges`` of the axes x, y, z [m].
+    [m] of every frame, or once of a radar at rest; ``ranges`` of the axes x, y, z [m], which hold
+    the radar unless the body is to be seen ``alone``, and as large as it can.
     """
     centres, axes = poses[:, :, 0], poses[:, :, 1:]
     vertices, faces = drawn_sphere()
@@ -76,7 +82,7 @@ def posed_figure(
         "faces": faces.ravel().tolist(),
         "tx": np.round(tx, 4).tolist(),
         "rx": np.round(rx, 4).tolist(),
-        "ranges": _ranges(np.concatenate(places), antennas),
+        "ranges": _ranges(np.concatenate(places), antennas[:0] if alone else antennas),
         "window_s": radar.frame_duration_s,
     }
 
@@ -140,8 +146,8 @@ def packed_integers(array: NDArray[np.integer]) -> str:
 
 def _ranges(body: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
     """Box about all poses, the radar and the floor, in half metres."""
-    least = np.minimum(body.min(axis=0), antennas.min(axis=0))
-    most = np.maximum(body.max(axis=0), antennas.max(axis=0))
+    places = np.concatenate([body, antennas])
+    least, most = places.min(axis=0), places.max(axis=0)
     least[:2] -= _MARGIN_M
     most[:2] += _MARGIN_M
     # The floor is z = 0: a heel a little below it needs no more room.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import load_motion
 
 UNIT = 0.0254 / 0.45
@@ -137,3 +137,16 @@ def _fails(words: list[str], path: Path, skeleton: Path | None) -> None:
     assert "\n" not in message
     for word in words:
         assert word in message, message
+
+
+def test_the_skeleton_of_another_person_is_warned_of(asf_files: tuple[Path, Path]) -> None:
+    amc, asf = asf_files
+    walk = amc.with_name("02_01.amc")
+    walk.write_bytes(amc.read_bytes())
+    other, own = asf.with_name("35.asf"), asf.with_name("02.asf")
+    other.write_bytes(asf.read_bytes())
+    load_motion(walk, skeleton=other)  # nothing tells whose it is
+    own.write_bytes(asf.read_bytes())
+    load_motion(walk, skeleton=own)
+    with pytest.warns(ValidityWarning, match=r"beside it is 02\.asf"):
+        load_motion(walk, skeleton=other)
