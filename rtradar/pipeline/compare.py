@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
+from rtradar.body import Person
 from rtradar.errors import InputError
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
@@ -209,8 +210,16 @@ def compare_recordings(
     names = [f"{number:02d}-{_file_name(own)}" for number, own in enumerate(motions, start=1)]
     found = []
     for name, motion in zip(names, motions, strict=True):
-        each = {"out": place / name, "fidelities": fidelities, "overwrite": overwrite}
-        found.append(compare(motion, radar, scene, **each, **options).summary)
+        one = compare(
+            motion,
+            radar,
+            scene,
+            out=place / name,
+            fidelities=fidelities,
+            overwrite=overwrite,
+            **options,
+        )
+        found.append(one.summary)
     first = found[0]
     summary: dict[str, Any] = {name: first[name] for name in ("reference", "versions")}
     summary |= {"recordings": names, "confidence": _CONFIDENCE}
@@ -226,7 +235,7 @@ def compare_recordings(
 def _file_name(motion: Moving) -> str:
     """Return the name of a recording as one of a file."""
     everyone = motion if isinstance(motion, Sequence) else [motion]
-    names = [getattr(one, "motion", one).name for one in everyone]
+    names = [one.motion.name if isinstance(one, Person) else one.name for one in everyone]
     return re.sub(r"[^\w.-]+", "-", "-".join(names))[:40]
 
 

@@ -104,7 +104,7 @@ class Inside:
         return limits
 
     def _thing_names(self) -> list[str]:
-        return [one.name for one in (*self._scene.walls, *self._solids)]
+        return [wall.name for wall in self._scene.walls] + [one.name for one in self._solids]
 
     def _refuse(self, number: int, parts: list[int]) -> None:
         first_s = self._first_s[number]
