@@ -40,7 +40,11 @@ def test_amc_in_pieces(
         load_motion(path, skeleton)
 
 
-@pytest.mark.parametrize("activity", ACTIVITIES)
+@pytest.mark.parametrize(
+    "activity",
+    # All are stitched and kept by the same code: one is enough within seconds.
+    [one if one == "walk" else pytest.param(one, marks=pytest.mark.slow) for one in ACTIVITIES],
+)
 def test_actors_in_pieces(
     activity: str, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]
 ) -> None:

@@ -231,7 +231,7 @@ def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
     """Return the data of the page: body and maps, on the same axes and in the same colours.
 
     ``limits_db`` are the highest floor and the highest peak of all maps, and ``difference_db`` the
-    colours' limit of differences, which a twentieth of the cells exceed that are 10 dB above the
+    colours' limit of differences, which a twentieth of the cells exceed that are 20 dB above the
     highest floor by either model: where neither has an echo nothing differs, and deep fades do by
     tens of decibels, which would hide all else.
     """
@@ -241,7 +241,7 @@ def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
     high = max(levels.high_db for levels in maps.values())
     boxes = np.array([view.shown_box() for view in thinned.values()])
     decibels = [np.maximum(one.low_db + one.step_db * one.level, low) for one in maps.values()]
-    most = max(_spread(one, decibels[-1], low + 10) for one in decibels[:-1])
+    most = max(_spread(one, decibels[-1], low + 20) for one in decibels[:-1])
     snapshots = next(iter(thinned.values())).snapshots
     radar = next(iter(thinned.values())).radar
     parts = snapshots.part_names.tolist()
