@@ -43,12 +43,12 @@ def seconds(motion: rt.Motion, scene: rt.Scene) -> float:
 
 
 def measure(quick: bool) -> list[Row]:
-    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.5 if quick else 3.0)
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3 if quick else 3.0)
     found = []
     for scene in (rt.Scene(), rt.Scene.load("living-room")):
         seconds(motion, scene)
         as_it_is, ratios = list[float](), {name: list[float]() for name in _without()}
-        for _ in range(2 if quick else REPEATS):
+        for _ in range(1 if quick else REPEATS):
             as_it_is.append(seconds(motion, scene))
             for name, change in _without().items():
                 with change:
