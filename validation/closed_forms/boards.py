@@ -130,6 +130,8 @@ def corner_rows(name: str) -> Iterator[Row]:
         "elevation [beams]": elevation / radar.elevation_resolution_deg,
     }
     for what, error in off.items():
+        if np.isnan(error) and name in ("iwr1642", "awr1642"):
+            continue  # their antennas stand on one line, and measure no elevation
         says = f"a corner reflector reads back through each board: {what.split()[0]}"
         yield judged(f"{name}, corner reflector", what, "", abs(float(error)), 0.1, says=says)
 
