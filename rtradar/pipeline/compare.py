@@ -185,13 +185,20 @@ def compare_recordings(
     Parameters
     ----------
     motions : sequence
-        Recordings, two or more, each as for `compare`.
+        Recordings, two or more, each what `compare` takes as ``motion``.
+    radar, scene
+        The same as for `run`.
     out : path
         Folder for a comparison of each recording, in a folder of its number and name, and for
         ``compare.json`` and ``compare.csv`` with the mean over recordings of each figure and the
         interval that holds it with a confidence of 95 %, by Student's t of as many recordings.
-    radar, scene, fidelities, overwrite, **options
-        As for `compare`.
+    fidelities : sequence of str
+        Two models or more, each once, the reference last; `rtradar.scatter.MODELS` has their names.
+    overwrite : bool
+        Whether files that the folders hold under names of the new ones are replaced even where no
+        ``compare.json`` lists them.
+    **options
+        Settings of all runs, the fields of `rtradar.RunSettings` but ``fidelity``.
 
     Returns
     -------

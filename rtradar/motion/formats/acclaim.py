@@ -215,7 +215,6 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
             f"{path}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)"
         )
     known = load_skeleton(skeleton)
-    _warn_of_another_person(path, skeleton)
     roots, rotations = FileBackedRows(), FileBackedRows()
     with TextFile(path, "AMC motion") as text:
         frames = _frames(text, known)
@@ -228,6 +227,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
             positions, quaternions = _posed(known, values, degrees=block[0][1])
             roots.append(to_world(positions))
             rotations.append(quaternions_to_world(quaternions))
+    _warn_of_another_person(path, skeleton)
     index = {bone.name: j for j, bone in enumerate(known.bones)}
     offsets = np.array([bone.direction * bone.length * known.unit_m for bone in known.bones])
     motion = Motion(
@@ -247,7 +247,8 @@ def _warn_of_another_person(path: Path, skeleton: Path) -> None:
 
     Skeletons of one source fit each other's recordings: only names tell whose is whose.
     """
-    own = [one.stem for one in path.parent.glob("*.asf") if path.stem.startswith(f"{one.stem}_")]
+    found = path.parent.glob("*.asf")  # of a folder that was just read from
+    own = [one.stem for one in found if path.stem.startswith(f"{one.stem}_")]
     if own and skeleton.stem not in own:
         warnings.warn(
             f"{path}: beside it is {max(own, key=len)}.asf, of its name, and {skeleton} is given; "
