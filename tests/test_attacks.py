@@ -25,7 +25,7 @@ from rtradar.radar import Radar
 from rtradar.recognition.predict import _of_scene
 from rtradar.scene.mesh_files import read_mesh
 from rtradar.settings import RunSettings
-from rtradar.system.csv_text import csv_text
+from rtradar.system.files import csv_text
 
 
 @pytest.mark.parametrize(

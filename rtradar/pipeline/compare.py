@@ -35,7 +35,7 @@ from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings_of
 from rtradar.system.checks import check_path
-from rtradar.system.csv_text import csv_text
+from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles, atomic_folder
 
 MEASURES = (
@@ -195,10 +195,9 @@ def compare_recordings(
     fidelities : sequence of str
         Two models or more, each once, the reference last; `rtradar.scatter.MODELS` has their names.
     overwrite : bool
-        Whether files that the folders hold under names of the new ones are replaced even where no
-        ``compare.json`` lists them.
+        Whether files of other origin are replaced, as by `compare`.
     **options
-        Settings of all runs, the fields of `rtradar.RunSettings` but ``fidelity``.
+        Settings of all runs: fields of `rtradar.RunSettings`.
 
     Returns
     -------

@@ -134,8 +134,13 @@ def save_figure(figure: Any, file: Path | BinaryIO, *, pdf: Path | None = None) 
         text.set_parse_math(False)
     write_png(figure, file)
     if pdf is not None:
-        figure.savefig(pdf, metadata={"CreationDate": None})
+        write_pdf(figure, pdf)
     figure.clear()
+
+
+def write_pdf(figure: Any, file: Path) -> None:
+    """Write a figure as PDF, the same bytes whenever that is."""
+    figure.savefig(file, metadata={"CreationDate": None})
 
 
 def write_png(figure: Any, file: Path | BinaryIO) -> None:

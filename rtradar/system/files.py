@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import errno
 import io
 import json
@@ -14,7 +15,7 @@ import sys
 import tempfile
 import threading
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
@@ -36,6 +37,7 @@ _OTHER_KINDS = {
 }
 
 _MOST_COMPRESSION = 1000  # by which the deflate of HDF5 makes zeros smaller
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.]+$)")  # its beginning, and of no number
 _PATIENCE_S = 1.0  # at the end of the process, for a file that is just taking its name
 
 DISK_ERRORS = frozenset(
@@ -409,3 +411,14 @@ def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
         ):
             raise ValueError(f"more than {most_bytes / 1e6:g} MB")
         return content
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as text, with what a spreadsheet would run as a formula quoted."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(map(_inert, (head, *rows)))
+    return text.getvalue()
+
+
+def _inert(row: Sequence[object]) -> list[object]:
+    return [f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell for cell in row]

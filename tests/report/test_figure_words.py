@@ -70,6 +70,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
         "write_png",
         lambda figure, _: figures.append(pickle.loads(pickle.dumps(figure))),
     )
+    monkeypatch.setattr(figure_style, "write_pdf", lambda *_: None)
     return figures
 
 

@@ -132,8 +132,8 @@ def integral_rows(quick: bool) -> Iterator[Row]:
                         "dB",
                         float(np.abs(20 * np.log10(np.abs(ratio))).max()),
                         LIMIT_DB,
-                        says="physical optics of a sphere, Tx and Rx 0 to 180 degrees apart, "
-                        "against its integral",
+                        says="physical optics of a sphere, Tx and Rx 0 to 180 degrees apart but "
+                        "for 9 to 14, where two forms fade, against its integrals",
                         cases=len(angles),
                     )
 

@@ -17,8 +17,8 @@ from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.trainings import draw_confusion, draw_learning, draw_transfer
 from rtradar.system.checks import printable
-from rtradar.system.csv_text import csv_text
 from rtradar.system.figure_style import LIGHT, WIDTH_IN, dress, new_figure, save_figure
+from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles
 
 Group = tuple[str, Sequence[Outcome]]

@@ -165,7 +165,7 @@ class RunView:
 
     @property
     def source_names(self) -> list[str]:
-        """Names of people, then of objects, and at the end of nobody."""
+        """Names of people, then of objects, and at the end what is of neither."""
         return [*self.snapshots.sources, "room or noise"]
 
     @property
