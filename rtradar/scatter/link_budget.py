@@ -19,7 +19,7 @@ from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
 from rtradar.scatter.inside_people import InsidePeople
-from rtradar.scatter.inside_walls import Inside
+from rtradar.scatter.inside_solids import Inside
 from rtradar.scatter.radar_axes import in_world
 from rtradar.scatter.validity import (
     Limit,

@@ -14,6 +14,7 @@ import pytest
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
+from rtradar.report.pages.comparison import _spread
 
 MODELS = ("analytic-paper", "analytic", "specular")
 
@@ -212,3 +213,11 @@ def test_a_capture_too_short_for_a_spectrogram_is_compared_without(
     page = (tmp_path / "out" / "compare.html").read_text()
     assert "Range-Doppler" in page
     assert page.count('src="data:image/png;base64,') == 4
+
+
+def test_colours_of_differences_end_at_those_of_echoes() -> None:
+    model, reference = np.full(100, -60.0), np.full(100, -60.0)
+    reference[:40], model[:40] = -20.0, -20.0 + np.linspace(0.0, 4.0, 40)
+    model[50] = -45.0  # below the floor, whatever it differs by
+    assert _spread(model, reference, -40.0) == pytest.approx(3.8)
+    assert _spread(model, reference, 0.0) == 0.0

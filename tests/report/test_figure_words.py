@@ -28,7 +28,7 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.report.figures import rooms, trainings
-from rtradar.report.figures.canvas import FieldUnit
+from rtradar.report.figures.canvas import FieldUnit, draw_view
 from rtradar.report.figures.plots import Plots
 from rtradar.report.figures.rooms import (
     GhostMark,
@@ -363,3 +363,12 @@ def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path
         gc.enable()
     assert figure.axes == []
     assert (tmp_path / "out.png").stat().st_size > 1000
+
+
+def test_a_map_of_cross_sections_says_what_it_does_to_echoes_of_elsewhere() -> None:
+    axes, level = new_figure(3.0).subplots(), np.zeros((3, 4))
+    grid = np.arange(4.0), np.arange(3.0)
+    for scale, said in ((1.0, False), (np.ones((3, 1)), True)):
+        view = None, (0.0, 2.0)
+        words = draw_view(axes, level, *grid, view, unit=FieldUnit("dBsm", scale))[1]
+        assert ("R^4" in words) == said

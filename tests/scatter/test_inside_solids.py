@@ -13,7 +13,7 @@ from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.inside_walls import Inside, objects_inside
+from rtradar.scatter.inside_solids import Inside, objects_inside
 from rtradar.scatter.link_budget import link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.system.registries import scene_files

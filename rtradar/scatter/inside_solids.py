@@ -19,7 +19,7 @@ _PELVIS = ("left hip", "right hip", "lower torso")
 _CONTACT_M = 0.02
 """Depth up to which the centre of a part touches a wall [m]: hands and feet in recordings do."""
 
-_FURNITURE_STEP = 10
+_MESH_STEP = 10
 """Instants to one at which furniture and objects are tested: a mesh takes long."""
 
 _INSTANTS = 10
@@ -60,12 +60,12 @@ class Inside:
             found = [part for part in pelvis if np.isfinite(self._first_s[number, part])]
             if found:
                 self._refuse(number, found)
-        at = np.arange(-self._instant % _FURNITURE_STEP, len(times), _FURNITURE_STEP)
+        at = np.arange(-self._instant % _MESH_STEP, len(times), _MESH_STEP)
         self._instant += len(times)
         for number, solid in enumerate(self._solids, start=len(self._scene.walls)):
             held = np.zeros(power.shape, dtype=bool)
             held[at] = solid.holds(times[at], poses.centres[at])
-            self._keep(number, times, held, power * _FURNITURE_STEP)
+            self._keep(number, times, held, power * _MESH_STEP)
 
     def _keep(self, number: int, times: Array, held: NDArray[np.bool_], power: Array) -> None:
         first = np.where(held, times[:, None], np.inf).min(axis=0, initial=np.inf)
@@ -138,10 +138,8 @@ class _Solid:
         found = found[:: -(-len(found) // _PLACES)]
         middle = (found.min(axis=0) + found.max(axis=0)) / 2
         rotation, place = self.moving.pose(times)
-        return (
-            np.einsum("tij,pj->tpi", rotation, middle + _SHRUNK * (found - middle))
-            + (place[:, None])
-        )
+        shrunk = middle + _SHRUNK * (found - middle)
+        return np.einsum("tij,pj->tpi", rotation, shrunk) + place[:, None]
 
 
 def objects_inside(scene: Scene, duration_s: float) -> list[Limit]:
