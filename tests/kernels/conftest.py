@@ -1,4 +1,4 @@
-"""What tests of kernels compile for themselves is forgotten after them, or the doctor would find it."""
+"""What tests of kernels compile is forgotten after them, or the doctor would find it."""
 
 from collections.abc import Iterator
 
