@@ -73,9 +73,17 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
 }
 """What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
 
+READ_AS = {
+    "up": "axis of the recording that is up: `x`, `y`, `z`, `-x`, `-y` or `-z`; found if left out",
+    "unit": "unit of its lengths: `m`, `cm`, `mm`, `in`, `cmu` or metres; as the file says, or found",
+    "rate_hz": "its frames a second [Hz]; as the file says",
+}
+"""Keys that say what a recording means."""
+
 OF_RECORDINGS = {
     "motion": "recording beside the scene file or below, or `synthetic:` and an activity",
     "skeleton": "the `.asf` of an `.amc`",
+    **READ_AS,
     "seed": "number of the subject of a synthetic actor; 0",
     "duration_s": "how long a synthetic actor moves [s]; 10",
 }
@@ -90,6 +98,10 @@ DATA_SET_KEYS = {
             "`[]`",
         ),
         "angles": ("`false` leaves spatial clouds empty, which saves the time of angles", "`true`"),
+        "skip_short": (
+            "`true` leaves out recordings that are too short for an interval, with a warning",
+            "`false`",
+        ),
         "folder": ("folder of the recordings, from the folder of this file", "`.`"),
     },
     "[windows]": {
@@ -163,6 +175,7 @@ DATA_SET_KEYS = {
             "must be given",
         ),
         "skeleton": ("the `.asf` of an `.amc`; may hold `{label}` and `{subject}`, too", ""),
+        **{key: (meaning, "") for key, meaning in READ_AS.items()},
         "label": ("activity; must be given unless `file` has `{label}`", "as in `file`"),
         "subject": ("who moves", "as in `file`, or `unknown`"),
         "licence": ("terms of the recording", "`unknown`"),
@@ -213,7 +226,9 @@ def keys(thing: type) -> str:
 
 
 def toml(value: object) -> str:
-    """A default as a TOML file has it."""
+    """A default as a TOML file has it; nothing where there is none."""
+    if value is None or value is inspect.Parameter.empty:
+        return ""
     if isinstance(value, str):
         return f'`"{value}"`'
     if isinstance(value, bool):
@@ -239,11 +254,12 @@ def scene_keys() -> str:
         }
         if table == "[[people]]":
             texts |= OF_RECORDINGS
+        texts["box"] = "lengths of a box along its x, y and z [m], in place of `mesh`"
         needed, others = KEYS[table]
         for key in (*needed, *others):
             name = prefix + key if prefix + key in parameters else key
             default = parameters[name].default if name in parameters else None
-            usual = "" if default is None else "must be given" if key in needed else toml(default)
+            usual = "must be given" if key in needed and name in parameters else toml(default)
             least, most = (toml(limit).strip("`") for limit in limits.get(key, (0, 0)))
             allowed = f"{least} to {most}" if key in limits else ""
             rows.append([f"`{table}`", f"`{key}`", texts[name], allowed, usual])
