@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ class Echoes:
         Body part (or wall) that each echo comes from.
     bounces : (echo,) int64
         Reflections on the way.
+    path : (echo,) int64, optional
+        Path over walls, a number among those of the model; 0, if left out, is the direct one.
 
     Raises
     ------
@@ -41,28 +43,33 @@ class Echoes:
     tx: NDArray[np.int64]
     part: NDArray[np.int64]
     bounces: NDArray[np.int64]
+    path: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
-        for field, kind in (("length", np.float64), ("amplitude", None), ("frequency", np.float64)):
-            object.__setattr__(self, field, np.asarray(getattr(self, field), dtype=kind))
-        for field in ("tx", "part", "bounces"):
-            object.__setattr__(self, field, np.asarray(getattr(self, field), dtype=np.int64))
+        for name, kind in (("length", np.float64), ("amplitude", None), ("frequency", np.float64)):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=kind))
+        for name in ("tx", "part", "bounces", "path"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.int64))
         if self.length.ndim != 3:
             raise ValueError(
                 f"Echoes.length has shape {self.length.shape}; it must be (chirp, rx, echo)"
             )
         chirps, _, echoes = self.length.shape
+        if not self.path.any():
+            # Whoever takes some of the echoes need not say again that all are direct.
+            object.__setattr__(self, "path", np.zeros(echoes, dtype=np.int64))
         expected = {
             "amplitude": (*self.frequency.shape, *self.length.shape),
             "frequency": (max(1, self.frequency.size),),
             "tx": (chirps,),
             "part": (echoes,),
             "bounces": (echoes,),
+            "path": (echoes,),
         }
-        for field, shape in expected.items():
-            if getattr(self, field).shape != shape:
+        for name, shape in expected.items():
+            if getattr(self, name).shape != shape:
                 raise ValueError(
-                    f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it "
+                    f"Echoes.{name} has shape {getattr(self, name).shape}; with this length it "
                     f"must be {shape}"
                 )
         if len(set(self.frequency.tolist())) < self.frequency.size:

@@ -115,8 +115,8 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     """Write a spatial cloud as a NumPy archive.
 
     The archive holds ``points (n, 3)``, ``velocity``, ``power`` and ``time (n,)``, ``axes`` and
-    ``units (3,)``, and ``source (n,) int64`` if the cloud has it. A coordinate that is not measured
-    is NaN in every point.
+    ``units (3,)``, and ``source`` and ``part (n,) int64`` if the cloud has them. A coordinate that
+    is not measured is NaN in every point.
 
     Parameters
     ----------
@@ -132,8 +132,9 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     """
     columns = [cloud.points, *(getattr(cloud, name)[:, None] for name in _EXTRA_UNITS)]
     names, units = (*SPATIAL_AXES, *_EXTRA_UNITS), (*SPATIAL_UNITS, *_EXTRA_UNITS.values())
-    more = {} if cloud.source is None else {"source": cloud.source}
-    write_npz(Path(path), CloudTable(names, units, np.concatenate(columns, axis=1)), **more)
+    who = {"source": cloud.source, "part": cloud.part}
+    known = {name: own for name, own in who.items() if own is not None}
+    write_npz(Path(path), CloudTable(names, units, np.concatenate(columns, axis=1)), **known)
 
 
 def write_npz(path: Path, cloud: CloudTable, **more: NDArray[Any]) -> dict[str, Any]:

@@ -43,6 +43,9 @@ class SpatialCloud:
     source : (n,) int64, optional
         Index of the person, or after them the object, that returned most of the cell, -1 for the
         room or nobody; None where that is not known.
+    part : (n,) int64, optional
+        Part that returned most of that, with the parts of all people first and then the objects; -1
+        as above.
 
     Raises
     ------
@@ -56,6 +59,7 @@ class SpatialCloud:
     power: NDArray[np.float64]
     time: NDArray[np.float64]
     source: NDArray[np.int64] | None = None
+    part: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         for field in ("points", "velocity", "power", "time"):
@@ -73,12 +77,14 @@ class SpatialCloud:
                     "every value must be finite, but for y or z not measured"
                 )
 
-        if self.source is not None:
-            source = np.asarray(self.source, dtype=np.int64)
-            object.__setattr__(self, "source", source)
-            if source.shape != (len(self.points),):
+        for field in ("source", "part"):
+            if getattr(self, field) is None:
+                continue
+            numbers = np.asarray(getattr(self, field), dtype=np.int64)
+            object.__setattr__(self, field, numbers)
+            if numbers.shape != (len(self.points),):
                 raise InputError(
-                    f"spatial cloud: source has shape {source.shape}; give one for each point"
+                    f"spatial cloud: {field} has shape {numbers.shape}; give one for each point"
                 )
 
     @property
@@ -89,10 +95,8 @@ class SpatialCloud:
     def strongest(self) -> SpatialCloud:
         """Return the points at most `SHOWN_DB` below the strongest one, for pictures."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
-        source = None if self.source is None else self.source[kept]
-        return SpatialCloud(
-            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept], source
-        )
+        given = {name: values[kept] for name, values in vars(self).items() if values is not None}
+        return SpatialCloud(**given)
 
 
 def measured_alone(points: NDArray[np.float64]) -> bool:
@@ -109,6 +113,7 @@ def spatial_points(
     radar: Radar,
     time_s: float,
     source: NDArray[np.int64] | None = None,
+    part: NDArray[np.int64] | None = None,
 ) -> SpatialCloud:
     """Make the points of one frame from the angle peaks of each detected cell.
 
@@ -126,8 +131,8 @@ def spatial_points(
         Radar at its position, turned as it is.
     time_s : float
         Centre of the frame [s].
-    source : (cell,) int64, optional
-        Who returned most of each cell.
+    source, part : (cell,) int64, optional
+        Who returned most of each cell, and by which part.
 
     Returns
     -------
@@ -148,7 +153,7 @@ def spatial_points(
         spectra.velocity[cell],
         (y.power[cell, rank] + z.power[cell, rank]) / 2,
         np.full(len(cell), time_s),
-        None if source is None else source[cell],
+        *(None if own is None else own[cell] for own in (source, part)),
     )
 
 
@@ -159,6 +164,7 @@ def points_of_sines(
     radar: Radar,
     time_s: float,
     source: NDArray[np.int64] | None = None,
+    part: NDArray[np.int64] | None = None,
 ) -> SpatialCloud:
     """Make the points of one frame from the direction of each detected cell.
 
@@ -172,7 +178,7 @@ def points_of_sines(
         Detected cells.
     power : (range, velocity) float
         Power summed over all channels.
-    radar, time_s, source
+    radar, time_s, source, part
         The same as for `spatial_points`.
 
     Returns
@@ -190,7 +196,7 @@ def points_of_sines(
         velocity[column[kept]],
         power[row[kept], column[kept]] / radar.n_channels,
         np.full(int(kept.sum()), time_s),
-        None if source is None else source[kept],
+        *(None if own is None else own[kept] for own in (source, part)),
     )
 
 

@@ -158,22 +158,33 @@ class Clouds(NamedTuple):
     ranges: SeenRanges | None
 
 
-class Frame(NamedTuple):
-    """One processed frame, centred at ``middle_s``.
+class CellSources(NamedTuple):
+    """Who returned most of some cells: ``source`` and ``part (cell,)``, -1 for the room or nobody.
 
-    ``power`` is its map (range, velocity) [m^2], ``mask`` marks the detections, ``angles`` are the
-    spectra of the detected cells, None if the radar measures no angle, and ``source`` (cell,) is
-    who returned most of each, None if that is not known.
+    Objects come after all people, and after all their parts.
     """
 
+    source: NDArray[np.int64]
+    part: NDArray[np.int64]
+
+
+class Frame(NamedTuple):
+    """One processed frame from ``start_cycle`` on, centred at ``middle_s``.
+
+    ``power`` is its map (range, velocity) [m^2], ``mask`` marks the detections, ``angles`` are the
+    spectra of the detected cells, None if the radar measures no angle, and ``sources`` say who
+    returned most of each, None if that is not known.
+    """
+
+    start_cycle: int
     middle_s: float
     power: NDArray[np.float32]
     mask: NDArray[np.bool_]
     angles: AngleSpectra | None
-    source: NDArray[np.int64] | None = None
+    sources: CellSources | None = None
 
 
-SourceOfCells = Callable[[int, NDArray[np.floating], NDArray[np.bool_]], NDArray[np.int64]]
+SourceOfCells = Callable[[int, NDArray[np.floating], NDArray[np.bool_]], CellSources]
 """Who returned most of each detected cell, by the first cycle, the map and the mask of a frame."""
 
 
@@ -196,7 +207,7 @@ class CloudMaker:
         self._sliding = SlidingWindows(radar)
         self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
         self._ranges = RangeSideLobes(processing.window_functions.range, radar.range_m)
-        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=7)
+        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=8)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
         self.max_chirps = step * max(1, int(_MAX_BYTES / step_bytes))
@@ -226,22 +237,24 @@ class CloudMaker:
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
                 self._ranges.add(power, mask)
-            angles = source = None
+            angles = sources = None
             if self._source_of is not None:
                 with stages.time("sources"):
-                    source = self._source_of(start, power, mask)
+                    sources = self._source_of(start, power, mask)
             if self._angles:
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
+                    given = radar, middle, *(sources or ())
                     found = (
-                        spatial_points(angles, radar, middle, source)
+                        spatial_points(angles, *given)
                         if sines is None
-                        else points_of_sines(sines, mask, power, radar, middle, source)
+                        else points_of_sines(sines, mask, power, *given)
                     )
-                    who = np.full(len(found.time), -1) if found.source is None else found.source
-                    columns = found.points, found.velocity, found.power, found.time, who
+                    nobody = np.full(len(found.time), -1)
+                    who = (nobody if own is None else own for own in (found.source, found.part))
+                    columns = found.points, found.velocity, found.power, found.time, *who
                     self._spatial.add(np.column_stack(columns))
-            yield Frame(middle, power, mask, angles, source)
+            yield Frame(start, middle, power, mask, angles, sources)
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
@@ -249,8 +262,8 @@ class CloudMaker:
             rdt = self._rdt.finish()
             rows = self._spatial.rows()
             rows = rows[np.argsort(rows[:, 5], kind="stable")]
-        source = None if self._source_of is None else rows[:, 6].astype(np.int64)
-        spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], source)
+        who = () if self._source_of is None else rows[:, 6:].astype(np.int64).T
+        spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], *who)
         return Clouds(rdt, spatial, self._spatial.n_seen, self._ranges.found())
 
 

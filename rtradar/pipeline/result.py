@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.echo_table import EchoTable
+from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
 from rtradar.report.figures.fitting import central_limits
@@ -72,7 +72,8 @@ class Result:
     link_budget: LinkBudget | None = None
     out: Path | None = None
     _in_memory: xr.Dataset | None = None
-    _capture: Capture | None = None
+    _truth: xr.Dataset | None = None
+    _table: EchoTable | None = None
 
     @cached_property
     def maps(self) -> xr.Dataset:
@@ -87,6 +88,23 @@ class Result:
             return self._in_memory
         assert self.out is not None
         return open_maps(self.out / "maps.h5")
+
+    @cached_property
+    def truth(self) -> xr.Dataset:
+        """What is true of each part of the people and of each object, at the times of the frames.
+
+        By ``time`` and ``part``: ``range_m`` and ``range_rate_mps`` of the direct echo, seen or
+        not, NaN of a part that has none at that level; its ``power_m2`` and whether it is
+        ``visible``; and by ``part`` the number of the ``person``, -1 of an object. An `InputError`
+        is raised for IF samples, whose echoes are not known, and if the file is not there any more.
+        """
+        if self._truth is not None:
+            return self._truth
+        if self.out is None or self.link_budget is None:
+            raise InputError(
+                "truth: of IF samples the echoes are not known; simulate them with rt.run"
+            )
+        return read_truth(self.out / "maps.h5")
 
     @cached_property
     def plot(self) -> Plots:
@@ -120,10 +138,17 @@ class Result:
         from rtradar.pipeline.view import assembled, load_run_view
         from rtradar.report.view.run_view import write_view
 
-        if self._capture is not None:
-            capture = self._capture
+        if self._table is not None:
+            capture = self._table.capture
             maps = {str(name): values.values for name, values in self.maps.variables.items()}
-            found = maps, snapshots(capture), self.points, self.spatial, self.radar, self.summary
+            found = (
+                maps,
+                snapshots(self._table),
+                self.points,
+                self.spatial,
+                self.radar,
+                self.summary,
+            )
             run_view = assembled(*found, capture.processing.window_functions)
         elif self.out is not None and self.link_budget is not None:
             run_view = load_run_view(self.out)

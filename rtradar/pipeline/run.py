@@ -9,8 +9,9 @@ from typing import Any, BinaryIO, Unpack
 
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.memory import refuse_large_maps
-from rtradar.pipeline.output.map_store import open_maps, read_maps
+from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
 from rtradar.pipeline.output.pictures import draw_pictures
 from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
@@ -19,7 +20,6 @@ from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write
 from rtradar.pipeline.prepare import Moving, check_radar, people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.sources import Sources
 from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
 from rtradar.pipeline.view import run_view_of
 from rtradar.radar import Radar
@@ -117,11 +117,12 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
     started, rays_before = _start()
     capture = prepare(motion, radar, scene, settings)
     file = BytesIO()
-    clouds = _stream(capture, file)
+    clouds, table = _stream(capture, file)
     summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
     with capture.stages.time("write"), open_maps(file) as maps:
         maps.load()
         _add_room(summary, capture, maps)
+        truth = read_truth(file)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
@@ -129,7 +130,8 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
         radar=capture.radar,
         link_budget=capture.link_budget,
         _in_memory=maps,
-        _capture=capture,
+        _truth=truth,
+        _table=table,
     )
 
 
@@ -149,7 +151,7 @@ def run_into(
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
-        clouds = _stream(capture, folder / "maps.h5", kept)
+        clouds, table = _stream(capture, folder / "maps.h5", kept)
         return_freed_memory()
         points = clouds.rdt.points
         with capture.stages.time("write"):
@@ -160,9 +162,8 @@ def run_into(
                 drawn = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
-        # Only now, for the echoes that the view asks for do not belong into the model's account.
         with capture.stages.time("view"):
-            save_snapshots(folder / "view.npz", snapshots(capture))
+            save_snapshots(folder / "view.npz", snapshots(table))
             with read_maps(folder / "maps.h5") as maps:
                 _add_room(summary, capture, maps)
         return_freed_memory()
@@ -206,9 +207,12 @@ def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
         summary["room"] = summary["room"] | room_findings(capture, maps)
 
 
-def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds:
-    """Stream a capture into a file of maps, and IF samples into an array; return its clouds."""
-    starts, source_of = capture.frame_starts, Sources(capture).of_cells
-    with RunWriter(maps, capture.processing, capture.title, starts, source_of) as writer:
+def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> tuple[Clouds, EchoTable]:
+    """Stream a capture into a file of maps, and IF samples into an array.
+
+    Returned are its clouds, and the table of its echoes.
+    """
+    table, starts = EchoTable(capture), capture.frame_starts
+    with RunWriter(maps, capture.processing, capture.title, starts, table) as writer:
         capture.stream(writer, kept)
-        return writer.finish(capture.body)
+        return writer.finish(capture.body), table

@@ -19,7 +19,7 @@ from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.inside_solids import objects_inside
-from rtradar.scatter.multipath.image_paths import wall_paths
+from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.radar_axes import MovingScene, in_radar_axes
@@ -61,6 +61,12 @@ class World:
         self._limits, self.variant = tuple(limits), person.variant
 
     @property
+    def path_names(self) -> tuple[str, ...]:
+        """Name of each path, by the number that an echo has of it: those of the people first."""
+        of_objects = (path.path.name for own in self.objects for path in own)
+        return tuple(dict.fromkeys((*path_names(self.person), *of_objects)))
+
+    @property
     def limits(self) -> tuple[Limit, ...]:
         """Limits of validity that the objects come near or go past."""
         of_paths = (limit for own in self.objects for path in own for limit in path.limits)
@@ -77,11 +83,12 @@ class World:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps, those of the people first."""
         chirps = np.asarray(chirps, dtype=np.int64)
-        found = [self.person.echoes(chirps)]
+        found, names = [self.person.echoes(chirps)], self.path_names
         for number, own in enumerate(self.objects, start=self._parts):
             for path in own:
                 echoes = path.echoes(chirps)
-                found.append(replace(echoes, part=echoes.part + number))
+                over = np.full(len(echoes.part), names.index(path.path.name))
+                found.append(replace(echoes, part=echoes.part + number, path=over))
         return together(found)
 
     def movers(self, n_chirps: int) -> list[tuple[float, float]]:
@@ -170,6 +177,11 @@ def build_world(
         for moving in scene.objects
     ]
     return World(model, len(body.part_names), objects, overlaps)
+
+
+def path_names(model: EchoModel) -> tuple[str, ...]:
+    """Return the name of each path of a model's echoes; without walls there is one."""
+    return model.path_names if isinstance(model, World | RoomModel) else (WallPath((), ()).name,)
 
 
 def model_of_people(model: EchoModel) -> EchoModel:

@@ -30,7 +30,8 @@ def maps(out: Path, **options: Any) -> dict[str, np.ndarray]:
     given = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
     rt.run(MOTION, RADAR, out=out, **given, **options)
     with h5py.File(out / "maps.h5") as file:
-        names = [name for name in file if file[name].ndim > 1 and file[name].dtype.kind == "f"]
+        stored = [name for name in file if isinstance(file[name], h5py.Dataset)]
+        names = [name for name in stored if file[name].ndim > 1 and file[name].dtype.kind == "f"]
         return {name: file[name][()] for name in names}
 
 

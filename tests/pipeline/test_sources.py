@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+import xarray as xr
 
 import rtradar as rt
+from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.sources import Sources
 from rtradar.scene import Wall, material
@@ -61,7 +63,8 @@ def test_expected_power_is_that_of_the_map() -> None:
     settings = RunSettings(duration_s=0.15, snr_db=60)
     capture = prepare(WALKER, RADAR, rt.Scene(), settings)
     start = int(capture.frame_starts[0])
-    expected = Sources(capture).expected(start, np.arange(RADAR.samples_per_chirp))[0]
+    of_parts = Sources(EchoTable(capture)).expected(start, np.arange(RADAR.samples_per_chirp))
+    expected = of_parts.sum(axis=0)
     found = result.maps["range_doppler"].values[0]
     strong = found > 1e-4 * found.max()
     ratio_db = 10 * np.log10(expected[strong] / found[strong])
@@ -100,6 +103,24 @@ def test_a_wall_is_the_rooms() -> None:
     assert (cloud.source[np.abs(cloud.velocity) > 1.0] == 0).mean() > 0.8
 
 
+def test_a_part_of_its_own_source_returns_most_of_a_cell(together: rt.Result) -> None:
+    """Of points near one hand and far from all other parts, that hand is the part."""
+    cloud, truth = together.spatial, together.truth
+    assert cloud.source is not None
+    assert cloud.part is not None
+    known = cloud.source >= 0
+    np.testing.assert_array_equal(known, cloud.part >= 0)
+    assert (truth["person"].values[cloud.part[known]] == cloud.source[known]).all()
+    range_m = np.linalg.norm(cloud.points - RADAR.position_m, axis=1)
+    of_frame = truth.sel(time=xr.DataArray(cloud.time), method="nearest")
+    away = np.abs(of_frame["range_m"].values - range_m[:, None]) / RADAR.range_bin_m
+    away += np.abs(of_frame["range_rate_mps"].values - cloud.velocity[:, None])
+    nearest, next_one = np.sort(away, axis=1)[:, :2].T
+    clear = known & (nearest < 1) & (next_one > 4)
+    assert clear.sum() > 100
+    assert (cloud.part[clear] == away.argmin(axis=1)[clear]).mean() > 0.95
+
+
 def test_an_object_comes_after_the_people() -> None:
     box = trimesh.creation.box((0.2, 0.2, 0.2))
     motion = rt.FollowingPath(velocity_mps=(1.5, 0.0, 0.0))
@@ -119,6 +140,6 @@ def test_who_returned_a_cell_does_not_depend_on_how_far_ahead_is_looked(
 ) -> None:
     found = []
     for ahead in (1, 8):
-        monkeypatch.setattr("rtradar.pipeline.sources._LOOKS_AHEAD", ahead)
+        monkeypatch.setattr("rtradar.pipeline.echo_table._LOOKS_AHEAD", ahead)
         found.append(rt.run([WALKER, KICKER], RADAR, duration_s=0.3).maps["source"].values)
     np.testing.assert_array_equal(*found)

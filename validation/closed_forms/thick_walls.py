@@ -344,7 +344,7 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                 ball = MovingEllipsoid(centre, (RADIUS_M,) * 3)
                 model = build_model("specular", radar, ball, scene=Scene(walls=(wall,)), order=2)
                 echoes = model.echoes(chirps)
-                names = np.array(model.path_names)
+                names = np.array(model.path_names)[echoes.path]
                 for path, sides in {
                     "left > body": (True, False),
                     "left > body > left": (True, True),

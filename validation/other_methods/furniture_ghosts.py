@@ -129,7 +129,8 @@ def simulated(scene: rt.Scene, centre: Array, name: str, order: int = 1) -> comp
     body = MovingEllipsoid(tuple(centre), (RADIUS,) * 3)
     model = build_model("specular", RADAR, body, scene=scene, variant="llvm", order=order)
     echoes = model.echoes(np.arange(1))
-    paths = getattr(model, "path_names", ("body",))
+    names = getattr(model, "path_names", ("body",))
+    paths = [names[path] for path in echoes.path]
     wanted = [path.startswith(f"body > {name}") if name else path == "body" for path in paths]
     middle = len(echoes.frequency) // 2
     turned = np.conj(echoes.amplitude[middle, 0, 0]) * np.exp(-1j * K * echoes.length[0, 0])

@@ -200,7 +200,7 @@ def bounce_rows(quick: bool) -> Iterator[Row]:
             "physical-optics", radar, body, scene=Scene(walls=(wall,)), order=2, facets=20480
         )
         echoes = model.echoes(np.array([0]))
-        names = np.array(model.path_names)
+        names = np.array(model.path_names)[echoes.path]
         found = field_of(echoes, np.array([frequency]))[0, 0, 0]
         at = body.at(np.array([0.5 * radar.chirp_interval_s]))
         bodies = rt.Ellipsoids(at.centres[0], at.frames[0], at.semi_axes)
@@ -242,7 +242,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
         options = {"rays_per_wavelength": 2.5} if fidelity == "rays" else {}
         model: Any = build_model(fidelity, radar, body, scene=scene, **options)
         echoes = model.echoes(chirps)
-        field, names = field_of(echoes, sweep), np.array(model.path_names)
+        field, names = field_of(echoes, sweep), np.array(model.path_names)[echoes.path]
         own = powers[fidelity] = {"all paths": power(field)}
         for name in sorted(set(names.tolist())):
             # Out over a wall or back over it: by reciprocity the same.

@@ -543,7 +543,7 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
         phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
         field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
         # The delays of slabs make several echoes of one path and part.
-        owned = list(zip(model.path_names, echoes.part.tolist(), strict=True))
+        owned = list(zip(echoes.path.tolist(), echoes.part.tolist(), strict=True))
         paths = sorted(
             {own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1}
         )

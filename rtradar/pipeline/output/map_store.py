@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
 from rtradar.errors import InputError
-from rtradar.pipeline.output.truth import TRUTH, truth_axes, truth_of
+from rtradar.pipeline.output.truth import OF_PARTS, TRUTH, Parts, truth_axes, truth_of
 from rtradar.system.files import LastingFile
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ _AXES = {
     ),
     "elevation": ("rad", "asin(z / r) in the radar's frame, positive upward"),
 }
+_TRUTH = "truth"
 _GROWING = ("time", "slow_time", "spectrogram_time")
 
 
@@ -84,7 +85,8 @@ class MapStore:
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
     becomes an attribute of their datasets, ``attributes`` those of the file. The maps ``left_out``
-    are not made. ``unit`` is that of the samples, whose square is that of powers.
+    are not made. ``unit`` is that of the samples, whose square is that of powers. For the ``parts``
+    there is a group ``truth``.
     """
 
     def __init__(
@@ -95,6 +97,7 @@ class MapStore:
         clutter_removal: Mapping[str, str] | None = None,
         left_out: Collection[str] = (),
         unit: str = "m",
+        parts: Parts | None = None,
     ) -> None:
         # The newest format indexes growing data in constant memory.
         self._owned, self._unit = isinstance(file, Path), unit
@@ -122,11 +125,32 @@ class MapStore:
             removal = (clutter_removal or {}).get(kind.axes[0], "none")
             said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
             self._describe(data, kind, clutter_removal=removal, **said)
+        if parts is not None:
+            self._make_truth(parts)
+
+    def _make_truth(self, parts: Parts) -> None:
+        """Make the group of what is true of each part, with axes of its own."""
+        self._scale(f"{_TRUTH}/time", data=np.zeros(0), maxshape=(None,), chunks=(1024,))
+        self._names(f"{_TRUTH}/part", parts.names)
+        axes, n_parts = (f"{_TRUTH}/time", f"{_TRUTH}/part"), len(parts.names)
+        for name, (dtype, unit, meaning) in OF_PARTS.items():
+            options = {"maxshape": (None, n_parts), "chunks": (_STEPS_A_CHUNK, n_parts)}
+            data = self._file.create_dataset(f"{_TRUTH}/{name}", (0, n_parts), dtype, **options)
+            self._describe(data, _Map(axes, meaning, dtype, unit))
+        data = self._file.create_dataset(f"{_TRUTH}/person", data=parts.person)
+        self._describe(data, _Map(axes[1:], "number of the person; -1: an object", np.int64, "1"))
 
     def _scale(self, name: str, **options: Any) -> None:
-        axis = self._file.create_dataset(name, **options)
-        axis.make_scale(name)
-        axis.attrs["units"], axis.attrs["long_name"] = _AXES[name]
+        axis, own = self._file.create_dataset(name, **options), name.rpartition("/")[2]
+        axis.make_scale(own)
+        axis.attrs["units"], axis.attrs["long_name"] = _AXES[own]
+
+    def _names(self, name: str, names: Sequence[str]) -> None:
+        """Make an axis of names."""
+        own = name.rpartition("/")[2]
+        axis = self._file.create_dataset(name, data=list(names), dtype=h5py.string_dtype())
+        axis.make_scale(own)
+        axis.attrs.update({"units": "1", "long_name": f"name of the {own}"})
 
     def _describe(self, data: Any, kind: _Map, **attributes: Any) -> None:
         unit = f"{self._unit}2" if kind.unit == "m2" else kind.unit
@@ -140,12 +164,16 @@ class MapStore:
         They wait until there are some megabytes, for HDF5 takes as long for one step as for many.
         """
         for name, added in ((axis, values), *maps.items()):
-            kind = _MAPS[name].dtype if name in _MAPS else np.float64
-            steps: NDArray[Any] = np.array(added, dtype=kind)
+            steps: NDArray[Any] = np.array(added, dtype=self._file[name].dtype)
             self._waiting.setdefault(name, []).append(steps)
             self._waiting_bytes += steps.nbytes
         if self._waiting_bytes >= _MOST_WAITING:
             self._write()
+
+    def extend_truth(self, time_s: float, of_parts: Mapping[str, NDArray[Any]]) -> None:
+        """Append the arrays (part,) of `OF_PARTS` at a time to the group ``truth``."""
+        added = {f"{_TRUTH}/{name}": values[None] for name, values in of_parts.items()}
+        self.extend(f"{_TRUTH}/time", [time_s], **added)
 
     def _write(self) -> None:
         for name, added in self._waiting.items():
@@ -166,9 +194,7 @@ class MapStore:
         """Write what is true of each person of a body at the times of the frames."""
         self._write()
         for name, names in truth_axes(body).items():
-            axis = self._file.create_dataset(name, data=list(names), dtype=h5py.string_dtype())
-            axis.make_scale(name)
-            axis.attrs.update({"units": "1", "long_name": f"name of the {name}"})
+            self._names(name, names)
         for name, values in truth_of(body, self._file["time"][:]).items():
             axes, unit, meaning = TRUTH[name]
             data = self._file.create_dataset(name, data=values)
@@ -198,11 +224,21 @@ def open_maps(file: Path | BinaryIO) -> xr.Dataset:
 
     An `InputError` is raised if the file is not there any more, or is damaged.
     """
+    return _opened(file)
+
+
+def read_truth(file: Path | BinaryIO) -> xr.Dataset:
+    """Read what is true of each part, the group ``truth``; errors as of `open_maps`."""
+    with _opened(file, _TRUTH) as truth:
+        return truth.load().assign(visible=truth["visible"].astype(bool))
+
+
+def _opened(file: Path | BinaryIO, group: str | None = None) -> xr.Dataset:
     import xarray as xr  # slow to import
 
     try:
         # Values as they are stored: times are numbers of seconds, and 0 is no missing power.
-        return xr.open_dataset(file, engine="h5netcdf", decode_cf=False)
+        return xr.open_dataset(file, engine="h5netcdf", decode_cf=False, group=group)
     except (OSError, ValueError, KeyError) as error:
         raise InputError(
             f"'{file}' cannot be read as the maps of a run ({error}); make it anew with rt.run"

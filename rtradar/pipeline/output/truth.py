@@ -1,12 +1,16 @@
-"""What is true of each person at the times of a run's frames: place, speed and joints."""
+"""What is true of each person and each part at the times of a run's frames."""
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.motion.skeleton import NODES
+from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.echo_table import EchoTable
 
 TRUTH = {
     "person_position": (("time", "person", "coordinate"), "m", "root of each person, world"),
@@ -15,7 +19,51 @@ TRUTH = {
 }
 """Arrays that `truth_of` gives, with their axes, units and meanings."""
 
+OF_PARTS = {
+    "range_m": (np.float64, "m", "half the length of the direct echo, seen or not"),
+    "range_rate_mps": (np.float64, "m/s", "rate of that range, positive receding"),
+    "power_m2": (np.float64, "m2", "power of the direct echo, mean over the receivers"),
+    "visible": (np.uint8, "1", "1 where any of the direct echo is seen"),
+}
+"""Arrays (time, part) of the group ``truth``: their types, units and meanings."""
+
 _STEP_S = 0.01
+
+
+class Parts(NamedTuple):
+    """The parts of all people and then the objects: ``names`` and the number of the ``person``.
+
+    The person of an object is -1.
+    """
+
+    names: tuple[str, ...]
+    person: NDArray[np.int64]
+
+
+def parts_of(capture: Capture) -> Parts:
+    """Return the parts of everyone and everything that moves in a capture."""
+    body, objects = capture.body, capture.scene.objects
+    names = *body.part_names, *(one.name for one in objects)
+    return Parts(names, np.append(body.owner, np.full(len(objects), -1)))
+
+
+def truth_of_parts(table: EchoTable, start_cycle: int, time_s: float) -> dict[str, NDArray[Any]]:
+    """Return the arrays (part,) of `OF_PARTS` at the middle of a frame, which is at ``time_s``."""
+    look, n_parts = table.middle(start_cycle), len(parts_of(table.capture).names)
+    direct = np.flatnonzero((look.bounces == 1) & (look.path == 0))
+    part, power = look.part[direct], look.power_m2[direct]
+    total = np.bincount(part, power, n_parts)
+    weight = np.where(total[part] > 0, power, 1.0)
+    sums = np.bincount(part, weight, n_parts)
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        added = np.bincount(part, weight * values[direct], n_parts)
+        return np.divide(added, sums, out=np.full(n_parts, np.nan), where=sums > 0)
+
+    rate = mean(look.rate_mps)
+    range_m = mean(look.range_m) + (time_s - look.time_s) * rate
+    found = {"range_m": range_m, "range_rate_mps": rate, "power_m2": total, "visible": total > 0}
+    return {name: own.astype(OF_PARTS[name][0]) for name, own in found.items()}
 
 
 def truth_axes(body: Body) -> dict[str, tuple[str, ...]]:

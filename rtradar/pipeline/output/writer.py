@@ -14,16 +14,18 @@ from rtradar.body import Body
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import MapStore
+from rtradar.pipeline.output.truth import parts_of, truth_of_parts
 from rtradar.pipeline.processing import (
     RANGE_TIME_S,
     CloudMaker,
     Clouds,
     Processing,
-    SourceOfCells,
     block_chirps,
     frame_angles,
 )
+from rtradar.pipeline.sources import Sources
 from rtradar.process import (
     SlidingRangeTime,
     angle_grid,
@@ -65,11 +67,11 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
 class RunWriter:
     """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
-    A path, whose file is replaced, or an open file may be given. ``source_of`` tells who returned
-    most of a cell, where that is known. If clutter is removed, the map of
-    the middle one of ``frame_starts``, first cycles of the frames, is also kept as it was before;
-    of none if they are left out. So that memory stays low, `push` takes at most ``max_chirps``
-    chirps.
+    A path, whose file is replaced, or an open file may be given. Where a ``table`` of echoes is
+    known, cells have their source, and what is true of each part is written too. If clutter is
+    removed, the map of the middle one of ``frame_starts``, first cycles of the frames, is also kept
+    as it was before; of none if they are left out. So that memory stays low, `push` takes at most
+    ``max_chirps`` chirps.
     """
 
     def __init__(
@@ -78,11 +80,11 @@ class RunWriter:
         processing: Processing,
         title: str,
         frame_starts: Sequence[int] | NDArray[np.int64] = (),
-        source_of: SourceOfCells | None = None,
+        table: EchoTable | None = None,
     ) -> None:
-        self._processing = processing
+        self._processing, self._table = processing, table
         radar, removal = processing.radar, processing.removal
-        self._clouds = CloudMaker(processing, source_of)
+        self._clouds = CloudMaker(processing, None if table is None else Sources(table).of_cells)
         self._spectrogram = processing.spectrogram()
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.max_chirps = self._clouds.max_chirps
@@ -100,9 +102,10 @@ class RunWriter:
         self._received = None
         if len(frame_starts) and removed["time"] != "none":
             self._received = ReceivedFrame(radar, int(frame_starts[len(frame_starts) // 2]))
-        left_out = () if source_of is not None else ("source",)
+        left_out = ("source",) if table is None else ()
         said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
-        self._store = MapStore(file, axes, said, removed, left_out, processing.unit)
+        parts = None if table is None else parts_of(table.capture)
+        self._store = MapStore(file, axes, said, removed, left_out, processing.unit, parts)
 
     def __enter__(self) -> RunWriter:
         return self
@@ -128,15 +131,18 @@ class RunWriter:
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
         for frame in self._clouds.frames(spectra):
             maps = {"range_doppler": frame.power, "detections": frame.mask}
-            if frame.source is not None:
+            if frame.sources is not None:
                 maps["source"] = np.full(frame.mask.shape, -1, dtype=np.int16)
-                maps["source"][frame.mask] = frame.source
+                maps["source"][frame.mask] = frame.sources.source
             with stages.time("angle"):
                 if frame.angles:
                     maps |= self._angle_maps(frame.angles)
             with stages.time("write"):
                 added = {name: values[None] for name, values in maps.items()}
                 store.extend("time", [frame.middle_s], **added)
+                if self._table is not None:
+                    of_parts = truth_of_parts(self._table, frame.start_cycle, frame.middle_s)
+                    store.extend_truth(frame.middle_s, of_parts)
 
     def _angle_maps(self, angles: Any) -> dict[str, NDArray[Any]]:
         makers = {"azimuth": range_azimuth, "elevation": range_elevation}

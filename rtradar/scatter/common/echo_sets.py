@@ -40,6 +40,7 @@ def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
         amplitude=echoes.amplitude[..., some],
         part=echoes.part[some],
         bounces=echoes.bounces[some],
+        path=echoes.path[some],
     )
 
 
@@ -79,4 +80,5 @@ def together(several: Sequence[Echoes]) -> Echoes:
         tx=first.tx,
         part=np.concatenate([own.part for own in several]),
         bounces=np.concatenate([own.bounces for own in several]),
+        path=np.concatenate([own.path for own in several]),
     )

@@ -44,12 +44,11 @@ def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
     slope = np.linalg.pinv(places - places.mean(axis=0), rcond=1e-6)[0] @ echoes.length[0]
     azimuth = np.arcsin(np.clip(-slope, -1, 1))
     values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
-    names = np.array(model.path_names)
     found = []
-    for path in dict.fromkeys(model.path_names):
-        own = (names == path) & (echoes.bounces > 1) & (power > 0)
+    for path in dict.fromkeys(echoes.path.tolist()):
+        own = (echoes.path == path) & (echoes.bounces > 1) & (power > 0)
         if own.any():
             total = float(power[own].sum())
             range_m, rate_mps, angle = (values[:, own] @ (power[own] / total)).tolist()
-            found.append(Ghost(path, range_m, rate_mps, angle, total))
+            found.append(Ghost(model.path_names[path], range_m, rate_mps, angle, total))
     return found

@@ -136,7 +136,6 @@ class RoomModel:
         self.person = over_legs(conductor, radar, body, materials)
         self._fast = bool(getattr(conductor, "fast_over_walls", False))
         self._models: dict[int, EchoModel] = {0: conductor}
-        self._column = np.empty(0, dtype=np.int64)
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
@@ -224,11 +223,8 @@ class RoomModel:
 
     @property
     def path_names(self) -> tuple[str, ...]:
-        """Path of each echo that `echoes` gave last; before `prune`, more may come."""
-        columns = self._columns
-        which = np.arange(len(columns)) if self._fast else self._column
-        paths = columns.path[np.array(columns.echo)[which]]
-        return tuple(self.paths[path].name for path in paths)
+        """Name of each path, by the number that an echo has of it."""
+        return tuple(path.name for path in self.paths)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the direct echoes did."""
@@ -302,6 +298,7 @@ class RoomModel:
             tx=at.tx_index,
             part=columns.part[echo],
             bounces=bounces[echo],
+            path=columns.path[echo],
         )
 
     @property
@@ -339,7 +336,7 @@ class RoomModel:
         nodes = self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         in_threads(path_amplitudes, len(extra), np.ones(extra.shape), *factors, blend, left)
-        found, numbers = [], []
+        found = []
         for path in np.unique(columns.path[echo]).tolist():
             own = self._model(path).echoes(chirps)
             # Each of its echoes in each column of its part.
@@ -351,10 +348,9 @@ class RoomModel:
                     times_factor(take(own, which), *factor),
                     length=own.length[..., which] + extra[..., column],
                     bounces=own.bounces[which] + self.paths[path].order,
+                    path=np.full(len(which), path),
                 )
             )
-            numbers.append(column)
-        self._column = np.concatenate(numbers)
         return together(found)
 
     def _model(self, path: int) -> EchoModel:

@@ -15,6 +15,8 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.body.people import body_of_people
 from rtradar.motion import place
+from rtradar.pipeline import echo_table
+from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.output import snapshots as module
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.scatter import build_model
@@ -59,7 +61,7 @@ def look(
         model=model, radar=RADAR, body=body, scene=scene or Scene(),
         frame_starts=chosen, n_chirps=N_CHIRPS,
     )  # fmt: skip
-    return snapshots(capture)
+    return snapshots(EchoTable(capture))
 
 
 def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres: Body) -> None:
@@ -181,7 +183,7 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
 def test_long_captures_and_rich_rooms_keep_no_more(
     spheres: Body, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "MAX_STEPS", 4)
+    monkeypatch.setattr(echo_table, "MAX_SHOWN", 4)
     monkeypatch.setattr(module, "MAX_ECHOES", 25)
     scene = Scene(name="one wall", walls=(WALL,))
     found = look(spheres, build_model("analytic", RADAR, spheres, scene=scene), scene)
