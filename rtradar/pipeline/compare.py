@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +18,12 @@ from scipy.special import stdtrit
 
 from rtradar.body import Person
 from rtradar.errors import InputError
+from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.labelled_echoes import compared_echoes
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.pipeline.prepare import Moving, power_alone
+from rtradar.pipeline.prepare import Moving, power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.pipeline.view import load_run_view
@@ -37,6 +40,9 @@ from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings
 from rtradar.system.checks import check_path
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles, atomic_folder
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MEASURES = (
     # key, heading, digits
@@ -88,6 +94,24 @@ class Comparison:
     summary: dict[str, Any]
     out: Path
     measures: tuple[tuple[str, str, int], ...] = MEASURES
+    _captures: Callable[[], Mapping[str, Capture]] | None = None
+
+    @cached_property
+    def echoes(self) -> xr.Dataset:
+        """The echoes of the people and objects by each level, part by part, and how they differ.
+
+        By ``fidelity``, ``chirp``, ``rx`` and ``part``, in some 40 TDM cycles of the recording:
+        ``length_m``, the mean length of the paths, weighted by power, NaN where nothing is seen
+        [m]; ``field_m``, the complex sum of the echoes at the centre of the sweep [m]; and
+        ``length_difference_m`` and ``field_difference_m`` from the reference. They are computed at
+        the first access. An `InputError` is raised for a comparison of several recordings or of
+        folders, which knows no echoes.
+        """
+        if self._captures is None:
+            raise InputError(
+                "echoes: known of one recording that is compared by levels, rt.compare(...)"
+            )
+        return compared_echoes(self._captures(), self.summary["reference"])
 
     def table(self) -> str:
         """Return the figures as aligned text, one column for each model."""
@@ -144,7 +168,7 @@ def compare(
     check_fidelities(names)
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
-    settings = settings_of("compare", RunOptions, options)
+    asked = settings = settings_of("compare", RunOptions, options)
     kind = files_of_runs("compare.json", _FILES, list(MODELS))
     with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
         scene = Scene() if scene is None else scene
@@ -167,7 +191,14 @@ def compare(
             folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
         )
         write_figures(folder, summary, kind)
-    return Comparison(summary, Path(out))
+
+    def captures() -> dict[str, Capture]:
+        return {
+            name: prepare(motion, radar, scene or Scene(), replace(asked, fidelity=name))
+            for name in names
+        }
+
+    return Comparison(summary, Path(out), _captures=captures)
 
 
 def compare_recordings(

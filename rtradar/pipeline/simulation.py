@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.labelled_echoes import chirps_between, labelled_echoes
 from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import block_chirps
@@ -123,6 +124,43 @@ class Simulation:
         for begin, values in self._blocks():
             whole[begin : begin + len(values)] = values
         return if_samples(whole, self.radar)
+
+    def echoes(self, start_s: float = 0.0, duration_s: float | None = None) -> xr.Dataset:
+        """Compute the echoes of each chirp by the level of the simulation: what was traced.
+
+        Parameters
+        ----------
+        start_s : float
+            Time from which on chirps are taken, since the start of the capture [s].
+        duration_s : float, optional
+            Time over which they are taken [s]; to the end of the capture if left out.
+
+        Returns
+        -------
+        xarray.Dataset
+            By ``chirp``, ``rx`` and ``echo``: ``length_m``, the length of the whole path from Tx to
+            Rx at the centre of the chirp [m], float64; ``amplitude``, as `rtradar.Echoes` defines
+            it, at the centre of the sweep [m], complex128; and ``visible``, whether it is not 0.
+            Coordinates are the ``time`` [s] and the number ``tx`` of each chirp, and of each echo
+            the names of its ``part`` and ``path``, the number of the ``person``, -1 of an object,
+            and the number of its ``bounces``.
+
+        Raises
+        ------
+        InputError
+            If no chirp is in that time, or the echoes take more memory than results may.
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> motion = rt.synthetic_motion("kick", duration_s=0.5)
+        >>> radar = rt.Radar.preset("paper-12ghz")
+        >>> capture = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.15)
+        >>> echoes = capture.echoes(duration_s=0.01)
+        >>> dict(echoes.sizes)
+        {'chirp': 160, 'rx': 8, 'echo': 21}
+        """
+        return labelled_echoes(self._capture, chirps_between(self._capture, start_s, duration_s))
 
     def blocks(self) -> Iterator[xr.DataArray]:
         """Compute the samples in blocks of chirps, in constant memory.
