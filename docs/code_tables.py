@@ -75,7 +75,7 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
 
 READ_AS = {
     "up": "axis of the recording that is up: `x`, `y`, `z`, `-x`, `-y` or `-z`; found if left out",
-    "unit": "unit of its lengths: `m`, `cm`, `mm`, `in`, `cmu` or metres; as the file says, or found",
+    "unit": "unit of its lengths: `m`, `cm`, `mm`, `in`, `cmu` or metres; found if left out",
     "rate_hz": "its frames a second [Hz]; as the file says",
 }
 """Keys that say what a recording means."""

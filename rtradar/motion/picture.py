@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from rtradar.motion.display import poses
-from rtradar.motion.motion import Motion
 from rtradar.system.figure_style import (
     LIGHT,
     STYLE,
@@ -24,6 +23,9 @@ from rtradar.system.figure_style import (
     theme_of,
     write_heading,
 )
+
+if TYPE_CHECKING:
+    from rtradar.motion.motion import Motion
 
 _POSES, _PATH_POSES = 6, 400
 """Numbers of skeletons, and of points of the root's path."""

@@ -18,6 +18,12 @@ AS_PAPER: RunOptions = {
 }
 """Options of `rtradar.run` that the paper chose; `paper_warnings` says which are faults."""
 
+SIZES = ("500", "1000", "2000", "3000")
+"""Points of a cloud, the columns of table 4."""
+
+CURVES = ("train_loss", "train_accuracy", "test_loss", "test_accuracy")
+"""What is kept of each epoch of a training."""
+
 
 def paper_warnings() -> tuple[str, ...]:
     """Say what is wrong with the choices of `AS_PAPER`, and which faults are not repeated.

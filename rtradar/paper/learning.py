@@ -9,15 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from rtradar.paper.choices import CURVES, SIZES
 from rtradar.paper.sources import Sources
 from rtradar.report.figures.trainings import draw_confusion, draw_learning
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
-
-SIZES = ("500", "1000", "2000", "3000")
-"""Points of a cloud, the columns of table 4."""
-
-CURVES = ("train_loss", "train_accuracy", "test_loss", "test_accuracy")
-"""What is kept of each epoch of a training."""
 
 
 def stored_result() -> dict[str, Any]:

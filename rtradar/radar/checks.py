@@ -15,7 +15,7 @@ from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, is_real, is_whole
 
 if TYPE_CHECKING:
-    from rtradar.radar.radar import Radar
+    from rtradar.radar.powers import Powers
 
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
@@ -169,7 +169,7 @@ FIELD_RULES: dict[str, FieldRule] = {
 """The rule of each field by itself, in the order in which they are checked."""
 
 
-def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
+def _rules(r: Powers) -> Iterator[tuple[Any, str]]:
     """Yield whether fields fit each other, and the complaint where they do not, one by one."""
     yield (
         r.n_tx and (r.rx_positions_m or r.rx_y + r.rx_z),
@@ -238,7 +238,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _beam_terms(r: Radar) -> float:
+def _beam_terms(r: Powers) -> float:
     """Beams of a grid four times as fine as the array resolves, times its elements."""
     if r.tx_positions_m is None or r.rx_positions_m is None:
         return 0.0
@@ -248,7 +248,7 @@ def _beam_terms(r: Radar) -> float:
     return float(np.prod(np.where(size > 0, 8 * size + 3, 1)) * len(places[0]) * len(places[1]))
 
 
-def _path_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+def _path_rules(r: Powers) -> Iterator[tuple[Any, str]]:
     """Yield the rules of a radar that moves, as `_rules` does."""
     path = tuple(own for own in (r.path_m, r.path_angles_deg) if own is not None)
     yield (
@@ -266,7 +266,7 @@ def _path_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+def _multiplexing_rules(r: Powers) -> Iterator[tuple[Any, str]]:
     """Yield the rules that fit the Tx to how they are told apart, as `_rules` does."""
     yield (
         r.carrier_step_hz is None or r.multiplexing == "fdm",
@@ -305,7 +305,7 @@ def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _receiver_rules(r: Radar) -> Iterator[tuple[Any, str]]:
+def _receiver_rules(r: Powers) -> Iterator[tuple[Any, str]]:
     """Yield the rules that fit a receiver to its radar, as `_rules` does."""
     if r.receiver is None:
         return
@@ -366,7 +366,7 @@ def _meant(field: str, value: Any, rule: FieldRule) -> str:
     return ""
 
 
-def check_rules(radar: Radar) -> None:
+def check_rules(radar: Powers) -> None:
     """Refuse a radar whose fields do not fit each other, by the first rule that fails."""
     for holds, complaint in _rules(radar):
         if not holds:

@@ -8,7 +8,6 @@ file with the fields of `Radar` as its keys needs no code.
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
-from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError
 from rtradar.radar import display
 from rtradar.radar.array import Places
 from rtradar.radar.checks import check_rules, checked_fields
-from rtradar.radar.schedule import FollowingCount, Schedule
+from rtradar.radar.powers import Powers
+from rtradar.radar.schedule import FollowingCount
 from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, printable
 from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table
@@ -36,7 +35,7 @@ register_radar = PRESETS.register
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Radar(Schedule):
+class Radar(Powers):
     r"""A MIMO FMCW radar with a cross of two linear arrays, or antennas anywhere.
 
     Antennas of a cross are numbered along the y-line first, then along the z-line; the index rises
@@ -331,7 +330,7 @@ class Radar(Schedule):
         """
         from rtradar.radar.ti_cfg import read_ti_cfg
 
-        return read_ti_cfg(path, board).radar
+        return read_ti_cfg(path, board, preset=cls.preset).radar
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the array, and beside it the ranges and velocities that it can measure.
@@ -378,37 +377,3 @@ class Radar(Schedule):
         pose = dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), (angles % 360).tolist(), strict=True))
         still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
         return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)
-
-    # -- powers (derived) --------------------------------------------------------------------------
-
-    @property
-    def watts_per_m2(self) -> float:
-        r"""Received power [W] of an echo with \|amplitude\|^2 = 1 m^2.
-
-        P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest. An `InputError` is raised where
-        the radar does not state its transmit power.
-        """
-        power_dbm = self._stated("transmit_power_dbm", "powers in watts are not known")
-        antennas = (self.tx_antenna, self.rx_antenna)
-        gains = math.prod(antenna.peak_gain for antenna in antennas if antenna is not None)
-        power_w = 1e-3 * 10 ** (power_dbm / 10)
-        return float(power_w * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
-
-    @property
-    def noise_power_w(self) -> float:
-        """Noise power of one complex IF sample, K (T + 290 K (F - 1)) B [W].
-
-        T is the `noise_temperature_k` of what the antennas see, F the noise factor, which is
-        defined for a source at 290 K, and B the sample rate. An `InputError` is raised where the
-        radar does not state its noise figure.
-        """
-        figure_db = self._stated("noise_figure_db", "its noise is not known")
-        receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (figure_db / 10) - 1)
-        noise_k = self.noise_temperature_k + receiver_k
-        return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
-
-    def _stated(self, field: str, otherwise: str) -> float:
-        value: float | None = getattr(self, field)
-        if value is None:
-            raise InputError(f"radar '{self.name}' does not state {field}, so {otherwise}; give it")
-        return value

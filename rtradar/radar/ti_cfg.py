@@ -11,15 +11,17 @@ import dataclasses
 import math
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, NoReturn
+from typing import Any, Generic, Literal, NamedTuple, NoReturn, TypeVar
 
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.radar.radar import Radar
+from rtradar.radar.powers import Powers
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import read_bytes
+
+_Radar = TypeVar("_Radar")
 
 _MOST_BYTES, _MOST_CHIRPS = 1_000_000, 512
 
@@ -120,20 +122,22 @@ class _Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TiProfile:
+class TiProfile(Generic[_Radar]):
     """What a configuration file says: the radar, and how its samples leave the chip.
 
     ``real``, ``q_first`` and ``rx_mask`` are those of `rtradar.exchange.Dca1000Layout`.
     """
 
-    radar: Radar
+    radar: _Radar
     real: bool
     q_first: bool
     rx_mask: int
 
 
-def read_ti_cfg(path: str | Path, board: str | None = None) -> TiProfile:
-    """Read a configuration file; see `Radar.from_ti_cfg`."""
+def read_ti_cfg(
+    path: str | Path, board: str | None = None, *, preset: Callable[[str], _Radar]
+) -> TiProfile[_Radar]:
+    """Read a configuration file; see `Radar.from_ti_cfg`. A board is made by ``preset``."""
     path = Path(path)
     commands, platform = _commands(path)
     low_power = "chirpComnCfg" in commands
@@ -142,16 +146,20 @@ def read_ti_cfg(path: str | Path, board: str | None = None) -> TiProfile:
             raise InputError(f"profile '{path}' has no {command}; it must say it")
     try:
         if low_power:
-            return _read_low_power(path, commands, platform, board)
-        return _read(path, commands, platform, board)
+            return _read_low_power(path, commands, platform, board, preset)
+        return _read(path, commands, platform, board, preset)
     except InputError as error:
         text = str(error)
         raise InputError(text if str(path) in text else f"profile '{path}': {text}") from None
 
 
 def _read(
-    path: Path, commands: dict[str, list[_Line]], platform: str | None, board: str | None
-) -> TiProfile:
+    path: Path,
+    commands: dict[str, list[_Line]],
+    platform: str | None,
+    board: str | None,
+    preset: Callable[[str], Any],
+) -> TiProfile[Any]:
     """Read the commands of the mmWave SDK."""
     mode = commands.get("dfeDataOutputMode", [])
     if mode and mode[-1].values[0] != 1:
@@ -159,7 +167,7 @@ def _read(
     frame, channels, adc = (commands[one][-1] for one in ("frameCfg", "channelCfg", "adcCfg"))
     sequence = _sequence(commands, frame, channels)
     order, profile = sequence.order, sequence.profile
-    base = Radar.preset(board or _board(path, commands, platform, profile.values[1]))
+    base = preset(board or _board(path, commands, platform, profile.values[1]))
     most_tx, most_rx = base.n_tx, base.n_rx
     rx_mask = channels.whole(0, 1, 2**most_rx - 1, "the mask of Rx")
     if max(order) >= most_tx:
@@ -197,14 +205,18 @@ def _read(
 
 
 def _read_low_power(
-    path: Path, commands: dict[str, list[_Line]], platform: str | None, board: str | None
-) -> TiProfile:
+    path: Path,
+    commands: dict[str, list[_Line]],
+    platform: str | None,
+    board: str | None,
+    preset: Callable[[str], Any],
+) -> TiProfile[Any]:
     """Read the commands of the low-power chips (xWRL), whose samples are real."""
     common, timing, frame, channels = (commands[one][-1] for one in _NEEDED_LOW_POWER)
     name = (platform or "").lower()
     if len(frame.values) != 6:
         frame.refuse(f"frameCfg of a low-power chip has {len(frame.values)} values, not 6")
-    base = Radar.preset(board or _BOARDS.get(name, "iwrl6432"))
+    base = preset(board or _BOARDS.get(name, "iwrl6432"))
     large = "684" in name
     tx_places, rx_places = base.tx_positions_m, base.rx_positions_m
     if "antGeometryCfg" in commands:
@@ -291,7 +303,7 @@ def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places
     return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
 
 
-def _pose(commands: dict[str, list[_Line]], base: Radar) -> dict[str, Any]:
+def _pose(commands: dict[str, list[_Line]], base: Powers) -> dict[str, Any]:
     """Height and tilt of the sensor where a file says them; beneath a ceiling it is above x = 0."""
     if "sensorPosition" not in commands:
         return {}
@@ -482,7 +494,7 @@ def _board(
     return board
 
 
-def _power(board: Radar, profile: _Line, tx: Sequence[int]) -> float | None:
+def _power(board: Powers, profile: _Line, tx: Sequence[int]) -> float | None:
     """Transmit power less the back-off, which has a byte for each Tx [dBm]."""
     code = profile.whole(5, 0, 2**32 - 1, "the power back-off")
     backoff_db = {code >> 8 * one & 0xFF for one in tx}

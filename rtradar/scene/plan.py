@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene.objects import Wall
-from rtradar.scene.scene import Scene
 from rtradar.system.checks import brief, printable
 from rtradar.system.figure_labels import Label, around, place_labels
 from rtradar.system.figure_style import (
@@ -26,6 +25,8 @@ from rtradar.system.figure_style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from rtradar.scene.scene import Scene
 
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
