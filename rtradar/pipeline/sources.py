@@ -69,7 +69,7 @@ class Sources:
         cells are in the order of `numpy.nonzero`.
         """
         rows, columns = np.nonzero(mask)
-        of_parts = self.expected(start_cycle, np.unique(rows))[:, rows, columns]
+        of_parts = self.expected(start_cycle, rows, columns)
         # The parts of one owner are neighbours.
         first_parts = np.flatnonzero(np.diff(self._owner, prepend=-1))
         of_owners = np.add.reduceat(of_parts, first_parts, axis=0)
@@ -78,11 +78,13 @@ class Sources:
         known = (best > self._still[rows, columns]) & (power[rows, columns] < _UNEXPECTED * best)
         return CellSources(np.where(known, source, -1), np.where(known, part, -1))
 
-    def expected(self, start_cycle: int, rows: NDArray[np.int64]) -> Array:
-        """Map (part, range, velocity) that is expected of each of them.
+    def expected(
+        self, start_cycle: int, rows: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> Array:
+        """Return the power (part, cell) that is expected of each part in some cells.
 
-        Powers are those of a map, sums over all channels [m^2]; only these ``rows`` of range bins
-        are filled.
+        It is that of a map (range, velocity), a sum over all channels [m^2], at these ``rows`` and
+        ``columns (cell,)``.
         """
         radar, n_cycles = self._capture.radar, self._cycles
         looks, part = self._looks(start_cycle)
@@ -96,26 +98,33 @@ class Sources:
         most_m2 = looks.power_m2.max(axis=0, initial=0.0)
         reach = _FINE * (self._falls * most_m2[:, None] > self._weak_m2).sum(axis=1)
         low, high = steps.min(axis=0) - reach, steps.max(axis=0) + reach
-        asked = _FINE * rows
-        echo, row = np.nonzero((asked >= low[:, None]) & (asked <= high[:, None]))
-        found = np.zeros((n_cycles, n_parts * radar.samples_per_chirp))
-        target = part[echo] * radar.samples_per_chirp + rows[row]
+        bins, bin_of_cell = np.unique(rows, return_inverse=True)
+        asked = _FINE * bins
+        echo, number = np.nonzero((asked >= low[:, None]) & (asked <= high[:, None]))
+        # A spectrum for each part in each bin that it reaches, and one of nothing for the others.
+        target = part[echo] * len(bins) + number
         order = np.argsort(target, kind="stable")
-        echo, row, target = echo[order], row[order], target[order]
+        echo, number = echo[order], number[order]
+        reached, target = np.unique(target[order], return_inverse=True)
+        found = np.zeros((n_cycles, len(reached) + 1))
 
         def spectra(first: int) -> tuple[NDArray[np.int64], Array]:
-            own, bins = echo[first : first + _AT_ONCE], rows[row[first : first + _AT_ONCE]]
-            away = _FINE * (bins + self._reach)
-            signal = np.empty((n_cycles, len(own)), dtype=np.complex64)
-            fields_in_bins(own, away, steps, fields, self._spread, signal)
+            some = slice(first, first + _AT_ONCE)
+            away = _FINE * (bins[number[some]] + self._reach)
+            signal = np.empty((n_cycles, len(away)), dtype=np.complex64)
+            fields_in_bins(echo[some], away, steps, fields, self._spread, signal)
             spectrum = doppler_power(signal[:, None], range(1), self._doppler, 1)
-            targets, begin = np.unique(target[first : first + _AT_ONCE], return_index=True)
+            targets, begin = np.unique(target[some], return_index=True)
             return targets, np.add.reduceat(spectrum, begin, axis=1)
 
         for targets, power_m2 in thread_map(spectra, range(0, len(echo), _AT_ONCE)):
             found[:, targets] += power_m2
-        maps = found.T.reshape(n_parts, radar.samples_per_chirp, n_cycles)
-        return np.asarray(radar.n_channels * np.fft.fftshift(maps, axes=2))
+        place = np.full(n_parts * len(bins), len(reached))
+        place[reached] = np.arange(len(reached))
+        of_cells = place.reshape(n_parts, len(bins))[:, bin_of_cell]
+        # The map begins at the most negative velocity.
+        cycles = (columns - n_cycles // 2) % n_cycles
+        return np.asarray(radar.n_channels * found[cycles, of_cells])
 
     def _looks(self, start_cycle: int) -> tuple[Looks, NDArray[np.int64]]:
         """The echoes at the instants of a frame that are not weak in it, and their parts."""

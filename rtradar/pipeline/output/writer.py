@@ -140,9 +140,10 @@ class RunWriter:
             with stages.time("write"):
                 added = {name: values[None] for name, values in maps.items()}
                 store.extend("time", [frame.middle_s], **added)
-                if self._table is not None:
+            if self._table is not None:
+                with stages.time("sources"):
                     of_parts = truth_of_parts(self._table, frame.start_cycle, frame.middle_s)
-                    store.extend_truth(frame.middle_s, of_parts)
+                store.extend_truth(frame.middle_s, of_parts)
 
     def _angle_maps(self, angles: Any) -> dict[str, NDArray[Any]]:
         makers = {"azimuth": range_azimuth, "elevation": range_elevation}
