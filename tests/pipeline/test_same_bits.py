@@ -34,7 +34,9 @@ def bits(folder: Path) -> dict[str, bytes]:
     found = {}
     with h5py.File(folder / "maps.h5") as maps:
         # Texts are given as objects, whose bytes are where they lie.
-        values = {name: data[()] for name, data in maps.items()}
+        truth = {f"truth/{name}": data for name, data in maps["truth"].items()}
+        stored = {name: data for name, data in maps.items() if name != "truth"} | truth
+        values = {name: data[()] for name, data in stored.items()}
         found |= {
             name: repr(own.tolist()).encode() if own.dtype.kind == "O" else own.tobytes()
             for name, own in values.items()
