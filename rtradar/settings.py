@@ -139,8 +139,8 @@ class RunSettings:
     spreading : bool
         Whether amplitudes hold the loss with distance 1 / (R1 R2).
     model_options : mapping, optional
-        Options of the model, such as ``{"shadow_rays": 256}`` of ``fresnel``. The class of a model
-        documents them.
+        Options of the model, such as ``{"visibility": "gradual"}`` of ``specular``. The class of a
+        model documents them.
     clutter_removal : {"none", "mean", "exponential", "mti"}
         Filter that removes static clutter before Doppler. See `rtradar.process.clutter`.
     body_material : {"perfect-conductor", "skin"}

@@ -202,17 +202,17 @@ def test_json_goes_where_it_is_asked_for(tmp_path: Path) -> None:
     [("3", 3), ("0.5", 0.5), ("true", True), ("false", False), ("inf", "inf"), ("a=b", "a=b")],
 )
 def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: object) -> None:
-    name, read = setting(f"shadow_rays={text}")
-    assert (name, type(read), read) == ("shadow_rays", type(value), value)
+    name, read = setting(f"tolerance={text}")
+    assert (name, type(read), read) == ("tolerance", type(value), value)
 
 
 def test_a_model_option_reaches_the_model(small_file: Path, tmp_path: Path) -> None:
-    words = ["--fidelity", "fresnel", "--model-option", "shadow_rays=8", "--out", tmp_path / "out"]
-    words += ["--radar", small_file, "--no-pictures"]
+    words = ["--fidelity", "specular", "--model-option", "visibility=gradual"]
+    words += ["--out", tmp_path / "out", "--radar", small_file, "--no-pictures"]
     assert run("synthetic:punch", *SHORT, *words) == 0
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"][
         "model_options"
-    ] == {"shadow_rays": 8}
+    ] == {"visibility": "gradual"}
 
 
 def _amc(folder: Path, frames: str = FRAMES) -> list[str]:

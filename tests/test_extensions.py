@@ -121,7 +121,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
         (
             "--fidelity",
             "rough",
-            "specular, fresnel, physical-optics, rays, reference, auto, points",
+            "specular, physical-optics, rays, reference, auto, points",
         ),
         ("--radar", "rough", "radhar, mars, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, ti-oob, threshold"),

@@ -35,7 +35,7 @@ axes = result.plot.rdt()
 axes = result.plot.spatial()
 result.view().save("view.html")
 
-capture = rt.simulate(motion, radar, scene, fidelity="fresnel", snr_db=float("inf"))
+capture = rt.simulate(motion, radar, scene, fidelity="physical-optics", snr_db=float("inf"))
 samples: xr.DataArray = capture.samples
 for block in capture.blocks():
     print(block.shape)

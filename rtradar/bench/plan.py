@@ -55,6 +55,8 @@ class Plan:
         for option, names in (("--radar", self.radars), ("--fidelity", self.fidelities)):
             if not all(names) or len(set(names)) < len(names):
                 raise InputError(f"{option} {','.join(names)}: name each once, with commas between")
+        for name in self.fidelities:
+            MODELS.refuse_gone(name)
         for option, names, what, allowed in (
             ("--fidelity", self.fidelities, "model", MODELS),
             ("--only", self.parts, "part", PARTS),

@@ -320,6 +320,7 @@ def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]
 
 def _fidelity(value: object) -> str:
     model = check_text("[each]", "fidelity", value)
+    MODELS.refuse_gone(model)
     if model not in MODELS:
         raise InputError(
             f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"

@@ -96,7 +96,7 @@ def add(commands: Subcommands) -> None:
         _add_compare,
         (
             "rtradar compare synthetic:kick --out out/kick",
-            "rtradar compare walk.bvh --fidelities analytic,specular,fresnel --out out/levels",
+            "rtradar compare walk.bvh --fidelities specular,physical-optics --out out/levels",
             "rtradar compare walk.bvh kick.bvh jump.bvh --out out/mean  # mean and interval",
             "rtradar compare out/measured out/simulated --out out/both",
         ),
@@ -124,7 +124,7 @@ def _add_run(run: OneLineParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="option of the model, such as shadow_rays=256 of fresnel; may be given again",
+        help="option of the model, such as visibility=gradual of specular; may be given again",
     )
     run.add_argument(
         "--no-pictures",

@@ -64,7 +64,7 @@ def _add_bench(bench: OneLineParser) -> None:
     bench.option(
         "--fidelity",
         "A,B,...",
-        "models (default: analytic-paper,analytic,specular,fresnel,physical-optics; "
+        "models (default: analytic-paper,analytic,specular,physical-optics; "
         "with --quick without the last two)",
     )
     bench.option(

@@ -30,10 +30,8 @@ _MAX_S = 600.0  # for each process
 
 _LEVELS: dict[str, dict[str, Any]] = {
     "specular": {"bounces": 2, "terms": 2},
-    "fresnel": {},
     "physical-optics": {},
     "analytic": {},
-    "auto": {},
 }
 """Levels with functions of their own, and options that need further ones."""
 

@@ -169,7 +169,7 @@ def compare(
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     asked = settings = settings_of("compare", RunOptions, options)
-    kind = files_of_runs("compare.json", _FILES, list(MODELS))
+    kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
         scene = Scene() if scene is None else scene
         results: dict[str, Result] = {}

@@ -63,7 +63,7 @@ def build_model(
     materials : (part,) sequence of str, optional
         Material of each part, ``perfect-conductor`` or ``skin``; by default perfect conductors.
     **model_options
-        Settings of that model, such as ``shadow_rays`` of ``fresnel``; its class documents them.
+        Settings of that model, such as ``visibility`` of ``specular``; its class documents them.
 
     Returns
     -------

@@ -49,14 +49,13 @@ def scattering_length(
         Antennas, pair by pair, in the coordinates of the target [m]. One may be a single (3,).
     frequency : float or (n,) array_like
         Frequency of the wave, for all pairs or for each [Hz].
-    fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays", \
-"full-wave"}
+    fidelity : {"analytic", "specular", "physical-optics", "reference", "rays", "full-wave"}
         Name of the model; ``full-wave`` solves Maxwell's equations, and is here alone.
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
     **model_options
         Settings of that model: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that
-        trace, ``shadow_rays`` of ``fresnel``, ``facets`` of ``physical-optics`` and ``reference``,
+        trace, ``visibility`` of ``specular``, ``facets`` of ``physical-optics`` and ``reference``,
         ``rays_per_wavelength`` and ``bounces`` of ``rays``, and ``material`` of ``full-wave``, the
         name of a material such as ``skin`` that fills the target.
 
@@ -122,6 +121,7 @@ def _method_for(
     if fidelity == FULL_WAVE:
         _refuse_unknown(fidelity, full_wave_scattering, options)
         return full_wave_scattering, True
+    MODELS.refuse_gone(fidelity)
     if fidelity not in (allowed := [*models_that("scattering"), FULL_WAVE]):
         raise InputError(
             f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(allowed)}"

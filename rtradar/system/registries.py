@@ -54,11 +54,14 @@ MODELS = Registry(
         "analytic-paper": "rtradar.scatter.models.analytic:AnalyticPaper",
         "analytic": "rtradar.scatter.models.analytic:Analytic",
         "specular": "rtradar.scatter.models.specular:Specular",
-        "fresnel": "rtradar.scatter.models.fresnel:Fresnel",
         "physical-optics": "rtradar.scatter.models.physical_optics:PhysicalOptics",
         "rays": "rtradar.scatter.models.rays:Rays",
         "reference": "rtradar.scatter.models.reference:Reference",
         "auto": "rtradar.scatter.models.auto:Auto",
+    },
+    gone={
+        "fresnel": "take 'specular' with visibility = 'gradual' (--model-option "
+        "visibility=gradual), or 'physical-optics'",
     },
 )
 """Every model, cheapest first, the one that chooses among them, and those of other packages."""

@@ -29,10 +29,14 @@ class Registry(Mapping[str, Callable[..., Any]]):
         What one is called in messages.
     built_in : mapping
         What comes with rtradar: name to ``module:attribute``.
+    gone : mapping, optional
+        What came with it before: name to what to do instead.
     """
 
-    def __init__(self, group: str, noun: str, built_in: Mapping[str, str]) -> None:
-        self.group, self.noun, self.built_in = group, noun, dict(built_in)
+    def __init__(
+        self, group: str, noun: str, built_in: Mapping[str, str], gone: Mapping[str, str] = {}
+    ) -> None:
+        self.group, self.noun, self.built_in, self.gone = group, noun, dict(built_in), dict(gone)
         self._registered: dict[str, Callable[..., Any]] = {}
 
     @cached_property
@@ -91,10 +95,16 @@ class Registry(Mapping[str, Callable[..., Any]]):
 
     def check(self, name: str, *, instead: str = "") -> None:
         """Raise InputError, as `find` does, if there is none of that name; load nothing."""
+        self.refuse_gone(name)
         if not isinstance(name, str) or name not in self:
             raise InputError(
                 f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}"
             )
+
+    def refuse_gone(self, name: str) -> None:
+        """Raise InputError, which says what to take instead, if one of that name is no more."""
+        if isinstance(name, str) and name in self.gone and name not in self:
+            raise InputError(f"{self.noun} '{name}' is gone; {self.gone[name]}")
 
     def __getitem__(self, name: str) -> Any:
         installed = self._installed.get(name, [])

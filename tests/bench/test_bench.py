@@ -221,19 +221,19 @@ def test_a_process_has_caches_of_its_own_and_gives_its_summary(
     monkeypatch.setattr(runs.sys, "executable", stand_in(tmp_path, script))
     folder = tmp_path / "caches"
     folder.mkdir()
-    run = Runner(folder).run(Case("paper-77ghz", "fresnel", 0.5))
+    run = Runner(folder).run(Case("paper-77ghz", "rays", 0.5))
     assert run.to_cloud_s == 4.0
     assert run.from_start_to_cloud_s == pytest.approx(run.process_s - 1.5)
     environment = dict(
         line.split("=", 1) for line in (tmp_path / "env").read_text().splitlines() if "=" in line
     )
     for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
-        assert environment[name].startswith(str(folder / "fresnel"))
+        assert environment[name].startswith(str(folder / "rays"))
     assert (
-        "run synthetic:walk --duration 0.5 --radar paper-77ghz --fidelity fresnel"
+        "run synthetic:walk --duration 0.5 --radar paper-77ghz --fidelity rays"
         in (tmp_path / "words").read_text()
     )
-    assert [item.name for item in folder.iterdir()] == ["fresnel"]  # what the run wrote is gone
+    assert [item.name for item in folder.iterdir()] == ["rays"]  # what the run wrote is gone
 
 
 def test_a_process_that_fails_says_its_last_line(

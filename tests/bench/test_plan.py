@@ -9,9 +9,9 @@ from rtradar.cli import main
 
 
 def test_quick_is_less_of_everything_unless_asked_for() -> None:
-    plan = plan_of(fidelities="specular , fresnel", duration_s=0.25, quick=True, radars=None)
+    plan = plan_of(fidelities="specular , analytic", duration_s=0.25, quick=True, radars=None)
     assert plan == Plan(
-        ("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True
+        ("paper-12ghz",), ("specular", "analytic"), repeats=1, duration_s=0.25, quick=True
     )
     assert plan.growing_durations_s == (0.25, 0.5)
     assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0, 60.0)
@@ -19,7 +19,7 @@ def test_quick_is_less_of_everything_unless_asked_for() -> None:
 
 def test_growth_is_of_specular_or_of_the_last_model() -> None:
     assert Plan().growing_fidelity == "specular"
-    assert Plan(fidelities=("analytic", "fresnel")).growing_fidelity == "fresnel"
+    assert Plan(fidelities=("analytic-paper", "analytic")).growing_fidelity == "analytic"
 
 
 def test_a_quick_measurement_has_the_usual_model() -> None:
@@ -48,6 +48,7 @@ def test_every_model_with_every_radar() -> None:
             ["--fidelity", "exact"],
             "--fidelity exact: there is no such model; allowed: analytic-paper",
         ),
+        (["--fidelity", "fresnel"], "fidelity 'fresnel' is gone; take 'specular' with visibility"),
         (["--repeats", "0"], "--repeats 0: it must be a whole number, at least 1"),
         (["--repeats", "some"], "invalid whole number"),
         (

@@ -14,8 +14,10 @@ RUNS = """
 import sys
 import rtradar as rt
 motion, radar = rt.synthetic_motion("kick", seed=1, duration_s=0.2), rt.Radar.preset("paper-77ghz")
-for level in "analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto":
+for level in "analytic-paper", "analytic", "specular", "physical-optics", "auto":
     rt.run(motion, radar, fidelity=level, clutter_removal="mti", out=f"{sys.argv[1]}/{level}")
+gradual = {"visibility": "gradual"}
+rt.run(motion, radar, fidelity="specular", model_options=gradual, out=f"{sys.argv[1]}/gradual")
 rt.run(motion, rt.Radar.preset("iwr6843"), rt.Scene.load("bedroom"), out=f"{sys.argv[1]}/room")
 """
 

@@ -20,7 +20,7 @@ RADAR = dataclasses.replace(
 )
 
 
-@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
+@pytest.mark.parametrize("fidelity", ["specular", "physical-optics"])
 def test_a_second_frame_compiles_no_kernel(
     backend: Backend, fidelity: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

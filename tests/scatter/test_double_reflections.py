@@ -114,13 +114,20 @@ def test_spheres_that_touch_are_no_pair(apart: float, number: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "fidelity", ["specular", pytest.param("fresnel", marks=pytest.mark.slow), "physical-optics"]
+    ("fidelity", "options"),
+    [
+        ("specular", {}),
+        pytest.param("specular", {"visibility": "gradual"}, marks=pytest.mark.slow),
+        ("physical-optics", {}),
+    ],
 )
-def test_on_a_walker_they_are_listed_and_each_has_an_echo(fidelity: str) -> None:
+def test_on_a_walker_they_are_listed_and_each_has_an_echo(
+    fidelity: str, options: dict[str, Any]
+) -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.3))
     chirps = np.array([100, 400])
-    one = build_model(fidelity, RADAR, body, bounces=1).echoes(chirps)
-    model: Any = build_model(fidelity, RADAR, body, bounces=2)
+    one = build_model(fidelity, RADAR, body, bounces=1, **options).echoes(chirps)
+    model: Any = build_model(fidelity, RADAR, body, bounces=2, **options)
     both = model.echoes(chirps)
     listed = model.account()["double_reflections"]
     assert {(row["first"], row["last"]) for row in listed} >= {("right thigh", "left thigh")}

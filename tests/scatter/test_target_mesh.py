@@ -15,7 +15,7 @@ from rtradar.errors import InputError
 from rtradar.scatter.echo_models import models_that
 
 WITH_MESHES = ("physical-optics", "reference", "rays")
-WITHOUT = ("analytic", "specular", "fresnel")
+WITHOUT = ("analytic", "specular")
 AWAY = np.array([4.0, 0.3, 0.2])
 BOX = trimesh.creation.box((0.2, 0.3, 0.1))
 CORNERS, FACES = np.array(BOX.vertices), np.array(BOX.faces)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ class BesideADisc:
     ("fidelity", "options"),
     [
         ("specular", {}),
-        ("fresnel", {}),
+        ("specular", {"visibility": "gradual"}),
         ("physical-optics", {"facets": 320}),
         ("reference", {"facets": 320}),
         ("auto", {}),
@@ -102,7 +102,7 @@ class BesideADisc:
     ],
 )
 def test_the_tracer_decides(
-    fidelity: str, options: dict[str, float], backend: Backend, monkeypatch: pytest.MonkeyPatch
+    fidelity: str, options: dict[str, Any], backend: Backend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A disc beside all lines of sight occludes nothing, but everything once every ray hits."""
     walker = Body.from_motion(rt.synthetic_motion("walk", seed=0))

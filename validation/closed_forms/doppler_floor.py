@@ -40,7 +40,7 @@ ATTENUATION_DB = 160.0
 FACETED = tuple(
     fidelity for fidelity in ("reference", "physical-optics", "rays") if fidelity in MODELS
 )
-OPTICAL = tuple(fidelity for fidelity in ("analytic", "specular", "fresnel") if fidelity in MODELS)
+OPTICAL = tuple(fidelity for fidelity in ("analytic", "specular") if fidelity in MODELS)
 OVER_REFERENCE_DB = 3.0
 
 

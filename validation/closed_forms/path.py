@@ -37,7 +37,7 @@ from rtradar.validate.rows import Row, judged, main
 Array = NDArray[np.float64]
 Vector = list[Decimal]
 # All models but `analytic-paper`, whose path goes to the centre of the ellipsoid.
-MODELS = ("analytic", "specular", "fresnel", "physical-optics", "rays", "reference")
+MODELS = ("analytic", "specular", "physical-optics", "rays", "reference")
 TOLERANCE_M = 1e-6
 STEP = Decimal("1e-15")
 getcontext().prec = 60

@@ -29,7 +29,6 @@ from rtradar.radar import Radar
 CASES = {
     ("paper-12ghz", "analytic"): (1.0, 1.2),
     ("paper-12ghz", "specular"): (1.4, 1.2),
-    ("paper-12ghz", "fresnel"): (3.5, 1.2),
     ("paper-12ghz", "physical-optics"): (3.5, 1.2),
     ("paper-77ghz", "specular"): (None, None),
 }

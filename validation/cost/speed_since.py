@@ -30,7 +30,6 @@ from rtradar.bench.runs import paired_ratio, to_cloud_s
 CASES = {
     "analytic": ("--fidelity", "analytic"),
     "specular": ("--fidelity", "specular"),
-    "fresnel": ("--fidelity", "fresnel"),
     "physical-optics": ("--fidelity", "physical-optics"),
     "auto": ("--fidelity", "auto"),
     "specular, mean removed": ("--fidelity", "specular", "--clutter-removal", "mean"),

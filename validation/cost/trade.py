@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import math
 import sys
 import time
 import warnings
@@ -45,9 +44,7 @@ MODELS = (
     "analytic-paper",
     "analytic",
     "specular",
-    "fresnel",
     "physical-optics",
-    "auto",
     "rays",
     "reference",
 )
@@ -60,9 +57,13 @@ class ModelOption:
 
     fidelity: str
     name: str
-    values: dict[str, tuple[float, ...]]
-    default: dict[str, float]
+    values: dict[str, tuple[float | str, ...]]
+    default: dict[str, float | str]
     style: str  # of its line in the figure
+
+
+def said(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def for_both(values: Any) -> dict[str, Any]:
@@ -70,7 +71,7 @@ def for_both(values: Any) -> dict[str, Any]:
 
 
 OPTIONS = (
-    ModelOption("fresnel", "shadow_rays", for_both((16, 64, 400)), for_both(400), "-"),
+    ModelOption("specular", "visibility", for_both(("sharp", "gradual")), for_both("sharp"), "-"),
     ModelOption(
         "physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"
     ),
@@ -81,8 +82,6 @@ OPTIONS = (
         {"paper-12ghz": 5120, "paper-77ghz": 20480},
         "-",
     ),
-    ModelOption("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
-    ModelOption("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
     ModelOption(
         "rays",
         "rays_per_wavelength",
@@ -95,10 +94,8 @@ COLOURS = {
     "analytic-paper": "tab:gray",
     "analytic": "tab:orange",
     "specular": "tab:green",
-    "fresnel": "tab:blue",
     "physical-optics": "tab:red",
     "rays": "tab:purple",
-    "auto": "black",
     "reference": "0.5",
 }
 MARKERS = {"walk": "o", "kick": "^", "punch": "s", "jumping_jack": "D"}
@@ -110,15 +107,15 @@ class Setting:
 
     fidelity: str
     option: str = ""
-    value: float = 0.0
+    value: float | str = 0.0
 
     @property
-    def options(self) -> dict[str, float]:
+    def options(self) -> dict[str, Any]:
         return {self.option: self.value} if self.option else {}
 
     @property
     def label(self) -> str:
-        return f"{self.fidelity} {self.option}={self.value:g}" if self.option else self.fidelity
+        return f"{self.fidelity} {self.option}={said(self.value)}" if self.option else self.fidelity
 
 
 @dataclass
@@ -134,10 +131,10 @@ class Point:
     cost: float = 0.0  # over that of `analytic`
 
 
-def settings_of(option: ModelOption, preset: str) -> list[tuple[float, Setting]]:
+def settings_of(option: ModelOption, preset: str) -> list[tuple[float | str, Setting]]:
     """Settings along an option, each with its value; the default value is the model as it is."""
 
-    def at(value: float) -> Setting:
+    def at(value: float | str) -> Setting:
         return (
             Setting(option.fidelity)
             if value == option.default[preset]
@@ -315,9 +312,9 @@ def table(points: dict[tuple[str, str, str], Point]) -> str:
             for each in PRESETS
             for value, setting in settings_of(option, each)
         }
-        for value in sorted({value for value, _ in at}):
+        for value in dict.fromkeys(value for value, _ in at):
             labels = {each: at[value, each].label for each in PRESETS if (value, each) in at}
-            line(f"`{option.fidelity}`, {option.name} {value:g}", labels)
+            line(f"`{option.fidelity}`, {option.name} {said(value)}", labels)
     return "\n".join(lines)
 
 
@@ -369,7 +366,8 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                 # The ends of the option, each once.
                 if activity == "walk" and len(found) > 1:
                     for value, point in (found[0], found[-1]):
-                        text = f"{1e3 * value:g} ms" if option.name == "anchor_s" else f"{value:g}"
+                        ms = isinstance(value, float) and option.name == "anchor_s"
+                        text = f"{1e3 * value:g} ms" if ms else said(value)
                         place = (point.cost, 100 * point.error)
                         axes.annotate(
                             text,

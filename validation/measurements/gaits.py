@@ -51,9 +51,7 @@ class Condition(NamedTuple):
     clutter_removal: str = "none"
 
 
-LEVELS = {
-    level: Condition(level) for level in ("analytic-paper", "analytic", "specular", "fresnel")
-}
+LEVELS = {level: Condition(level) for level in ("analytic-paper", "analytic", "specular")}
 SAME = Condition("specular", clutter_removal="mean")
 CONDITIONS = {
     "living-room": SAME._replace(scene="living-room"),

@@ -67,7 +67,7 @@ judged, reported = (
     partial(kind, key="double-reflections") for kind in (rows.judged, rows.reported)
 )
 
-LEVELS = ("specular", "fresnel", "physical-optics")
+LEVELS = ("specular", "physical-optics")
 ASPECTS_DEG = np.array([20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0])
 SPHERE_M, FREQUENCY_HZ = 0.05, 12e9
 THIGHS_HZ = 3e9

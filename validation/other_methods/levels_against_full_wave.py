@@ -43,12 +43,13 @@ Complex = NDArray[np.complex128]
 reported = partial(rows.reported, key="levels-against-full-wave")
 
 RANGE_M = 4.0
-LEVELS = ("analytic", "specular", "fresnel", "physical-optics", "reference", "rays")
+LEVELS = ("analytic", "specular", "physical-optics", "reference", "rays")
 ASPECTS_DEG = (10.0, 30.0, 50.0, 70.0, 90.0)
 PAIR_ASPECTS_DEG = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0, 90.0)
 PARTS = ("thigh", "forearm", "foot", "head", "upper torso")
 TWO_TERMS = ("specular", {"terms": 2})
-TWICE = ("specular", "fresnel", "physical-optics")
+GRADUAL = ("specular", {"visibility": "gradual"})
+TWICE = ("specular", "physical-optics")
 """Levels that have reflections from part to part if asked; `rays` has three bounces here."""
 
 CROSSED_HZ, CROSSED_EDGES_M = 4.5e9, (7.2e-3, 6e-3)
@@ -68,7 +69,7 @@ def field(
     frequency: float,
     level: str,
     polarization: Polarization,
-    **options: int,
+    **options: int | str,
 ) -> Complex:
     # Limits of validity are what is measured here.
     with warnings.catch_warnings():
@@ -179,6 +180,7 @@ def limb_rows() -> Iterator[Row]:
         truth = field(coaxial, at, 12e9, "full-wave", polarization)
         given = coaxial, at, 12e9, polarization
         yield from of_levels("shank under thigh, 12 GHz", *given, truth)
+    wrong: dict[str, list[Complex]] = {"sharp": [], "gradual": []}
     upper, fore = axes_of("upper arm"), axes_of("forearm")
     for gap in (0.02, 0.10):
         # The forearm is before the upper arm, as seen from 90 degrees.
@@ -194,8 +196,23 @@ def limb_rows() -> Iterator[Row]:
             coarse, fine = (one.scattering_length(at, at, polarization) for one in surfaces)
             between = f"{claim}, {polarization.upper()}, two meshes"
             yield reported(between, "rms", "dB", rms(field_db(fine / coarse)))
-            given = crossed, at, CROSSED_HZ, polarization
-            yield from of_levels(claim, *given, limit(coarse, fine, squares))
+            given = crossed, at, CROSSED_HZ
+            truth = limit(coarse, fine, squares)
+            yield from of_levels(claim, *given, polarization, truth)
+            for visibility, errors in wrong.items():
+                found = field(*given, "specular", polarization, visibility=visibility)
+                errors.append((found - truth) / rms(truth))
+    yield rows.judged(
+        "forearm across upper arm, gradual over sharp",
+        "complex difference from full wave over that of sharp visibility",
+        "",
+        rms(np.array(wrong["gradual"])) / rms(np.array(wrong["sharp"])),
+        1.0,
+        says="`specular` with a gradual visibility behind an occluder is no farther from full wave "
+        "than with a sharp one: complex difference over that of the sharp one",
+        cases=len(wrong["sharp"]) * len(PAIR_ASPECTS_DEG),
+        key="levels-against-full-wave",
+    )
 
 
 def mesh_of(limbs: rt.Ellipsoids, edge_m: float) -> ClosedMesh:
@@ -218,10 +235,11 @@ def of_levels(
     truth: Complex,
 ) -> Iterator[Row]:
     levels = [(level, {}) for level in LEVELS] + [(level, {"bounces": 2}) for level in TWICE]
-    for level, options in levels:
+    for level, options in [*levels, GRADUAL]:
         found = field(target, at, frequency, level, polarization, **options)
-        name = f"{claim}, {polarization.upper()}, `{level}`" + (", two bounces" if options else "")
-        yield from compared(name, found, truth)
+        more = {"bounces": ", two bounces", "visibility": ", gradual"}
+        name = f"{claim}, {polarization.upper()}, `{level}`"
+        yield from compared(name + "".join(more[option] for option in options), found, truth)
 
 
 def measure(quick: bool) -> list[Row]:

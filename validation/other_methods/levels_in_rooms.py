@@ -225,6 +225,14 @@ def field_of(echoes: Echoes, frequency: Array) -> Field:
 # -- the living room -------------------------------------------------------------------------------
 
 
+ROOM_LEVELS: dict[str, tuple[str, dict[str, Any]]] = {
+    "specular": ("specular", {}),
+    "specular, gradual": ("specular", {"visibility": "gradual"}),
+    "physical-optics": ("physical-optics", {}),
+    "rays": ("rays", {"rays_per_wavelength": 2.5}),
+}
+
+
 def room_rows(quick: bool) -> Iterator[Row]:
     """A walk in the living room: power by path over that of `specular` there."""
     scene = rt.Scene.load("living-room")
@@ -238,12 +246,11 @@ def room_rows(quick: bool) -> Iterator[Row]:
     middle = body.at(np.array([duration_s / 2])).centres[0].mean(axis=0)
     powers: dict[str, dict[str, float]] = {}
     angles: dict[str, float] = {"all paths": 0.0}
-    for fidelity in ("specular", "fresnel", "physical-optics", "rays"):
-        options = {"rays_per_wavelength": 2.5} if fidelity == "rays" else {}
+    for level, (fidelity, options) in ROOM_LEVELS.items():
         model: Any = build_model(fidelity, radar, body, scene=scene, **options)
         echoes = model.echoes(chirps)
         field, names = field_of(echoes, sweep), np.array(model.path_names)[echoes.path]
-        own = powers[fidelity] = {"all paths": power(field)}
+        own = powers[level] = {"all paths": power(field)}
         for name in sorted(set(names.tolist())):
             # Out over a wall or back over it: by reciprocity the same.
             way = " > ".join(sorted(set(name.split(" > ")) - {"body"})) or "direct"
@@ -251,13 +258,13 @@ def room_rows(quick: bool) -> Iterator[Row]:
             angles[way] = bistatic_deg(model.course(name, middle, radar), middle)
     optics = powers.pop("specular")
     strong = [name for name in optics if optics[name] > optics["direct"] * 10**-3.5]
-    for fidelity, found in powers.items():
+    for level, found in powers.items():
         by_path = {name: 10 * np.log10(found[name] / optics[name]) for name in strong}
-        claim = f"living room, {fidelity} over specular"
+        claim = f"living room, {level} over specular"
         for name, ratio in by_path.items():
-            level = 10 * np.log10(optics[name] / optics["direct"])
+            strength = 10 * np.log10(optics[name] / optics["direct"])
             quantity = (
-                f"{name}: {level:.0f} dB of the direct, {angles[name]:.0f} deg between both ways"
+                f"{name}: {strength:.0f} dB of the direct, {angles[name]:.0f} deg between both ways"
             )
             yield reported(claim, quantity, "dB", float(ratio))
         # Where a wave hardly turns at the body, optics has no return to speak of.

@@ -19,11 +19,10 @@ float64.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -34,12 +33,9 @@ from scipy.signal.windows import hann
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.kernels.jit import compiled
-from rtradar.kernels.scatter.zones.fresnel_zones import MERIDIANS
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
-from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, bounds_of
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
@@ -387,32 +383,11 @@ class ClosedForm:
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether each line stays outside of every part but its own, scaled to a unit sphere."""
-        return self._clear(origins, targets, own, self._centres, self._frames)
-
-    def clear(
-        self,
-        origins: Array,
-        targets: Array,
-        group: NDArray[np.int64],
-        own: NDArray[np.int64],
-        pose: NDArray[np.int64],
-        poses: Poses,
-    ) -> NDArray[np.bool_]:
-        """The same for lines in groups, past the body in several poses, as the tracer has it."""
-        seen = np.empty(len(group), dtype=bool)
-        for number in range(len(poses.centres)):
-            some = np.flatnonzero(pose[group] == number)
-            posed = poses.centres[number], poses.frames[number]
-            seen[some] = self._clear(origins[some], targets[some], own[group[some]], *posed)
-        return seen
-
-    def _clear(
-        self, origins: Array, targets: Array, own: NDArray[np.int64], centres: Array, frames: Array
-    ) -> NDArray[np.bool_]:
         seen = np.ones(len(origins), dtype=bool)
         for part, axes in enumerate(self._axes):
-            start = (origins - centres[part]) @ frames[part] / axes
-            line = (targets - origins) @ frames[part] / axes
+            centre, frame = self._centres[part], self._frames[part]
+            start = (origins - centre) @ frame / axes
+            line = (targets - origins) @ frame / axes
             nearest = np.clip(-np.sum(start * line, axis=1) / np.sum(line * line, axis=1), 0, 1)
             distance = np.linalg.norm(start + nearest[:, None] * line, axis=1)
             seen &= (own == part) | (distance >= 1)
@@ -424,7 +399,6 @@ class Both:
 
     def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
         self._tracer, self._reference = tracer, reference
-        self._counting = Lock()  # zones are looked at in several threads
         self.lines, self.different = 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
@@ -437,26 +411,6 @@ class Both:
         self.different += int((seen != self._reference.sees(origins, targets, own)).sum())
         return seen
 
-    def clear(
-        self, origins: Array, targets: Array, group: NDArray[np.int64], *given: Any
-    ) -> NDArray[np.bool_]:
-        seen = self._tracer.clear(origins, targets, group, *given)
-        # Lines to all corners of cells; those that look for an edge come ever nearer to an outline.
-        corners = 1 + MERIDIANS * (len(bounds_of(SHADOW_RAYS)) - 1)
-        if not (np.bincount(group) % corners).any():
-            expected = self._reference.clear(origins, targets, group, *given)
-            with self._counting:
-                self.lines += len(seen)
-                self.different += int((seen != expected).sum())
-        return seen
-
-
-def tracer_rows(quick: bool) -> Iterator[Row]:
-    """Mitsuba's answers on moving bodies against the closed form, and the power of the parts."""
-    yield from compared_rows("lines of sight", visibilities, quick, 3.0)
-    # The closed form takes a second for a keyframe of the corners of all cells.
-    yield from compared_rows("corners of Fresnel zones", zone_fractions, quick, 0.3)
-
 
 def visibilities(radar: rt.Radar, body: rt.Body, tracer: Any, chirps: NDArray[np.int64]) -> Array:
     """Fraction of the amplitude (chirp, rx, part) that is left of each part by `specular`."""
@@ -464,21 +418,13 @@ def visibilities(radar: rt.Radar, body: rt.Body, tracer: Any, chirps: NDArray[np
     return np.concatenate([visibility.at(chirp)[0] for chirp in chirps[:, None]])
 
 
-def zone_fractions(radar: rt.Radar, body: rt.Body, tracer: Any, chirps: NDArray[np.int64]) -> Array:
-    """The same by `fresnel`, at the middle of the sweep."""
-    frequency = np.array([radar.centre_frequency_hz])
-    fractions = ZoneFractions(radar, body, frequency, tracer)
-    return np.abs(np.concatenate([fractions.at(chirp)[0] for chirp in chirps[:, None]]))
-
-
-def compared_rows(
-    what: str, fractions_of: Callable[..., Array], quick: bool, duration_s: float
-) -> Iterator[Row]:
+def tracer_rows(quick: bool) -> Iterator[Row]:
+    """Mitsuba's answers on moving bodies against the closed form, and the power of the parts."""
     radar, mi = rt.Radar.preset("paper-12ghz"), use(select("cpu"))
     lines, different, worst, cases = 0, 0, 0.0, 0
     for activity in ("walk",) if quick else ("walk", "kick", "punch", "jumping_jack"):
         motion = rt.synthetic_motion(activity, seed=0)
-        duration = duration_s / 6 if quick else duration_s
+        duration = 0.5 if quick else 3.0
         body = rt.Body.from_motion(place(motion, start_s=0.0, duration_s=duration))
         traced = Both(BodyTracer(mi, body.semi_axes), ClosedForm(body.semi_axes))
         # Power of each part at one chirp of every keyframe, by the tracer and by the closed form.
@@ -487,7 +433,7 @@ def compared_rows(
         amplitude = build_model("analytic", radar, body).echoes(chirps).amplitude[0]
         powers = []
         for tracer in (traced, ClosedForm(body.semi_axes)):
-            fractions = fractions_of(radar, body, tracer, chirps)
+            fractions = visibilities(radar, body, tracer, chirps)
             powers.append((np.abs(amplitude) ** 2 * fractions**2).sum(axis=1))
         lines, different = lines + traced.lines, different + traced.different
         # Averages over 0.1 s, of parts within 30 dB of the strongest.
@@ -500,22 +446,21 @@ def compared_rows(
         worst, cases = max(worst, float(np.sqrt(np.mean(decibels**2)))), cases + int(strong.sum())
     yield judged(
         "tracer against closed form",
-        f"fraction of {lines} {what} with another answer",
+        f"fraction of {lines} lines of sight with another answer",
         "",
         different / lines,
         1e-5,
-        says=f"fraction of {what} on which Mitsuba and the closed form differ",
+        says="fraction of lines of sight on which Mitsuba and the closed form differ",
         cases=lines,
         key="tracer",
     )
-    parts = "parts" if what == "lines of sight" else "parts by `fresnel`"
     yield judged(
         "tracer against closed form",
-        f"power of {parts} within 30 dB of the strongest, over 0.1 s: rms difference",
+        "power of parts within 30 dB of the strongest, over 0.1 s: rms difference",
         "dB",
         worst,
         0.01,
-        says=f"power of the {parts} of a moving body, occluded by Mitsuba or in closed form: rms",
+        says="power of the parts of a moving body, occluded by Mitsuba or in closed form: rms",
         cases=cases,
         key="tracer",
     )

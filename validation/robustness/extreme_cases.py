@@ -25,7 +25,7 @@ from helpers import MovingEllipsoid
 Array = NDArray[np.float64]
 C = 299_792_458.0
 MODELS = ("analytic", "specular")
-TRACED = ("specular", "fresnel", "physical-optics", "rays")
+TRACED = ("specular", "physical-optics", "rays")
 BESIDE = np.array([0.0, 0.1, 0.0])
 
 

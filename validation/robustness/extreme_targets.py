@@ -203,11 +203,11 @@ def _() -> str:
 
 
 @case(
-    "physical optics, rays and fresnel at 0.1 m and 10 km",
+    "physical optics, rays and specular at 0.1 m and 10 km",
     "finite; at 10 km the closed form, phase and all, 2 %",
 )
 def _() -> str:
-    for fidelity in ("physical-optics", "rays", "fresnel"):
+    for fidelity in ("physical-optics", "rays", "specular"):
         fields = []
         for gap in (0.1, 1e4):
             antenna = [gap + 0.05, 0.0, 0.0]
@@ -219,7 +219,7 @@ def _() -> str:
                 )
             )
         assert np.isfinite(fields).all(), (fidelity, fields)
-        expected = rt.rcs.sphere(0.05, 24e9, "go" if fidelity == "fresnel" else "po")
+        expected = rt.rcs.sphere(0.05, 24e9, "go" if fidelity == "specular" else "po")
         # 0.02 is the error of facets; float32 would know their phase at 10 km to 0.5 rad only.
         assert abs(fields[1] / complex(expected) - 1) < 0.02, (fidelity, fields[1], expected)
     return "finite; phase and all to 2 % at 10 km"
@@ -230,7 +230,7 @@ def _() -> str:
     sight = np.array([[4.0, 0, 0], [0, 0, 4.0], [2.0, 1.0, 3.0]])
     said = []
     for axes in ((1e-3, 1e-3, 1.0), (0.3, 0.3, 3e-4)):
-        for fidelity in ("fresnel", "physical-optics", "rays"):
+        for fidelity in ("specular", "physical-optics", "rays"):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", rt.ValidityWarning)
                 try:
@@ -384,7 +384,7 @@ def _() -> str:
 
 @case(
     "radar and person 10 km from the origin of coordinates",
-    "as at the origin, on each of analytic, specular, fresnel",
+    "as at the origin, on each of analytic, specular, sharp and gradual",
 )
 def _() -> str:
     far = np.array([1e4, -3e3, 50.0])
@@ -396,9 +396,11 @@ def _() -> str:
     )
     chirps = np.arange(0, 4000, 401)
     worst_length = worst_amplitude = 0.0
-    for fidelity in (*MODELS, "fresnel"):
+    levels = [(fidelity, {}) for fidelity in MODELS] + [("specular", {"visibility": "gradual"})]
+    for fidelity, options in levels:
         here, away = (
-            build_model(fidelity, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved))
+            build_model(fidelity, r, b, **options).echoes(chirps)
+            for r, b in ((radar, body), (there, moved))
         )
         worst_length = max(worst_length, float(np.abs(here.length - away.length).max()))
         largest = float(np.abs(here.amplitude).max())

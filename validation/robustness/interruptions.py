@@ -88,7 +88,7 @@ def cases(work: Path, quick: bool) -> list[Case]:
     )
     compiles = Case(
         "run, nothing compiled yet",
-        (*walk, "--fidelity", "fresnel"),
+        (*walk, "--fidelity", "physical-optics"),
         (
             Stage("compiling", "compiles numba/**/*.nbc"),
             Stage("compiling on", "compiles numba/**/*.nbc", 5.0),

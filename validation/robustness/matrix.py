@@ -39,7 +39,7 @@ DURATION_S = 0.05
 SLOW = ("rays", "reference")
 FACTORS: dict[str, tuple[str, ...]] = {
     "level": (
-        "analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto", *SLOW,
+        "analytic-paper", "analytic", "specular", "physical-optics", "auto", *SLOW,
     ),
     "scene": ("free-space", "living-room", "corridor", "behind-plasterboard"),
     "antenna": ("isotropic", "patch"),

@@ -7,37 +7,35 @@ import numpy as np
 from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.jit import compiled, inlined
 
-PLACES = 8
-"""Parts of the interval between two keyframes where it is divided the most: 1.25 ms of 10 ms."""
-
 
 @compiled()
 def find_slopes(inside, before, here, after, slope):
     """Fill the slopes per place (place, node, pair, part) where a part is known.
 
     ``before``, ``here`` and ``after`` are intervals, each a ratio (place, node, pair, part) and
-    where it is known (place, part). Slopes are those of the parabola through three places; at the
+    where it is known (place, part); places are evenly from one end to the other. Slopes are those
+    of the parabola through three places; at the
     very start, not ``inside``, that of a straight line.
     """
     (ratio_before, known_before), (ratio, known), (ratio_after, known_after) = before, here, after
-    nodes, pairs, parts = ratio.shape[1:]
+    last_place, (nodes, pairs, parts) = len(ratio) - 1, ratio.shape[1:]
     for part in range(parts):
         left = -1
-        for place in range(PLACES + 1):
+        for place in range(last_place + 1):
             if not known[place, part]:
                 continue
             # Find the neighbours. At both ends the one on the other side belongs to the next
             # interval, where this part has its own.
             right = place + 1
-            while right <= PLACES and not known[right, part]:
+            while right <= last_place and not known[right, part]:
                 right += 1
-            beyond = PLACES - 1 if left < 0 else 1
+            beyond = last_place - 1 if left < 0 else 1
             while left < 0 and not known_before[beyond, part]:
                 beyond -= 1
-            while right > PLACES and not known_after[beyond, part]:
+            while right > last_place and not known_after[beyond, part]:
                 beyond += 1
-            gap = place - left if left >= 0 else PLACES - beyond
-            next_gap = right - place if right <= PLACES else beyond
+            gap = place - left if left >= 0 else last_place - beyond
+            next_gap = right - place if right <= last_place else beyond
             # Weigh the slopes to both by the width of the other.
             for node in range(nodes):
                 for pair in range(pairs):
@@ -49,7 +47,7 @@ def find_slopes(inside, before, here, after, slope):
                     )
                     following = (
                         ratio[right, node, pair, part]
-                        if right <= PLACES
+                        if right <= last_place
                         else ratio_after[beyond, node, pair, part]
                     )
                     rise, next_rise = (value - last) / gap, (following - value) / next_gap
@@ -63,8 +61,8 @@ def find_slopes(inside, before, here, after, slope):
 
 @inlined()
 def stretch(known, place):
-    """The known places (place,) on either side of one in 0 to `PLACES`."""
-    left = min(int(place), PLACES - 1)
+    """The known places (place,) on either side of one between the first and the last."""
+    left = min(int(place), len(known) - 2)
     right = left + 1
     while not known[left]:
         left -= 1
@@ -86,7 +84,7 @@ def fill_envelope(chirps, fraction, tx, weights, course, strength, amplitude):
     receivers = weights.shape[1]
     for i in range(len(chirps)):
         # Weights of the cubic of each part.
-        chirp, place = chirps[i], fraction[i] * PLACES
+        chirp, place = chirps[i], fraction[i] * (len(ratio) - 1)
         ends, cubic = np.empty((2, parts), dtype=np.int64), np.empty((4, parts))
         for part in range(parts):
             left, right = stretch(known[:, part], place)

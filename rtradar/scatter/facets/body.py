@@ -36,6 +36,32 @@ class Seen(NamedTuple):
     fraction: NDArray[np.float32]
     row: NDArray[np.int64]
 
+    def of(self, chosen: NDArray[np.int64]) -> Seen:
+        """What they see of some of the parts."""
+        return self._replace(row=self.row[:, chosen])
+
+    def unhidden(self) -> Seen:
+        """The same antennas and parts without any shadow."""
+        return Seen(np.ones_like(self.fraction[:1]), np.zeros_like(self.row))
+
+
+_MOST_LEFT = 2.0
+"""Most that a visible fraction may be: what the first Fresnel zone alone sends."""
+
+
+def visible_fraction(
+    shadowed: NDArray[np.complex128], free: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Sums over facets with shadows over those without: exactly 1 where they are the same.
+
+    It is 0 where there is nothing, and no more than `_MOST_LEFT` where the whole sum nearly
+    cancels, as past the end of optics.
+    """
+    some = free != 0
+    fraction = np.where(some, shadowed / np.where(some, free, 1.0), 0.0)
+    fraction /= np.maximum(np.abs(fraction) / _MOST_LEFT, 1.0)
+    return np.where(some & (shadowed == free), 1.0, fraction)
+
 
 class FacetShadows:
     """Fractions of the facets of a posed body that antennas see.
@@ -85,7 +111,7 @@ class FacetShadows:
 
 
 class FacetBody:
-    """The facets of a moving body, which the models `physical-optics` and `reference` share.
+    """The facets of a moving body, which several models share.
 
     ``facets`` is the least number per part, None for `body_facets`; ``nodes`` the number of
     frequencies over the sweep, ``frequency (node,)`` [Hz]; ``variant`` the backend in use.
@@ -137,6 +163,28 @@ class FacetBody:
         index = np.arange(len(antennas))[None]
         places = (pose.centres, pose.frames), antennas[None], nodes.pairs
         return self.amplitude(*places, length[None], seen, index, parts)[:, 0]
+
+    def visible(
+        self, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
+    ) -> NDArray[np.complex128]:
+        """What shadows leave (node, pair, n) of the amplitudes of parts (n,): 1 in full view.
+
+        It is the sum over the facets with shadows over that without, at paths (pair, n) [m].
+        """
+        antennas = nodes.antennas
+        seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
+        left = np.ones((len(self.frequency), len(nodes.pairs), len(parts)), dtype=np.complex128)
+        # Parts in full view need no sum.
+        cut = np.flatnonzero(seen.row.any(axis=0))
+        if len(cut):
+            index, seen = np.arange(len(antennas))[None], seen.of(cut)
+            places = (pose.centres, pose.frames), antennas[None], nodes.pairs, length[None, :, cut]
+            shadowed, free = (
+                self.amplitude(*places, own, index, parts[cut])[:, 0]
+                for own in (seen, seen.unhidden())
+            )
+            left[..., cut] = visible_fraction(shadowed, free)
+        return left
 
     def amplitude(
         self,

@@ -1,9 +1,9 @@
 """The slow part of a physical-optics echo, interpolated between keyframes, more where it bends.
 
 The envelope is the echo over that of the unobstructed specular point, carrier and all: 1 where
-optics is geometric, and slow. Keyframes are 10 ms apart. Where the second difference of a part's
-echo over neighbouring keyframes is more than a given fraction of its owner's, the interval is
-halved, and halved again, down to an eighth: there an edge crosses the part, or what it returns
+optics is geometric, and slow. Where the second difference of a part's echo over neighbouring
+keyframes is more than a given fraction of its owner's, the interval is halved, and halved again,
+down to an eighth of 10 ms by `physical-optics`: there an edge crosses the part, or what it returns
 comes from far beside its specular point. Between keyframes runs a cubic with one slope on either
 side of each.
 """
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.scatter.envelope import PLACES, find_slopes
+from rtradar.kernels.scatter.envelope import find_slopes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.system.threads import thread_map
 
@@ -65,7 +65,8 @@ class Envelope:
     in keyframes from the start; ``whole (part,)`` is `whole_echo` near by, or None where all parts
     are asked for. Several threads call it at once. ``tolerance`` is the second difference of a
     part's echo over the root of the power of the whole person that halves an interval, ``end`` the
-    keyframe from which on nothing moves.
+    keyframe from which on nothing moves, ``places`` the parts, a power of two, into which an
+    interval is divided at most.
     """
 
     def __init__(
@@ -74,9 +75,10 @@ class Envelope:
         owner: NDArray[np.int64],
         tolerance: float,
         end: int,
+        places: int,
     ) -> None:
         self._sample, self._owner, self._parts = sample, owner, np.arange(len(owner))
-        self._tolerance, self._end = tolerance, end
+        self._tolerance, self._end, self._places = tolerance, end, places
         self._keyframes: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
         self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _KEPT_INTERVALS)
 
@@ -132,10 +134,10 @@ class Envelope:
     def _divided(
         self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample
     ) -> _Interval:
-        ratio = np.full((PLACES + 1, *first.ratio.shape), np.nan + 0j)
-        ratio[0], ratio[PLACES] = first.ratio, last.ratio
-        known = np.zeros((PLACES + 1, len(self._parts)), dtype=bool)
-        known[[0, PLACES]] = True
+        ratio = np.full((self._places + 1, *first.ratio.shape), np.nan + 0j)
+        ratio[0], ratio[self._places] = first.ratio, last.ratio
+        known = np.zeros((self._places + 1, len(self._parts)), dtype=bool)
+        known[[0, self._places]] = True
         bends = [_bend(first.ratio, last.ratio, after.ratio, last.strength)]
         if before is not None:
             bends.append(_bend(before.ratio, first.ratio, last.ratio, first.strength))
@@ -143,10 +145,13 @@ class Envelope:
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
         interval = _Interval(ratio, known)
         if index < self._end:
-            self._divide(index, interval, 0, PLACES, bent, whole)
+            self._divide(index, interval, 0, self._places, bent, whole)
         else:
             # Half-way it is as at the beginning, and does not bend there.
-            ratio[PLACES // 2][:, :, bent], known[PLACES // 2, bent] = first.ratio[:, :, bent], True
+            ratio[self._places // 2][:, :, bent], known[self._places // 2, bent] = (
+                first.ratio[:, :, bent],
+                True,
+            )
         return interval
 
     def _divide(
@@ -162,7 +167,7 @@ class Envelope:
         if right - left < 2 or len(parts) == 0:
             return
         middle, (ratio, known) = (left + right) // 2, interval
-        found = self._sample(index + middle / PLACES, parts, whole)
+        found = self._sample(index + middle / self._places, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
         before, after = ratio[left][:, :, parts], ratio[right][:, :, parts]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -12,13 +14,14 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
-from rtradar.scatter.facets.body import FacetShadows
+from rtradar.scatter.facets.body import FacetShadows, Seen, visible_fraction
 from rtradar.scatter.facets.mesh_target import mesh_scattering
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
     MAXIMUM_FACETS,
+    edge_facets,
     ellipsoid_facets,
     facet_integral,
     subdivisions_for,
@@ -31,6 +34,9 @@ if TYPE_CHECKING:
     import trimesh
 
 Array = NDArray[np.float64]
+
+_FEW_FACETS = 5120
+"""Least number per ellipsoid."""
 
 _VIEWS_AT_ONCE = 2**27
 """Size of the visibility that is held at a time [bytes]."""
@@ -65,14 +71,38 @@ def facet_scattering(
         )
     if not isinstance(solid, Ellipsoids):
         return mesh_scattering(solid, tx, rx, wavenumber, polarization, variant)
-    field = np.empty(len(tx), dtype=np.complex128)
-    apart = _directions_apart(solid, tx, rx)
-    for wide in (False, True):
-        some = np.flatnonzero((apart > NEAR) == wide)
-        if len(some):
-            pairs = _Pairs(tx[some], rx[some], wavenumber[some], polarization, wide)
-            field[some] = _ellipsoids(solid, pairs, variant, facets)
-    return field
+    pairs = _Pairs(tx, rx, wavenumber, polarization, wide=False)
+    count = partial(_enough_facets, solid, facets)
+    field = _block_by_block(solid, pairs, variant, count, _fields).sum(axis=1)
+    return np.asarray(field * np.linalg.norm(tx, axis=1) * np.linalg.norm(rx, axis=1))
+
+
+def visible_fractions(
+    target: Ellipsoids,
+    tx: Array,
+    rx: Array,
+    frequency: Array,
+    polarization: Literal["v", "h"],
+    variant: str,
+) -> NDArray[np.complex128]:
+    """Visible fraction (n, part) of each part past the others, pair by pair.
+
+    It is the sum over the facets of a part with shadows over that without, in the forms of
+    `facet_scattering` but for forward scatter: 1 in full view, 0 where a part is hidden. Facets are
+    four times as many as a moving body has, by the thickest of those parts that others cut, as a
+    look at few facets tells.
+    """
+    wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    pairs = _Pairs(tx, rx, wavenumber, polarization, wide=False)
+    few = _block_by_block(target, pairs, variant, lambda *_: _FEW_FACETS, _rows)
+    cut = few.any(axis=0)
+    if not cut.any():
+        return np.ones_like(few)
+
+    def count(largest: float, wide: bool) -> int:
+        return _for_directions(4 * edge_facets(target.semi_axes[cut], largest), wide)
+
+    return _block_by_block(target, pairs, variant, count, _fractions)
 
 
 class _Pairs(NamedTuple):
@@ -84,35 +114,53 @@ class _Pairs(NamedTuple):
     polarization: Literal["v", "h"]
     wide: bool
 
-    def some(self, chosen: slice) -> _Pairs:
+    def some(self, chosen: slice | NDArray[np.int64]) -> _Pairs:
         return self._replace(
             tx=self.tx[chosen], rx=self.rx[chosen], wavenumber=self.wavenumber[chosen]
         )
 
 
-def _ellipsoids(
-    target: Ellipsoids, pairs: _Pairs, variant: str, facets: int | None
+_OfBlock = Callable[[Ellipsoids, Facets, FacetShadows, _Pairs], NDArray[np.complex128]]
+
+
+def _block_by_block(
+    target: Ellipsoids,
+    pairs: _Pairs,
+    variant: str,
+    count: Callable[[float, bool], int],
+    of_block: _OfBlock,
 ) -> NDArray[np.complex128]:
-    backend = select(variant)
-    enough = _enough_facets(target, float(pairs.wavenumber.max()), facets)
-    if facets is None and pairs.wide:
-        # The current does not fall to nothing at the edge of the lit side.
-        enough = min(4 * enough, MAXIMUM_FACETS)
-    surface = ellipsoid_facets(target.semi_axes, subdivisions_for(enough))
-    shadows = FacetShadows(BodyTracer(use(backend), target.semi_axes), surface, target.semi_axes)
-    block = max(1, _VIEWS_AT_ONCE // (8 * len(target.centres) * len(surface.faces)))
-    return np.concatenate(
-        [
-            _block(target, surface, shadows, pairs.some(slice(first, first + block)))
-            for first in range(0, len(pairs.tx), block)
-        ]
-    )
+    """What a function finds of each part (n, part), for pairs near each other and far apart.
+
+    ``count(wavenumber, wide)`` is the number of facets per part that either need.
+    """
+    found = np.empty((len(pairs.tx), len(target.centres)), dtype=np.complex128)
+    apart = _directions_apart(target, pairs.tx, pairs.rx)
+    for wide in (False, True):
+        some = np.flatnonzero((apart > NEAR) == wide)
+        if not len(some):
+            continue
+        enough = count(float(pairs.wavenumber[some].max()), wide)
+        surface = ellipsoid_facets(target.semi_axes, subdivisions_for(enough))
+        tracer = BodyTracer(use(select(variant)), target.semi_axes)
+        shadows = FacetShadows(tracer, surface, target.semi_axes)
+        block = max(1, _VIEWS_AT_ONCE // (8 * len(target.centres) * len(surface.faces)))
+        for first in range(0, len(some), block):
+            own = some[first : first + block]
+            given = pairs.some(own)._replace(wide=wide)
+            found[own] = of_block(target, surface, shadows, given)
+    return found
 
 
-def _enough_facets(target: Ellipsoids, wavenumber: float, facets: int | None) -> int:
+def _for_directions(enough: int, wide: bool) -> int:
+    """Facets of pairs far apart: the current does not fall to nothing at the edge of the light."""
+    return min(4 * enough if wide else enough, MAXIMUM_FACETS)
+
+
+def _enough_facets(target: Ellipsoids, facets: int | None, wavenumber: float, wide: bool) -> int:
     """Facets per part: those asked for, or as many as the thickest part takes."""
     ka = wavenumber * float(np.median(target.semi_axes, axis=1).max())
-    needed = max(5120, math.ceil(FACETS_PER_SQUARE_KA * ka**2))
+    needed = max(_FEW_FACETS, math.ceil(FACETS_PER_SQUARE_KA * ka**2))
     if facets is not None:
         subdivisions_for(facets)
     if ka > LARGEST_KA and (facets is None or facets < needed):
@@ -125,29 +173,78 @@ def _enough_facets(target: Ellipsoids, wavenumber: float, facets: int | None) ->
             f"physical optics of a part with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs {needed} "
             f"facets an ellipsoid; {cure}"
         )
-    return min(needed, MAXIMUM_FACETS) if facets is None else facets
+    return _for_directions(needed, wide) if facets is None else facets
 
 
-def _block(
+def _fields(
     target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
 ) -> NDArray[np.complex128]:
-    tx, rx, wavenumber, polarization, wide = pairs
-    n, parts = len(tx), np.arange(len(target.centres))
+    """Fields (n, part), spreading and all, relative to the path over the origin."""
+    parts = np.arange(len(target.centres))
+    return _integrals(target, surface, _seen(target, shadows, pairs), pairs, parts, shadow=True)
+
+
+def _rows(
+    target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
+) -> NDArray[np.complex128]:
+    """Not 0 where a part is cut or hidden (n, part)."""
+    row = _seen(target, shadows, pairs).row
+    return row.reshape(2, len(pairs.tx), -1).sum(axis=0).astype(np.complex128)
+
+
+def _fractions(
+    target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
+) -> NDArray[np.complex128]:
+    """Visible fractions (n, part)."""
+    seen = _seen(target, shadows, pairs)
+    left = np.ones((len(pairs.tx), len(target.centres)), dtype=np.complex128)
+    # Parts in full view need no sum.
+    cut = np.flatnonzero(seen.row.any(axis=0))
+    if len(cut):
+        seen = seen.of(cut)
+        left[:, cut] = visible_fraction(
+            *(
+                _integrals(target, surface, own, pairs, cut, shadow=False)
+                for own in (seen, seen.unhidden())
+            )
+        )
+    return left
+
+
+def _seen(target: Ellipsoids, shadows: FacetShadows, pairs: _Pairs) -> Seen:
+    """What all Tx and then all Rx of some pairs see, a row for each of them and each part."""
+    tx, rx = pairs.tx, pairs.rx
     antennas, view = np.unique(np.concatenate([tx, rx]), axis=0, return_inverse=True)
-    to_antennas = np.stack([tx, rx], axis=1)[:, None] - target.centres[:, None]
-    to_tx, to_rx = (to_antennas[:, :, end] for end in (0, 1))
-    apart = float(_directions_apart(target, tx, rx).max()) if wide else 0.0
+    apart = float(_directions_apart(target, tx, rx).max()) if pairs.wide else 0.0
+    parts = np.arange(len(target.centres))
     seen = shadows.seen(target.centres, target.frames, antennas, parts, apart=apart)
-    local = np.einsum("pji,npaj->npai", target.frames, to_antennas)
-    row = np.moveaxis(seen.row[view.reshape(2, n)], (0, 1, 2), (2, 0, 1))
+    return seen._replace(row=seen.row[view.ravel()])
+
+
+def _integrals(
+    target: Ellipsoids,
+    surface: Facets,
+    seen: Seen,
+    pairs: _Pairs,
+    parts: NDArray[np.int64],
+    *,
+    shadow: bool,
+) -> NDArray[np.complex128]:
+    """Sums over the facets of some parts (n, part), see `_fields` and `with_obliquity`."""
+    tx, rx, wavenumber, polarization, _ = pairs
+    n, frames = len(tx), target.frames[parts]
+    to_antennas = np.stack([tx, rx], axis=1)[:, None] - target.centres[parts][:, None]
+    to_tx, to_rx = (to_antennas[:, :, end] for end in (0, 1))
+    local = np.einsum("pji,npaj->npai", frames, to_antennas)
+    row = np.moveaxis(seen.row.reshape(2, n, len(parts)), 0, 2)
     ranges = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
     carrier, k = (np.repeat(a, len(parts))[:, None] for a in (ranges[0] + ranges[1], wavenumber))
     views = Views(np.tile(parts, n), local.reshape(-1, 2, 3), row.reshape(-1, 2), seen.fraction)
     waves = Waves(np.array([[0, 1]]), carrier, k, spreading=True)
-    ways = to_tx[:, :, None], to_rx[:, :, None], target.frames
-    waves, factor = with_obliquity(waves, *ways, polarization, shadow=True)
-    field = facet_integral(surface, views, waves).reshape(n, len(parts)) * factor[:, :, 0]
-    return np.asarray(field.sum(axis=1) * ranges[0] * ranges[1])
+    ways = to_tx[:, :, None], to_rx[:, :, None], frames
+    waves, factor = with_obliquity(waves, *ways, polarization, shadow=shadow)
+    field = facet_integral(surface, views, waves).reshape(n, len(parts))
+    return np.asarray(field * factor[:, :, 0])
 
 
 def _directions_apart(target: Ellipsoids, tx: Array, rx: Array) -> Array:

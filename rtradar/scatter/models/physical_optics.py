@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,24 +12,16 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.envelope import fill_envelope
-from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.keyframes import keyframe_before
-from rtradar.scatter.common.poses import (
-    chirp_poses,
-    has_mesh,
-    one_echo_a_part,
-    owners_of,
-)
+from rtradar.scatter.common.interpolation import ArrayNodes
+from rtradar.scatter.common.poses import chirp_poses, has_mesh, one_echo_a_part
 from rtradar.scatter.double_reflections import (
     TwoBounceModel,
     check_bounces,
     double_scattering,
 )
+from rtradar.scatter.facets.array_envelope import ArrayEnvelope
 from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, Scale, whole_echo
 from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import select, use
@@ -38,9 +29,6 @@ from rtradar.trace.body_tracer import BodyTracer
 
 if TYPE_CHECKING:
     import trimesh
-
-_COARSE, _FINE = (2, 1), (6, 2)
-"""Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
 
 _MOST_FREQUENCIES = 9
 
@@ -159,74 +147,37 @@ class PhysicalOptics(TwoBounceModel):
                 raise InputError(_NO_DOUBLES.format("take body = 'ellipsoids'"))
             tracer = BodyTracer(use(select(variant)), body.semi_axes)
             self._reflect_twice(radar, body, tracer, spreading=spreading)
-        self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
-        # From coarse nodes to fine ones, which stand at antennas or between them.
-        self._spread = spread_nodes(radar, _COARSE, _FINE)
-        self._unevenness = unevenness
-        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
-        end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
-        self._envelope = Envelope(self._sample, owners_of(body), tolerance, end)
+        self._envelope = ArrayEnvelope(
+            radar,
+            body,
+            self._surface.carriers,
+            self._ratio,
+            anchor_s=anchor_s,
+            tolerance=tolerance,
+            unevenness=unevenness,
+        )
 
-    def _sample(self, place: float, parts: NDArray[np.int64], whole: Scale | None) -> Sample:
-        """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
-        time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
-        pose = self._body.at([time])
-        coarse = self._at_nodes(time, pose, self._coarse, parts)
-        ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
-        echo = coarse.ratio * coarse.strength
-        scale = whole_echo(coarse, owners_of(self._body)) if whole is None else whole[parts]
-        uneven = (
-            np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1))
-            > self._unevenness * scale
-        )
-        if uneven.any():
-            fine = self._at_nodes(time, pose, self._fine, parts[uneven])
-            ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
-        return Sample(ratio, strength)
-
-    def _at_nodes(
-        self, time: float, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]
-    ) -> Sample:
-        antennas, pairs = nodes.antennas, nodes.pairs
-        centres, frames = (
-            np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
-        )
-        ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
-        length, strength = self._surface.carriers(
-            Geometry(*ends, centres, frames, pose.semi_axes[parts])
-        )
-        amplitude = self._surface.field(time, pose, nodes, length[:, 0], parts)
-        specular = strength[:, 0]
+    def _ratio(
+        self,
+        time: float,
+        pose: Poses,
+        nodes: ArrayNodes,
+        length: NDArray[np.float64],
+        strength: NDArray[np.float64],
+        parts: NDArray[np.int64],
+    ) -> NDArray[np.complex128]:
+        """The sum over the facets of parts, over their carriers."""
+        amplitude = self._surface.field(time, pose, nodes, length, parts)
         # Without a specular point there is next to nothing to see either: antennas on opposite
         # sides.
-        ratio = np.where(specular != 0, amplitude / np.where(specular != 0, specular, 1.0), 0.0)
-        return Sample(ratio, np.abs(specular))
+        return np.where(strength != 0, amplitude / np.where(strength != 0, strength, 1.0), 0.0)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
         length, strength = self._surface.carriers(at)
-        amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
-        intervals, rest = keyframe_before(self._radar, chirps, self._step)
-        envelope, weights = self._envelope, self._fine.weights
-        # Power is measured at keyframes, where nothing is asked of what comes after.
-        between = set(intervals[rest != 0].tolist())
-        in_order = sorted(set(intervals.tolist()))
-        for _, group in groupby(in_order, key=lambda interval: interval // TOGETHER):
-            together = list(group)
-            envelope.prepare_keyframes(k for k in together if k not in between)
-            envelope.prepare_courses(between.intersection(together))
-            for interval in together:
-                inside = np.flatnonzero(intervals == interval)
-                if interval in between:
-                    fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
-                    course = tuple(envelope.course(interval))
-                    given = inside, fraction, at.tx_index, weights, course
-                    fill_envelope(*given, strength, amplitude)
-                else:
-                    ratio = envelope.keyframe(interval).ratio[:, None]
-                    over_array = weights[at.tx_index[inside]] @ ratio
-                    amplitude[:, inside] = over_array * strength[inside]
+        nodes = len(self._surface.frequency)
+        amplitude = self._envelope.times(chirps, at.tx_index, strength, nodes)
         single = one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
         return self._with_doubles(single, chirps)

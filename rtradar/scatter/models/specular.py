@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
@@ -17,12 +18,24 @@ from rtradar.scatter.double_reflections import (
     check_bounces,
     double_scattering,
 )
+from rtradar.scatter.facets.target import visible_fractions
+from rtradar.scatter.facets.visible_fractions import VisibleFractions
 from rtradar.scatter.specular_point.second_term import check_terms, with_second_term
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
+
+Visibility = Literal["sharp", "gradual"]
+
+
+def check_visibility(visibility: str) -> None:
+    """Raise InputError where there is no such kind of visibility."""
+    if visibility not in (allowed := get_args(Visibility)):
+        raise InputError(
+            f"specular: visibility = {visibility!r} is unknown; allowed: {', '.join(allowed)}"
+        )
 
 
 class Specular(TwoBounceModel):
@@ -32,10 +45,17 @@ class Specular(TwoBounceModel):
 
     Occlusion: the specular point is visible or not. Each Tx and Rx is asked every 10 ms.
 
+    With ``visibility="gradual"`` a part that others cut has the fraction of its return that is left
+    when its facets are summed as by `physical-optics`, with shadows over without; equation
+    :eq:`visible-fraction` of the theory page. A part in full view needs no sum.
+
     Parameters
     ----------
+    visibility : {"sharp", "gradual"}
+        Whether the specular point decides alone, or what is left of the part's facets.
     bounces : int
-        1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`).
+        1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`); of
+        these a path is visible or not.
     terms : int
         1, or 2 for the second term of geometric optics as well
         (`rtradar.scatter.specular_point.second_term`), at the middle of the sweep.
@@ -43,7 +63,7 @@ class Specular(TwoBounceModel):
     Raises
     ------
     InputError
-        Where ``bounces`` or ``terms`` is neither.
+        Where an option is none of these.
     """
 
     fast_over_walls = True
@@ -59,18 +79,23 @@ class Specular(TwoBounceModel):
         variant: str = "auto",
         bounces: int = 1,
         terms: int = 1,
+        visibility: Visibility = "sharp",
     ) -> NDArray[np.complex128]:
         """Scattering length of one target."""
         check_bounces("specular", bounces)
         check_terms(terms)
+        check_visibility(visibility)
         at = target_geometry(target, tx, rx)
         length, amplitude, points = solve_specular_points(
             at, polarization=polarization, points=True
         )
         tracer = BodyTracer(use(select(variant)), target.semi_axes)
         tracer.pose(target.centres, target.frames)
-        visible = unobstructed(tracer, at.tx, at.rx, points)
-        left = visible.astype(np.complex128)
+        if visibility == "gradual":
+            given = target, tx, rx, frequency, polarization, variant
+            left = visible_fractions(*given)[:, None]
+        else:
+            left = unobstructed(tracer, at.tx, at.rx, points).astype(np.complex128)
         if terms == 2:
             k = 2 * np.pi * frequency[:, None, None] / SPEED_OF_LIGHT_MPS
             left *= with_second_term(at, points, polarization, k)
@@ -88,18 +113,24 @@ class Specular(TwoBounceModel):
         spreading: bool = True,
         bounces: int = 1,
         terms: int = 1,
+        visibility: Visibility = "sharp",
     ) -> None:
         check_bounces("specular", bounces)
         check_terms(terms)
+        check_visibility(visibility)
         self._terms = terms
         self._radar, self._body, self.spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
         self.tracer = BodyTracer(use(backend), body.semi_axes)
-        self.visibility = SpecularVisibility(radar, body, self.tracer)
+        self._visibility: SpecularVisibility | VisibleFractions
+        if visibility == "gradual":
+            self._visibility = VisibleFractions(radar, body, variant=variant, spreading=spreading)
+        else:
+            self._visibility = SpecularVisibility(radar, body, self.tracer)
         if bounces == 2:
             self._reflect_twice(radar, body, self.tracer, spreading=spreading)
-        if bounces == 2 or terms == 2:
+        if bounces == 2 or terms == 2 or visibility == "gradual":
             # Each path over walls has these of its own.
             self.fast_over_walls = False
 
@@ -107,12 +138,17 @@ class Specular(TwoBounceModel):
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude, points = self._solved(chirps, at, points=self._terms == 2)
-        centre_hz, echo = self._radar.centre_frequency_hz, amplitude.astype(np.complex128)
+        frequency = np.array([self._radar.centre_frequency_hz])
+        if isinstance(self._visibility, VisibleFractions):
+            echo = self._visibility.times(chirps, at.tx_index, amplitude)
+            frequency = self._visibility.frequency
+        else:
+            echo = amplitude[None].astype(np.complex128)
         if self._terms == 2:
-            k = np.array(2 * np.pi * centre_hz / SPEED_OF_LIGHT_MPS)
+            k = np.array(2 * np.pi * self._radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
             # The amplitude of an echo is the conjugate of the scattering length.
             echo *= with_second_term(at, points, self._radar.polarization, k).conj()
-        single = one_echo_a_part(at.tx_index, length, echo, centre_hz)
+        single = one_echo_a_part(at.tx_index, length, echo, frequency)
         return self._with_doubles(single, chirps)
 
     def specular_echo(
@@ -131,7 +167,11 @@ class Specular(TwoBounceModel):
         points: bool = False,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Lengths, amplitudes of what is visible, and specular points if they are wanted."""
-        weight, known = self.visibility.at(chirps)
+        weight, known = (
+            self._visibility.at(chirps)
+            if isinstance(self._visibility, SpecularVisibility)
+            else (1.0, None)
+        )
         length, amplitude, found = solve_specular_points(
             at,
             start=known if start is None else start,

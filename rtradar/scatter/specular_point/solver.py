@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry, Options, solve
-from rtradar.radar import Radar
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
+from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.system.threads import thread_map
 
 _CHIRPS_PER_THREAD = 64
 """Fewer cost more for waking threads than for the work, the more so while Mitsuba's are awake."""
-
-_KEPT_KEYFRAMES, _PASSING = 2048, 32
-"""The first 20 s of a recording, read twice, in 1 MB; of what follows one block."""
 
 
 def solve_specular_points(
@@ -55,37 +48,6 @@ def solve_specular_points(
 
     thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
     return length, amplitude, point
-
-
-class StartPoints:
-    """Starting points of a moving body, from which three steps lead to a specular point.
-
-    They are the specular points of the radar's first two antennas at keyframes 10 ms apart.
-    """
-
-    def __init__(self, radar: Radar, body: Body) -> None:
-        self._radar, self._body = radar, body
-        self._step = keyframe_step(radar)
-        self._keyframes: KeyframeCache[int, NDArray[np.float64]] = KeyframeCache(
-            _KEPT_KEYFRAMES, _PASSING
-        )
-
-    def at(
-        self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
-    ) -> NDArray[np.float64]:
-        """Specular points (chirp, part, 3) at the keyframes before some chirps, in the parts' axes.
-
-        They are those of some parts (part,), or of all [m].
-        """
-        before, _ = keyframe_before(self._radar, chirps, self._step)
-        numbers, place = np.unique(before, return_inverse=True)
-        found = [self._keyframes.get(n, partial(self._find, n)) for n in numbers.tolist()]
-        points = np.stack(found)
-        return (points if parts is None else points[:, parts])[place]
-
-    def _find(self, number: int) -> NDArray[np.float64]:
-        at = chirp_poses(self._radar.gapless, self._body, np.array([number * self._step]))
-        return local_points(at._replace(rx=at.rx[:, :1]))[1]
 
 
 def local_points(at: ChirpPoses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

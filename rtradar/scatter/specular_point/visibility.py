@@ -31,7 +31,7 @@ _PASSING = 2
 
 
 class Keyframe(NamedTuple):
-    """One pose: ``visible (tx, rx, part)``, and ``start (part, 3)`` as in `StartPoints`."""
+    """One pose: ``visible (tx, rx, part)``, ``start (part, 3)`` as in `local_points`."""
 
     visible: NDArray[np.bool_]
     start: NDArray[np.float64]

@@ -16,7 +16,6 @@ from references import (  # noqa: F401
     signal,
     silhouettes,
     specular_point,
-    zones,
 )
 from references.cases import CASES
 

@@ -7,7 +7,7 @@ import numpy as np
 from references.cases import Pair, filled, kernel_case
 from references.specular_point import geometry
 from rtradar.kernels.elementary import add_blended, cubic_weights, hermite_weights, smoothstep
-from rtradar.kernels.scatter.envelope import PLACES, fill_envelope, find_slopes
+from rtradar.kernels.scatter.envelope import fill_envelope, find_slopes
 from rtradar.kernels.scatter.mirrors import SlabPass, received_from_conductors, slab_fields
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.rooms import (
@@ -21,6 +21,7 @@ from rtradar.kernels.scatter.rooms import (
 )
 
 _WAVENUMBER = 300.0
+PLACES = 8
 
 
 # -- envelopes -------------------------------------------------------------------------------------

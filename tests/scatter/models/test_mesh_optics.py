@@ -126,7 +126,7 @@ def test_four_fine_triangles_lie_over_each_coarse_one():
 
 
 @needs_anny
-@pytest.mark.parametrize("fidelity", ["analytic", "specular", "fresnel", "auto"])
+@pytest.mark.parametrize("fidelity", ["analytic", "specular", "auto"])
 def test_levels_that_need_curvature_refuse_a_mesh(fidelity):
     with pytest.raises(rt.InputError, match="curvature in closed form; allowed for a mesh: phys"):
         build_model(fidelity, RADAR, person())

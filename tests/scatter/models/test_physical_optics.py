@@ -16,7 +16,7 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.elementary import hermite_weights
-from rtradar.kernels.scatter.envelope import PLACES, stretch
+from rtradar.kernels.scatter.envelope import stretch
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample
 from rtradar.scatter.facets.target import facet_scattering
@@ -25,6 +25,7 @@ from rtradar.scatter.models.reference import Reference
 from rtradar.scatter.models.specular import Specular
 
 Array = NDArray[np.float64]
+PLACES = 8
 
 
 @dataclass(frozen=True)
@@ -243,7 +244,7 @@ def envelope_of(
         ratio = np.array([law(place), 1.0 + 0j])[parts]
         return Sample(np.tile(ratio, (3, 2, 1)), np.ones((2, len(parts))))
 
-    return Envelope(sample, np.zeros(2, dtype=np.int64), tolerance, end), asked
+    return Envelope(sample, np.zeros(2, dtype=np.int64), tolerance, end, PLACES), asked
 
 
 def between(envelope: Envelope, index: int, fraction: Array) -> NDArray[np.complex128]:

@@ -10,9 +10,8 @@ from rtradar.body.body import Poses
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
+from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.specular_point import visibility
-from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
 from rtradar.scatter.specular_point.visibility import (
     SpecularVisibility,
     trace_keyframe,
@@ -190,20 +189,3 @@ def test_some_parts_are_as_among_all(backend: Backend) -> None:
             some, of_some = seen.at(chirps, np.array(parts, dtype=np.int64))
             np.testing.assert_array_equal(some, weight[..., parts])
             np.testing.assert_array_equal(of_some, start[:, parts])
-
-
-def test_starts_are_specular_points_of_the_keyframe_before_and_lead_to_the_same_points() -> None:
-    radar, body = small_radar(), Curtain(speed=0.5)
-    chirps = np.array([100, 104, 109, 110, 133])
-    starts = StartPoints(radar, body)  # type: ignore[arg-type]
-    found = starts.at(chirps)
-    at = chirp_poses(radar, body, np.array([100, 100, 100, 110, 130]))  # type: ignore[arg-type]
-    points = solve_specular_points(at, points=True)[2][:, 0]
-    np.testing.assert_allclose(
-        found, points - at.centres, atol=1e-9
-    )  # its axes are the world's; 1e-7 of the semi-axis squared
-    np.testing.assert_array_equal(starts.at(chirps, np.array([1])), found[:, [1]])
-    here = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    cold, warm = solve_specular_points(here), solve_specular_points(here, start=found)
-    np.testing.assert_allclose(warm[0], cold[0], rtol=1e-14)
-    np.testing.assert_allclose(warm[1], cold[1], rtol=1e-7)  # where the search ends

@@ -1,4 +1,4 @@
-"""`fresnel` where one part half covers another, against physical optics with a geometric shadow.
+"""`specular` with a gradual visibility where one part half covers another, against another sum.
 
 Edges cross a target, at each of three frequencies of the sweep: that of a flat plate, that of a
 torso, and both edges of a limb. The same is done before all antennas of both radars, of which the
@@ -6,10 +6,10 @@ corner channels and two in the middle are compared. In time, a sphere passes bef
 ellipsoid, and the power beside the Doppler line of the ellipsoid is compared.
 
 The reference adds up the points of ``physical_optics.py`` that the occluder does not hide from
-either antenna, by the discriminant of the ray and the occluder; it uses no specular points, zones
-or meshes. Complex errors are relative to the free field.
+either antenna, by the discriminant of the ray and the occluder; it uses no specular points, facets
+or rays. Complex errors are relative to the free field.
 
-    python validation/other_methods/fresnel.py [--quick] [--json FILE]
+    python validation/other_methods/visible_fractions.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
-from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering
+from rtradar.scatter.models.specular import Specular
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-SHADOW_RAYS = (16, 64, 400)
+OURS = "`specular` with a gradual visibility"
 TARGETS = {
     "thigh": TARGET,
     "head": np.array([0.06, 0.06, 0.1]),
@@ -113,12 +113,15 @@ def scene(target: Array, occluder: Array, place: Array, turn: Array) -> rt.Ellip
     return rt.Ellipsoids([np.zeros(3), place], frames, [target, occluder])
 
 
-def ours(
-    ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = SHADOW_RAYS[-1]
-) -> Complex:
-    """Field by `fresnel` at each frequency."""
+def ours(ellipsoids: rt.Ellipsoids, frequency: Array) -> Complex:
+    """Field at each frequency."""
     antenna = np.broadcast_to(ANTENNA, (len(frequency), 3))
-    return fresnel_scattering(ellipsoids, antenna, antenna, frequency, shadow_rays=shadow_rays)
+    return rt.scattering_length(ellipsoids, antenna, antenna, frequency, visibility="gradual")
+
+
+def gradual(radar: rt.Radar, body: object) -> Specular:
+    """The level of a moving body."""
+    return Specular(radar, body, visibility="gradual")  # type: ignore[arg-type]
 
 
 # -- at rest ---------------------------------------------------------------------------------------
@@ -129,8 +132,6 @@ def edge_rows(quick: bool) -> Iterator[Row]:
     for band in BANDS:
         frequencies = band.centre + np.array([-2e9, 0.0, 2e9])
         density = 2.0 if band.start < 50e9 else 1.2
-        counts = SHADOW_RAYS[2:] if quick else SHADOW_RAYS
-        everything: dict[int, list[Array]] = {rays: [] for rays in counts}
         for index, (name, occluder) in enumerate(OCCLUDERS.items()):
             errors, rough = [], []
             for target in list(TARGETS.values())[slice(index, index + 1) if quick else slice(None)]:
@@ -159,19 +160,14 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                         optics = lit.lit_fraction(one(ellipsoids, 1))
                         partly = (np.abs(optics) > 1e-9) & (np.abs(optics - 1) > 1e-9)
                         before = ours(one(ellipsoids, 1), frequencies)
-                        for rays in counts:
-                            wrong = np.abs(
-                                (ours(ellipsoids, frequencies, rays) - before) / free - optics
-                            )
-                            everything[rays].append(wrong)
-                            if rays == SHADOW_RAYS[-1]:
-                                errors.append(wrong[partly])
-                                rough.append(np.abs(np.round(np.abs(optics)) - optics)[partly])
+                        wrong = np.abs((ours(ellipsoids, frequencies) - before) / free - optics)
+                        errors.append(wrong[partly])
+                        rough.append(np.abs(np.round(np.abs(optics)) - optics)[partly])
             claim = f"{band.name}, edge of a {name}"
             wrong = np.concatenate(errors)
             quantity = f"rms complex error, {len(wrong)} cases partly covered"
             says = (
-                "knife edge and limbs across a specular point by `fresnel`, 12 and 77 GHz: "
+                f"knife edge and limbs across a specular point by {OURS}, 12 and 77 GHz: "
                 "rms complex error"
             )
             yield judged(
@@ -183,14 +179,6 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                 "rms complex error of the better of all and nothing",
                 "",
                 rms(np.concatenate(rough)),
-                key="edge",
-            )
-        for rays, found in everything.items():
-            yield reported(
-                f"{band.name}, edges",
-                f"{rays} shadow rays: rms complex error",
-                "",
-                rms(np.concatenate(found)),
                 key="edge",
             )
 
@@ -233,9 +221,9 @@ def array_rows(quick: bool) -> Iterator[Row]:
                 pose = rt.Ellipsoids(
                     pose.centres + np.array([0.0, 1.0, 1.0]), pose.frames, pose.semi_axes
                 )
-                echoes = Fresnel(radar, Standing(pose)).echoes(np.arange(radar.n_tx))
+                echoes = gradual(radar, Standing(pose)).echoes(np.arange(radar.n_tx))
                 alone = Standing(one(pose, 0), part_names=("target",))
-                free = Fresnel(radar, alone).echoes(np.arange(radar.n_tx))
+                free = gradual(radar, alone).echoes(np.arange(radar.n_tx))
                 middle = len(echoes.frequency) // 2
                 got = (echoes.amplitude[middle, ..., 0] / free.amplitude[middle, ..., 0]).conj()
                 spreads.append(np.abs(got - got.mean(axis=(0, 1))).ravel())
@@ -248,7 +236,7 @@ def array_rows(quick: bool) -> Iterator[Row]:
                         errors.append(got[tx, rx] - lit.lit_fraction(one(pose, 1))[0])
         claim = f"{preset}, edge of a torso before the array"
         quantity, error = f"rms complex error, {len(errors)} channels", rms(np.array(errors))
-        says = "an edge before the array by `fresnel`, channel by channel: rms complex error"
+        says = f"an edge before the array by {OURS}, channel by channel: rms complex error"
         yield judged(
             claim, quantity, "", error, EDGE_ERROR, key="edge", says=says, cases=len(errors)
         )
@@ -276,9 +264,9 @@ def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
         optics = np.array(
             [target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)]
         )
-        echoes = Fresnel(band.radar, passing).echoes(np.arange(band.cycles))
+        echoes = gradual(band.radar, passing).echoes(np.arange(band.cycles))
         amplitude = echoes.amplitude[len(echoes.frequency) // 2, :, 0, 0].conj()
-        free = Fresnel(band.radar, Passing(speed, -1.0)).echoes(np.arange(1))
+        free = gradual(band.radar, Passing(speed, -1.0)).echoes(np.arange(1))
         field = amplitude / np.abs(free.amplitude[len(free.frequency) // 2, 0, 0, 0])
         floors.append(beside_db(field, band))
         optics_floors.append(beside_db(optics, band))
@@ -292,7 +280,7 @@ def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
     yield reported(claim, "worst instant: power beside the line", "dB", max(floors), key="edge")
     error, says = (
         rms(np.array(errors)),
-        "an edge passing by `fresnel`, over a frame: rms complex error",
+        f"an edge passing by {OURS}, over a frame: rms complex error",
     )
     yield judged(
         claim,
@@ -317,7 +305,7 @@ def measure(quick: bool) -> list[Row]:
 if __name__ == "__main__":
     sys.exit(
         main(
-            "Partly covered parts on `fresnel` against physical optics with a geometric shadow.",
+            f"Partly covered parts by {OURS} against physical optics with a geometric shadow.",
             measure,
         )
     )

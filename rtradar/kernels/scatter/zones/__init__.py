@@ -1,1 +1,0 @@
-"""Kernels of Fresnel zones and the edges that cross them."""
