@@ -344,7 +344,7 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
         (
             "rtradar.kernels.elementary.dot",
-            "rtradar.kernels.scatter.nearby_points.nearby_echoes",
+            "rtradar.kernels.scatter.mirrors.slab_fields",
             "rtradar.kernels.scatter.specular_point.solve",
         ),
         (

@@ -47,7 +47,8 @@ def test_on_the_command_line_it_is_the_same_line(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "set.toml").write_text(
-        "[windows]\nduration_s = 2.0\n[[synthetic]]\nlabel = 'walk'\ncount = 1\n[each]\nfidelity=['fresnel']\n"
+        "[windows]\nduration_s = 2.0\n[[synthetic]]\nlabel = 'walk'\ncount = 1\n"
+        "[each]\nfidelity = ['fresnel']\n"
     )
     words = {
         "run": ["synthetic:walk", "--fidelity", "fresnel", "--out", "OUT"],
