@@ -13,7 +13,6 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.multipath.room_model import FIELD_ERROR, RoomModel
-from rtradar.scatter.radar_axes import MovingScene
 from rtradar.scatter.validity import Limit, warn_of
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
@@ -66,16 +65,16 @@ def indoors(
     paths = model.prune(n_chirps, noise, _LEFT_OUT * allowed if model.has_ghost_tones else 0.0)
     order = max(settings.order, 1)
 
-    def trace(seen: Scene) -> Clutter:
-        return Clutter(radar, seen, variant=variant, order=order).prune(noise)
+    def trace(still: Radar) -> Clutter:
+        return Clutter(still, scene, variant=variant, order=order).prune(noise)
 
-    clutter = trace(scene)
+    clutter = trace(radar.at(0.0))
     error, ghosts, said = model.left_out_m2, None, dict[str, Any]()
     if allowed > 0 and model.has_ghost_tones:
         ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed - error)
         error += said.pop("error_m2")
-    if isinstance(scene, MovingScene):
-        room: RoomIf = MovingRoomIf(radar, scene, radar.duration_of(n_chirps), trace)
+    if radar.is_moving:
+        room: RoomIf = MovingRoomIf(radar, radar.duration_of(n_chirps), trace)
     else:
         shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
         room, error = RoomIf(radar, clutter.cycle(), shadow), error + shadow.error_m2
@@ -98,7 +97,7 @@ def indoors(
             **said,
         }
     limits = []
-    if isinstance(scene, MovingScene):
+    if radar.is_moving:
         limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))
     behind, leader = clutter.behind()
     if behind > 0:

@@ -29,7 +29,6 @@ from rtradar.scatter.binary_phase import BinaryPhaseModel
 from rtradar.scatter.common.poses import has_mesh
 from rtradar.scatter.link_budget import LinkBudget, link_budget, power_of_parts_alone
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.validity import warn_of
 from rtradar.scatter.world import World, build_world, model_of_people
@@ -78,8 +77,6 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
                 radar = scene.place(radar)
                 processing = replace(processing, radar=radar)
             n_chirps, frame_starts = _frames(radar, body)
-            placed, in_world = scene, body
-            radar, body, scene = in_radar_axes(radar, body, scene)
             warm_up_start = time.perf_counter()
             model = _echo_model(radar, body, scene, settings)
             chirps = np.arange(2 * radar.n_tx)
@@ -119,10 +116,10 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
                 tones = model.with_person(direct) if isinstance(model, World) else direct
     return Capture(
         people=everyone,
-        scene=placed,
+        scene=scene,
         settings=settings,
         processing=processing,
-        body=in_world,
+        body=body,
         model=model,
         tones=tones,
         inside=inside,
@@ -209,7 +206,7 @@ def power_alone(
     body = body_of_people(everyone, settings)
     if has_mesh(body):
         return None
-    radar, body, _ = in_radar_axes(scene.place(radar), body, scene)
+    radar = scene.place(radar)
     level = partial(_echo_model, radar, scene=Scene(), settings=settings)
     return power_of_parts_alone(level, radar, body, radar.chirps_in(body.duration_s))
 

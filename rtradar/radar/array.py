@@ -152,7 +152,35 @@ class Array(Waveform):
             Positions along the path, those that `path_at` gives.
         """
         angles, positions = self.path_at(times)
+        if not self.is_moving:
+            return np.broadcast_to(self.axes, (len(positions), 3, 3)), positions
         return _rotation(angles), positions
+
+    def antennas_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Give the places of all antennas at some times.
+
+        Parameters
+        ----------
+        times : (time,) float
+            As for `path_at`.
+
+        Returns
+        -------
+        tx : (time, tx, 3) float64
+            Positions of the transmitters, world, each as `tx` is [m].
+        rx : (time, rx, 3) float64
+            Positions of the receivers, world, each as `rx` is [m].
+        """
+        axes, positions = self.poses_at(times)
+        if not self.is_moving:
+            count = len(positions)
+            tx, rx = (np.broadcast_to(own, (count, *own.shape)) for own in (self.tx, self.rx))
+        else:
+            tx, rx = (
+                np.einsum("tij,aj->tai", axes, own) + positions[:, None]
+                for own in (self.tx_m, self.rx_m)
+            )
+        return tx, rx
 
     def path_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Give angles and position of the radar at some times.

@@ -23,7 +23,8 @@ from rtradar.kernels.scatter.specular_point import Geometry, Options
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses
+from rtradar.scatter.common.polarization import Polarization
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, keyframe_time
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.system.threads import thread_map
@@ -84,8 +85,8 @@ def solve_doubles(
     at: Geometry | ChirpPoses,
     pairs: Indices,
     *,
+    polarization: Polarization,
     start: Array | None = None,
-    polarization: Literal["v", "h"] = "v",
     spreading: bool = True,
 ) -> Doubles:
     """Find the paths over ``pairs (pair, 2)`` of parts, as if each pair stood alone.
@@ -98,11 +99,13 @@ def solve_doubles(
     shape = (*at.rx.shape[:2], len(pairs))
     length, amplitude, points = np.empty(shape), np.empty(shape), np.empty((*shape, 2, 3))
     first = np.full((len(at.tx), len(pairs), 2, 3), np.nan) if start is None else start.copy()
-    options = Options(polarized=True, horizontal=polarization == "h", spreading=spreading)
+    options = Options(horizontal=polarization.kind == "h", spreading=spreading)
+    above = np.empty(at.tx.shape)
+    above[:] = polarization.up
 
     def some(begin: int) -> None:
         end = min(begin + _CHIRPS_PER_THREAD, len(at.tx))
-        solve_double(begin, end, at, pairs, first, options, length, amplitude, points)
+        solve_double(begin, end, at, above, pairs, first, options, length, amplitude, points)
 
     thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
     return Doubles(length, amplitude, points)
@@ -163,7 +166,7 @@ def double_scattering(
     pairs = pairs_apart(target.centres, target.frames, target.semi_axes)
     if not len(pairs):
         return np.zeros(len(tx), dtype=np.complex128)
-    found = solve_doubles(at, pairs, polarization=polarization)
+    found = solve_doubles(at, pairs, polarization=Polarization(polarization))
     tracer.pose(target.centres, target.frames)
     clear = legs_clear(tracer, at.tx, at.rx, found.points, pairs)
     return sum_of_echoes(found.length, found.amplitude * clear, at, frequency)
@@ -233,7 +236,7 @@ class DoubleReflections:
             at,
             pairs,
             start=start,
-            polarization=self._radar.polarization,
+            polarization=Polarization(self._radar.polarization, at.axes),
             spreading=self._spreading,
         )
         amplitude = (found.amplitude * weight[:, None]).astype(np.complex128)
@@ -272,17 +275,18 @@ class DoubleReflections:
         return np.ascontiguousarray(pairs), weight, start
 
     def _trace(self, number: int) -> _Keyframe:
-        time_s = self._radar.gapless.centres_of(np.array([number * self._step]))
-        centres, frames, semi_axes = self._body.at(np.minimum(time_s, self._body.duration_s))
-        tx, rx = (antennas.mean(axis=0)[None] for antennas in (self._radar.tx, self._radar.rx))
+        time_s = keyframe_time(self._radar, self._body, number * self._step)
+        radar, (centres, frames, semi_axes) = self._radar.at(time_s), self._body.at([time_s])
+        tx, rx = (antennas.mean(axis=0)[None] for antennas in (radar.tx, radar.rx))
         at = Geometry(tx, rx[:, None], centres, frames, semi_axes)
         if self._touching:
             pairs = np.array(list(permutations(range(len(semi_axes)), 2)), dtype=np.int64)
         else:
             pairs = pairs_apart(centres[0], frames[0], semi_axes)
-        found = solve_doubles(at, pairs, polarization=self._radar.polarization)
+        sent = Polarization(radar.polarization, radar.axes)
+        found = solve_doubles(at, pairs, polarization=sent)
         power = found.amplitude[0, 0] ** 2
-        single = solve_specular_points(at)[1][0, 0] ** 2
+        single = solve_specular_points(at, polarization=sent)[1][0, 0] ** 2
         owner = self._body.owner
         of_person = np.bincount(owner, weights=single, minlength=len(self._body.names))
         beside = of_person[owner[pairs]].min(axis=1)

@@ -17,7 +17,6 @@ from rtradar.errors import ExtensionError, InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import EchoModel, account_of, has_mesh
 from rtradar.scatter.free_space_legs import over_legs
-from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scene import Scene
 from rtradar.system.registries import MODELS
 
@@ -79,8 +78,7 @@ def build_model(
         Where it is of another package, and fails.
     """
     kind = _kind_for(fidelity, body, model_options)
-    radar, body, scene = in_radar_axes(radar, body, scene or Scene())
-    room = None if scene.is_empty else scene
+    room = None if scene is None or scene.is_empty else scene
     if room is not None and not spreading:
         raise InputError(
             f"scene '{room.name}': spreading may be off in free space only; leave --no-spreading "

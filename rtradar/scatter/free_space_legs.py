@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces, is_shaped, unit
+from rtradar.scatter.common.polarization import (
+    CONDUCTOR,
+    Polarization,
+    Surfaces,
+    is_shaped,
+    pattern_of,
+    unit,
+)
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 
 
@@ -37,15 +44,9 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
     The square root of the power pattern of the Tx in the direction of the part, times that of the
     Rx.
     """
-    points = specular_points(at)
-    gain = np.ones(points.shape[:-1])
-    for antenna, place in (
-        (radar.tx_antenna, at.tx[:, None, None]),
-        (radar.rx_antenna, at.rx[:, :, None]),
-    ):
-        if antenna is not None:
-            gain *= np.sqrt(antenna.relative(points - place, radar.polarization))
-    return gain
+    points, polarization = specular_points(at), Polarization(radar.polarization, at.axes)
+    sent = pattern_of(radar.tx_antenna, points - at.tx[:, None, None], polarization)
+    return sent * pattern_of(radar.rx_antenna, points - at.rx[:, :, None], polarization)
 
 
 def over_legs(

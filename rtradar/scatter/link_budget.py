@@ -20,7 +20,6 @@ from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
 from rtradar.scatter.inside_people import InsidePeople
 from rtradar.scatter.inside_solids import Inside
-from rtradar.scatter.radar_axes import in_world
 from rtradar.scatter.validity import (
     Limit,
     folded_angle_deg,
@@ -79,8 +78,7 @@ def link_budget(
     """
     chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
     powers, fields = FileBackedRows(), FileBackedRows()
-    scene, there = in_world(scene or Scene(), body)
-    solid, others = Inside(scene, body.part_names, body.owner), InsidePeople(body)
+    solid, others = Inside(scene or Scene(), body.part_names, body.owner), InsidePeople(body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts = np.zeros(len(body.part_names), dtype=bool)
     ever_sampled = np.zeros(len(body.names), dtype=bool)
@@ -95,7 +93,7 @@ def link_budget(
         powers.append(by_part)
         fields.append(_field(echoes, radar.centre_frequency_hz).view(np.float64))
         for look in (solid.look, others.look):
-            look(times, there.at(times), by_part)
+            look(times, body.at(times), by_part)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
         concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
         small = by_part * small_curvature(radar, body, times)

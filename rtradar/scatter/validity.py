@@ -109,7 +109,7 @@ def small_curvature(radar: Radar, body: Body, times: Array) -> NDArray[np.bool_]
     The result is (time, part), for ``times (time,)`` [s].
     """
     centres, frames, semi_axes = body.at(times)
-    sight = np.einsum("tpji,tpj->tpi", frames, np.asarray(radar.position_m) - centres)
+    sight = np.einsum("tpji,tpj->tpi", frames, radar.poses_at(times)[1][:, None] - centres)
     wavenumber = 2 * np.pi * radar.start_frequency_hz / SPEED_OF_LIGHT_MPS
     return np.asarray(wavenumber * smaller_radius(semi_axes, sight) < MINIMUM_KA)
 
@@ -123,7 +123,7 @@ def too_fast(radar: Radar, body: Body, times: Array) -> NDArray[np.bool_]:
         return np.zeros((len(times), len(body.part_names)), dtype=bool)
     early = np.minimum(times, body.duration_s - _STEP_S)
     before, after = (
-        np.linalg.norm(body.at(at).centres - np.asarray(radar.position_m), axis=-1)
+        np.linalg.norm(body.at(at).centres - radar.poses_at(at)[1][:, None], axis=-1)
         for at in (early, early + _STEP_S)
     )
     return np.asarray(np.abs(after - before) / _STEP_S > radar.max_velocity_mps)
@@ -182,12 +182,12 @@ def refuse_too_near(radar: Radar, body: Body, times: Array) -> None:
     The message names the part and the time, one of ``times`` [s].
     """
     centres, frames, semi_axes = body.at(times)
-    antennas = np.concatenate([radar.tx, radar.rx])
+    antennas = np.concatenate(radar.antennas_at(times), axis=1)
     # The distance to a part is at least that to its centre less its largest semi-axis.
-    away = np.linalg.norm(centres[:, None] - antennas[:, None], axis=-1)
+    away = np.linalg.norm(centres[:, None] - antennas[:, :, None], axis=-1)
     gap = away - semi_axes.max(axis=1)
     for time, antenna, part in np.argwhere(gap < MINIMUM_ANTENNA_DISTANCE_M):
-        local = frames[time, part].T @ (antennas[antenna] - centres[time, part])
+        local = frames[time, part].T @ (antennas[time, antenna] - centres[time, part])
         distance = _distance(local, semi_axes[part])
         if distance < MINIMUM_ANTENNA_DISTANCE_M:
             raise InputError(

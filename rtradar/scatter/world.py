@@ -22,7 +22,6 @@ from rtradar.scatter.inside_solids import objects_inside
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.radar_axes import MovingScene, in_radar_axes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.rigid.legs import Past
 from rtradar.scatter.rigid.people import OccludingPeople
@@ -155,12 +154,11 @@ def build_world(
     that traces nothing lets nothing occlude an object either.
     """
     overlaps = objects_inside(scene, body.duration_s) if scene.objects else []
-    radar, body, scene = in_radar_axes(radar, body, scene)
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
     if not scene.objects:
         return model
-    if isinstance(scene, MovingScene):
+    if radar.is_moving and (scene.walls or scene.furniture):
         raise InputError(
             f"scene '{scene.name}': objects that move, in a room before a radar that moves, are "
             f"not simulated; leave out '{scene.objects[0].name}', the walls and furniture, or "

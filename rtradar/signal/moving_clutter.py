@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.radar_axes import MovingScene
 from rtradar.signal.static_clutter import RoomIf
 from rtradar.signal.synthesis import synthesize
 
@@ -51,34 +50,25 @@ class Traced(Protocol):
 
 
 class _Keyframe(NamedTuple):
-    """What the room returns at a keyframe, and the pose (3, 3) and (3,) of the radar.
+    """What the room returns at a keyframe.
 
     ``rest (tx, rx, echo)`` of each object is the length that no way of `_ways` holds [m].
     """
 
     objects: Sequence[Any]
     rest: tuple[_Array, ...]
-    axes: _Array
-    origin: _Array
 
 
 class MovingRoomIf(RoomIf):
-    """IF samples of a room, for a capture of ``duration_s`` by the radar of a `MovingScene`.
+    """IF samples of a room, for a capture of ``duration_s`` by a radar that moves.
 
-    ``trace`` gives the clutter that the upright ``radar`` has in a scene, once for each keyframe.
+    ``trace`` gives the clutter before a radar at rest, once for each keyframe.
     """
 
-    def __init__(
-        self,
-        radar: Radar,
-        scene: MovingScene,
-        duration_s: float,
-        trace: Callable[[MovingScene], Traced],
-    ) -> None:
-        self.scene, self._trace = scene, trace
-        self.times = keyframe_times(scene.radar, duration_s)
+    def __init__(self, radar: Radar, duration_s: float, trace: Callable[[Radar], Traced]) -> None:
+        self._trace, self.times = trace, keyframe_times(radar, duration_s)
         self._kept: KeyframeCache[int, _Keyframe] = KeyframeCache(0, 3)
-        super().__init__(radar, trace(scene).cycle())
+        super().__init__(radar, trace(radar.at(0.0)).cycle())
 
     def add(self, samples: _Samples, chirps: NDArray[np.int64]) -> None:
         """Add the IF samples of the room, as `RoomIf.add`."""
@@ -101,11 +91,7 @@ class MovingRoomIf(RoomIf):
         radar = self._radar
         found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
-        # The antennas as the radar would see them from where it is at the keyframe.
-        centre = np.array(radar.position_m)
-        at_tx, at_rx = (
-            (places - found.origin) @ found.axes + centre for places in self.scene.antennas(times)
-        )
+        at_tx, at_rx = radar.antennas_at(times)
         at_tx = at_tx[np.arange(len(tx)), tx]
         at_rx = np.take_along_axis(at_rx, radar.rx_of_tx[tx][..., None], axis=1)
         for own, rest in zip(found.objects, found.rest, strict=True):
@@ -123,12 +109,9 @@ class MovingRoomIf(RoomIf):
                 samples[some] += synthesize(echoes, radar, times[some], dtype=np.complex64)
 
     def _keyframe(self, keyframe: int) -> _Keyframe:
-        time_s, scene, radar = float(self.times[keyframe]), self.scene, self._radar
-        objects = self._trace(MovingScene.of(scene.radar, scene.world, time_s)).objects
-        (axes,), (origin,) = scene.radar.poses_at([time_s])
-        rx = radar.rx[radar.rx_of_tx]
-        rest = tuple(own.length - _ways(own, radar.tx, rx) for own in objects)
-        return _Keyframe(objects, rest, axes, origin)
+        radar = self._radar.at(float(self.times[keyframe]))
+        objects, rx = self._trace(radar).objects, radar.rx[radar.rx_of_tx]
+        return _Keyframe(objects, tuple(own.length - _ways(own, radar.tx, rx) for own in objects))
 
 
 def keyframe_times(radar: Radar, duration_s: float) -> _Array:

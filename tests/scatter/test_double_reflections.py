@@ -18,11 +18,13 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import cut
 from rtradar.scatter import build_model
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart, solve_doubles
 from rtradar.settings import RunSettings
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
+V = Polarization("v")
 K = 2 * np.pi * 12e9 / SPEED_OF_LIGHT_MPS
 RADAR = dataclasses.replace(rt.Radar.preset("paper-12ghz"), tx_y=1, tx_z=0, rx_y=2, rx_z=0)
 
@@ -59,7 +61,7 @@ def random_pair(seed: int) -> Geometry:
 def test_paths_are_those_of_a_minimiser(seed: int) -> None:
     at, pairs = random_pair(seed), np.array([[0, 1]])
     for polarization in ("v", "h"):
-        found = solve_doubles(at, pairs, polarization=polarization)
+        found = solve_doubles(at, pairs, polarization=Polarization(polarization))
         length, amplitude = solve_double_reference(at, pairs, polarization == "h")
         np.testing.assert_allclose(found.length, length, atol=1e-8)
         np.testing.assert_allclose(found.amplitude, amplitude, rtol=3e-3, atol=1e-9)
@@ -70,8 +72,8 @@ def test_paths_are_those_of_a_minimiser(seed: int) -> None:
 def test_the_way_back_returns_the_same(seed: int) -> None:
     at = random_pair(seed)
     back = at._replace(tx=at.rx[:, 0], rx=at.tx[:, None])
-    there = solve_doubles(at, np.array([[0, 1]]))
-    again = solve_doubles(back, np.array([[1, 0]]))
+    there = solve_doubles(at, np.array([[0, 1]]), polarization=V)
+    again = solve_doubles(back, np.array([[1, 0]]), polarization=V)
     np.testing.assert_allclose(again.length, there.length, atol=1e-9)
     np.testing.assert_allclose(again.amplitude, there.amplitude, rtol=3e-3)
 
@@ -153,7 +155,7 @@ def test_keyframes_change_nothing_but_fades() -> None:
         (number[row["first"]], number[row["last"]])
         for row in doubles.account()["double_reflections"]
     ]
-    cold = solve_doubles(Geometry(tx, rx, *poses), np.array(sorted(pairs)))
+    cold = solve_doubles(Geometry(tx, rx, *poses), np.array(sorted(pairs)), polarization=V)
     there = (cold.amplitude != 0) & (found.amplitude[0][..., kept] != 0)
     assert there.mean() > 0.3
     np.testing.assert_allclose(found.length[..., kept][there], cold.length[there], atol=1e-7)
@@ -209,7 +211,7 @@ def test_a_pair_fades_where_it_begins_to_return() -> None:
 def test_parts_in_one_place_end_the_search() -> None:
     at = random_pair(0)
     at = at._replace(centres=np.repeat(at.centres[:, :1], 2, axis=1))
-    assert not solve_doubles(at, np.array([[0, 1]])).amplitude.any()
+    assert not solve_doubles(at, np.array([[0, 1]]), polarization=V).amplitude.any()
 
 
 @pytest.mark.parametrize("bounces", [0, 3])

@@ -15,7 +15,6 @@ from rtradar.process import range_doppler
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.radar_axes import MovingScene, in_radar_axes
 from rtradar.scatter.world import build_world
 from rtradar.scene import Furniture, Object, Scene, Wall, material
 from rtradar.signal.moving_clutter import MovingRoomIf, keyframe_times
@@ -63,35 +62,31 @@ def moving(*way: tuple[float, float, float], turn: tuple[float, float, float] = 
     return dataclasses.replace(RADAR, **path, path_angles_deg=[(0, 0, 0), turn], yaw_deg=5.0)
 
 
-def room_of(radar: Radar, scene: Scene) -> tuple[Radar, MovingRoomIf, Any]:
-    body = Body.from_motion(rt.synthetic_motion("walk", duration_s=0.1))
-    upright, _, seen = in_radar_axes(radar, body, scene)
-    assert isinstance(seen, MovingScene)
+def room_of(radar: Radar, scene: Scene) -> tuple[MovingRoomIf, Any]:
+    def trace(still: Radar) -> Clutter:
+        return Clutter(still, scene, order=2, variant="scalar")
 
-    def trace(at: Scene) -> Clutter:
-        return Clutter(upright, at, order=2, variant="scalar")
-
-    return upright, MovingRoomIf(upright, seen, 0.1, trace), trace
+    return MovingRoomIf(radar, 0.1, trace), trace
 
 
 @pytest.mark.parametrize("scene", [ROOM, CORNER], ids=["walls", "reflector"])
 def test_a_radar_at_rest_has_the_clutter_of_one_that_does_not_move(scene: Scene) -> None:
-    upright, room, trace = room_of(moving((0, 0, 0)), scene)
+    radar = moving((0, 0, 0))
+    room, trace = room_of(radar, scene)
     assert room.times.tolist() == [0.0, 0.1]
     chirps = np.arange(100, 104)
-    still = RoomIf(upright, trace(room.scene).cycle()).clutter_if(chirps)
+    still = RoomIf(radar, trace(radar.at(0.0)).cycle()).clutter_if(chirps)
     np.testing.assert_allclose(room.clutter_if(chirps), still, atol=2e-6 * np.abs(still).max())
 
 
 @pytest.mark.parametrize(("scene", "apart_db"), [(ROOM, -60), (CORNER, -30)])
 def test_each_chirp_is_that_of_a_radar_at_rest_where_it_is(scene: Scene, apart_db: float) -> None:
     radar = moving((0.05, 0.03, -0.02), turn=(3, 2, 1))
-    upright, room, trace = room_of(radar, scene)
+    room, trace = room_of(radar, scene)
     assert len(room.times) >= 4
     for chirp in (0, 333, 700):
-        time = float(upright.centres_of(np.array([chirp]))[0])
-        seen = MovingScene.of(radar, scene, time)
-        still = RoomIf(upright, trace(seen).cycle()).clutter_if(np.array([chirp]))
+        there = radar.at(float(radar.centres_of(np.array([chirp]))[0]))
+        still = RoomIf(there, trace(there).cycle()).clutter_if(np.array([chirp]))
         away = np.linalg.norm(room.clutter_if(np.array([chirp])) - still) / np.linalg.norm(still)
         assert 20 * np.log10(away) < apart_db
 
@@ -99,21 +94,22 @@ def test_each_chirp_is_that_of_a_radar_at_rest_where_it_is(scene: Scene, apart_d
 @pytest.mark.parametrize("scene", [Scene(walls=ROOM.walls[:1]), CORNER], ids=["wall", "reflector"])
 def test_range_and_doppler_are_those_of_the_closed_form(scene: Scene) -> None:
     velocity = np.array([2.0, 0.5, 0.0])
-    upright, room, _ = room_of(moving(tuple(0.1 * velocity)), scene)
+    radar = moving(tuple(0.1 * velocity))
+    room, _ = room_of(radar, scene)
     chirps = np.arange(RADAR.chirps_per_frame)
-    place = np.array(RADAR.position_m) + velocity * upright.centres_of(chirps).mean()
+    place = np.array(RADAR.position_m) + velocity * radar.centres_of(chirps).mean()
     way = np.array([3.0 - place[0], 0, 0])
     if scene is CORNER:
         way = np.array(CORNER.furniture[0].position_m) - place
     far = float(np.linalg.norm(way))
     rate = -float(velocity @ way) / far
-    power = (np.abs(range_doppler(room.clutter_if(chirps), upright).values) ** 2).sum(axis=2)
+    power = (np.abs(range_doppler(room.clutter_if(chirps), radar).values) ** 2).sum(axis=2)
     row, column = np.unravel_index(power.argmax(), power.shape)
     bins = [np.arange(at - 3, at + 4) for at in (row, column)]
     there = power[np.ix_(*bins)]
     read = [bins[axis] @ there.sum(axis=1 - axis) / there.sum() for axis in (0, 1)]
-    assert abs(read[0] - far / upright.range_bin_m) < 0.1
-    assert abs(read[1] - power.shape[1] // 2 - rate / upright.velocity_bin_mps) < 0.1
+    assert abs(read[0] - far / radar.range_bin_m) < 0.1
+    assert abs(read[1] - power.shape[1] // 2 - rate / radar.velocity_bin_mps) < 0.1
 
 
 def test_keyframes_are_near_each_other_on_the_way_and_few_at_rest() -> None:

@@ -21,12 +21,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
-from rtradar.motion import synthetic_motion
 from rtradar.process import angle, range_doppler
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.radar_axes import in_radar_axes
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.signal import separate
 from rtradar.signal.moving_clutter import MovingRoomIf
@@ -276,9 +273,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
             path_m=[[0, 0, 0], [0.1 * speed, 0.02, -0.01]],
             path_angles_deg=[[0, 0, 0], [4, 2, -1]],
         )
-        body = Body.from_motion(synthetic_motion("walk", duration_s=0.1))
-        upright, _, seen = in_radar_axes(radar, body, scene)
-        room = MovingRoomIf(upright, seen, 0.1, functools.partial(_clutter, upright))
+        room = MovingRoomIf(radar, 0.1, functools.partial(_clutter, scene))
         times = chirp_times(radar, 0, radar.chirps_per_frame)
         way = (
             np.array(apex if name == "trihedral" else (3.0, 0.0, 0.0))
@@ -287,7 +282,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
         way = way if name == "trihedral" else way * (1, 0, 0)
         velocity = np.array([speed, 0.2, -0.1])
         truth = float(np.linalg.norm(way)), -float(velocity @ way / np.linalg.norm(way))
-        power = range_doppler(room.clutter_if(np.arange(len(times))), upright).values
+        power = range_doppler(room.clutter_if(np.arange(len(times))), radar).values
         summed = (np.abs(power) ** 2).sum(axis=2)
         cycles = summed.shape[1]
         read = centroid(summed.sum(axis=1)), centroid(summed.sum(axis=0)) - cycles // 2
@@ -306,7 +301,7 @@ def room_rows(quick: bool) -> Iterator[Row]:
             return
 
 
-def _clutter(radar: Radar, scene: Scene) -> Clutter:
+def _clutter(scene: Scene, radar: Radar) -> Clutter:
     return Clutter(radar, scene, order=1)
 
 

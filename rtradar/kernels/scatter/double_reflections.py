@@ -154,13 +154,15 @@ def _stretch(u, along, step):
 
 
 @inlined()
-def _polarised(direction, horizontal, out):
-    """Field (3,) that an antenna sends or receives along a unit vector; 0 straight up."""
+def _polarised(direction, above, horizontal, out):
+    """Field (3,) that an antenna sends or receives along a unit vector; 0 along its up."""
     x, y, z = direction[0], direction[1], direction[2]
+    u, v, w = above[0], above[1], above[2]
     if horizontal:
-        out[0], out[1], out[2] = y, -x, 0.0
+        out[0], out[1], out[2] = y * w - z * v, z * u - x * w, x * v - y * u
     else:
-        out[0], out[1], out[2] = -z * x, -z * y, 1 - z * z
+        along = dot(direction, above)
+        out[0], out[1], out[2] = u - along * x, v - along * y, w - along * z
     size = math.sqrt(dot(out, out))
     for i in range(3):
         out[i] = out[i] / size if size > 1e-9 else 0.0
@@ -213,7 +215,7 @@ def _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix):
 
 
 @inlined()
-def _search(tx, rx, first, second, options, u, v, points, rows, square):
+def _search(tx, rx, above, first, second, options, u, v, points, rows, square):
     """Find the path of one pair from the unit vectors ``u, v (3,)``; they and ``points`` are set.
 
     Returned are its length and its amplitude, 0 where there is no such reflection. ``rows (15, 3)``
@@ -271,8 +273,8 @@ def _search(tx, rx, first, second, options, u, v, points, rows, square):
     if min(min(cosine_p, dot(s2, normal_p)), min(cosine_q, -dot(s2, normal_q))) <= 0:
         return length, 0.0
     root = lower[0, 0] * lower[1, 1] * lower[2, 2] * lower[3, 3]
-    _polarised(s1, options.horizontal, sent)
-    _polarised(s3, options.horizontal, received)
+    _polarised(s1, above, options.horizontal, sent)
+    _polarised(s3, above, options.horizontal, received)
     _reflected(sent, normal_p)
     _reflected(sent, normal_q)
     value = -2 * ROOT_PI * cosine_p * cosine_q * area / (r2 * root) * dot(sent, received)
@@ -280,12 +282,13 @@ def _search(tx, rx, first, second, options, u, v, points, rows, square):
 
 
 @compiled()
-def solve_double(begin, end, at, pairs, start, options, length, amplitude, points):
+def solve_double(begin, end, at, above, pairs, start, options, length, amplitude, points):
     """Fill length, amplitude (chirp, rx, pair) and points (chirp, rx, pair, 2, 3) [m].
 
-    For chirps from ``begin`` to ``end`` of a `Geometry`; ``pairs (pair, 2)`` are the parts that
-    reflect first and last; ``start (chirp, pair, 2, 3)`` unit vectors where the search begins, NaN
-    where nothing is known, are replaced by those of the last receiver.
+    For chirps from ``begin`` to ``end`` of a `Geometry`, with the antennas' up ``above (chirp,
+    3)``; ``pairs (pair, 2)`` are the parts that reflect first and last; ``start (chirp, pair, 2,
+    3)`` unit vectors where the search begins, NaN where nothing is known, are replaced by those of
+    the last receiver.
     """
     tx, rx, centres, frames, semi_axes = at
     u, v, rows, square = np.empty(3), np.empty(3), np.empty((15, 3)), np.empty((10, 4))
@@ -302,8 +305,9 @@ def solve_double(begin, end, at, pairs, start, options, length, amplitude, point
                 else:
                     _bisecting(first, tx[chirp], second.centre, u)
                     _bisecting(second, first.centre, rx[chirp, receiver], v)
+                ends = tx[chirp], rx[chirp, receiver], above[chirp]
                 given = first, second, options, u, v, points[chirp, receiver, pair]
-                found = _search(tx[chirp], rx[chirp, receiver], *given, rows, square)
+                found = _search(*ends, *given, rows, square)
                 length[chirp, receiver, pair], amplitude[chirp, receiver, pair] = found
                 known = found[1] != 0
                 if known:

@@ -13,7 +13,7 @@ from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.triangles import mean_of_phasor
 
 _STEEP = 1e-9
-"""Horizontal part of a direction below which x takes the place of up, as everywhere."""
+"""Sine of the angle from up below which the boresight takes its place, as everywhere."""
 
 
 class Tubes(NamedTuple):
@@ -32,12 +32,13 @@ class Tubes(NamedTuple):
 
 
 @inlined()
-def _copolar(sx, sy, sz, horizontal):
-    """Polarisation of a receiver: h = up x s, v = s x h."""
-    if sx * sx + sy * sy < _STEEP * _STEEP:
-        hx, hy, hz = 0.0, -sz, sy
-    else:
-        hx, hy, hz = -sy, sx, 0.0
+def _copolar(sx, sy, sz, axes, horizontal):
+    """Polarisation of a receiver, whose axes are columns: h = up x s, v = s x h."""
+    ux, uy, uz = axes[0, 2], axes[1, 2], axes[2, 2]
+    hx, hy, hz = uy * sz - uz * sy, uz * sx - ux * sz, ux * sy - uy * sx
+    if hx * hx + hy * hy + hz * hz < _STEEP * _STEEP:
+        ux, uy, uz = axes[0, 0], axes[1, 0], axes[2, 0]
+        hx, hy, hz = uy * sz - uz * sy, uz * sx - ux * sz, ux * sy - uy * sx
     size = math.sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = hx / size, hy / size, hz / size
     if horizontal:
@@ -46,7 +47,7 @@ def _copolar(sx, sy, sz, horizontal):
 
 
 @inlined()
-def _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered):
+def _amplitude(tubes, tube, sx, sy, sz, axes, horizontal, tapered):
     """Amplitude a of a footprint towards a receiver, times its area."""
     p0, p1, p2 = tubes.places[tube, 0], tubes.places[tube, 1], tubes.places[tube, 2]
     ax, ay, az = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
@@ -58,7 +59,7 @@ def _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered):
         nx, ny, nz = -nx, -ny, -nz
     n_d, n_e = nx * d[0] + ny * d[1] + nz * d[2], nx * e[0] + ny * e[1] + nz * e[2]
     n_s = nx * sx + ny * sy + nz * sz
-    qx, qy, qz = _copolar(sx, sy, sz, horizontal)
+    qx, qy, qz = _copolar(sx, sy, sz, axes, horizontal)
     e_q, d_q = e[0] * qx + e[1] * qy + e[2] * qz, d[0] * qx + d[1] * qy + d[2] * qz
     e_s, n_q = e[0] * sx + e[1] * sy + e[2] * sz, nx * qx + ny * qy + nz * qz
     weight = (e_q * (n_s - n_d) + d_q * n_e - e_s * n_q) / 2
@@ -69,13 +70,13 @@ def _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered):
 
 @compiled()
 def radiate_tubes(
-    start, stop, tubes, visible, rx, wavenumber, length, horizontal, spreading, tapered, out
+    start, stop, tubes, visible, rx, axes, wavenumber, length, horizontal, spreading, tapered, out
 ):
     """Add what tubes send to receivers to ``out (chunk, node, rx, group)``, a part in each chunk.
 
     Tasks ``start`` to ``stop`` are done, one for each chunk and receiver. ``visible (rx, tube)``,
-    ``rx (rx, 3)`` [m], ``wavenumber (node,)`` [1/m], and the path ``length (rx, group)`` whose
-    phase is taken out [m].
+    ``rx (rx, 3)`` [m] and their axes (3, 3), ``wavenumber (node,)`` [1/m], and the path ``length
+    (rx, group)`` whose phase is taken out [m].
     """
     count, receivers, chunks = len(tubes.group), len(rx), len(out)
     for task in range(start, stop):
@@ -90,7 +91,7 @@ def radiate_tubes(
             sx, sy, sz = x - middle[0], y - middle[1], z - middle[2]
             leg = math.sqrt(sx * sx + sy * sy + sz * sz)
             sx, sy, sz = sx / leg, sy / leg, sz / leg
-            weight = _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered)
+            weight = _amplitude(tubes, tube, sx, sy, sz, axes, horizontal, tapered)
             if spreading:
                 weight /= leg
             # Paths over the corners, and their mean.

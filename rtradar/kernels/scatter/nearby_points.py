@@ -231,7 +231,7 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
                 for i in range(receivers):
                     antenna = _to_part((rx[0, i], rx[1, i], rx[2, i]), centre, frame)
                     local_r[0, i], local_r[1, i], local_r[2, i] = antenna
-                options = Options(False, False, True)
+                options = Options(False, True)
                 search_all(source, local_r, axes, up, options, guess, one, room)
             for i in range(receivers):
                 length[chirp, i, echo], amplitude[chirp, i, echo] = room[0, i], room[1, i]

@@ -57,7 +57,6 @@ class Geometry(NamedTuple):
 class Options(NamedTuple):
     """What an amplitude holds: co-polarisation (v, or h), and 1 / (R1 R2)."""
 
-    polarized: bool
     horizontal: bool
     spreading: bool
 
@@ -308,11 +307,12 @@ def search_all(tx, rx, axes, up, options, guess, one, out):
 
 
 @compiled()
-def solve(begin, end, at, start, options, length, amplitude, point):
+def solve(begin, end, at, above, start, options, length, amplitude, point):
     """Fill length, amplitude (chirp, rx, part) and, unless empty, point (chirp, rx, part, 3) [m].
 
-    For chirps from ``begin`` to ``end`` of a `Geometry`; the search starts at ``start (chirp, part,
-    3)`` in the ellipsoid's axes, NaN where nothing is known. `Options` say what amplitudes hold.
+    For chirps from ``begin`` to ``end`` of a `Geometry`; the antennas' up is ``above (chirp, 3)``,
+    0 for amplitudes without regard to polarisation. The search starts at ``start (chirp, part, 3)``
+    in the ellipsoid's axes, NaN where nothing is known. `Options` say what amplitudes hold.
     """
     # Unpacked here: to take an array out of a tuple counts a reference, which takes time in loops.
     tx, rx, centres, frames, semi_axes = at
@@ -321,17 +321,18 @@ def solve(begin, end, at, start, options, length, amplitude, point):
     local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
     for chirp in range(begin, end):
         for part in range(parts):
-            # Antennas, and the vertical, in the axes of the part.
+            # Antennas, and their up, in the axes of the part.
             frame, centre = frames[chirp, part], centres[chirp, part]
             for i in range(3):
                 local_t[i] = 0.0
                 local_r[i] = 0.0
+                up[i] = 0.0
                 for j in range(3):
                     local_t[i] += frame[j, i] * (tx[chirp, j] - centre[j])
+                    up[i] += frame[j, i] * above[chirp, j]
                     for receiver in range(receivers):
                         away = rx[chirp, receiver, j] - centre[j]
                         local_r[i, receiver] += frame[j, i] * away
-                up[i] = frame[2, i] if options.polarized else 0.0
                 guess[i] = start[chirp, part, i]
             search_all(local_t, local_r, semi_axes[part], up, options, guess, one, out)
             for receiver in range(receivers):

@@ -48,7 +48,7 @@ def snapshots(table: EchoTable) -> Snapshots:
     model = capture.model.person if isinstance(capture.model, World) else capture.model
     times = np.minimum(radar.window_times(capture.frame_starts[window]), body.duration_s)
     direct = (WallPath((), ()),)
-    paths = model.paths_in_world(radar) if isinstance(model, RoomModel) else direct
+    paths = model.paths if isinstance(model, RoomModel) else direct
     keys, observed = _by_key(table.shown(), len(body.part_names))
     chosen = _strongest(keys, observed.power_m2)
     keys = [keys[number] for number in chosen]

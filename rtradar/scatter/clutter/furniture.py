@@ -27,7 +27,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes, behind_walls
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.polarization import apply_te_tm, is_shaped
+from rtradar.scatter.common.polarization import Polarization, apply_te_tm, pattern_of
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
@@ -106,12 +106,20 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
 
 def _facet_edge(corners: Array, radar: Radar) -> float:
     """Longest side of facets [m], by the bow of paths over it, the group and the piece."""
-    antennas = np.concatenate([radar.tx, radar.rx])
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    antennas, (low, high) = np.concatenate([radar.tx, radar.rx]) @ radar.axes, _box(corners, radar)
     nearest = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min()
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
     edge = flat_edge(float((high - low).max()), float(nearest), wavenumber)
     return min(edge, 2 * radar.range_bin_m)
+
+
+def _box(places: Array, radar: Radar) -> Array:
+    """Least and largest coordinates (2, 3) of places (..., 3), in the radar's axes [m].
+
+    So radar and room give the same, however they are turned together.
+    """
+    seen = places.reshape(-1, 3) @ radar.axes
+    return np.stack([seen.min(axis=0), seen.max(axis=0)])
 
 
 def flat_edge(extent: float, nearest: float, wavenumber: float) -> float:
@@ -161,7 +169,8 @@ class FacetGroups:
     def __init__(self, middles: Array, radar: Radar) -> None:
         self._origin, self._bin = np.array(radar.position_m), radar.range_bin_m
         way = (middles - self._origin).mean(axis=0)
-        self._sides = np.linalg.svd(way[None])[2][1:]
+        # In the radar's axes, as in `_box`.
+        self._sides = np.linalg.svd((way @ radar.axes)[None])[2][1:] @ radar.axes.T
         cells = self._cells(middles)
         self._least, self._count = cells.min(axis=0), np.ptp(cells, axis=0) + 1
         self._keys, own, counts = np.unique(
@@ -194,8 +203,9 @@ class PathGroups:
     """
 
     def __init__(self, places: Array, radar: Radar, order: int) -> None:
-        low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-        self._middle, self._step, self.order = (low + high) / 2, radar.range_bin_m, order
+        low, high = _box(places, radar)
+        self._middle = radar.axes @ (low + high) / 2
+        self._step, self.order = radar.range_bin_m, order
         self._origin = np.array(radar.position_m)
         # From face to face and back, no path differs from that over the middle by more.
         self._half = int(np.ceil((order + 1) * np.linalg.norm(high - low) / self._step))
@@ -247,12 +257,13 @@ def _returns(
 ) -> RoomEchoes | None:
     bounces, places = 1 if closed else SHEET_BOUNCES, grid.tubes.places
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
+    polarization = Polarization(radar.polarization, radar.axes)
     shooter = Shooter(
         surfaces=surfaces,
         grid=grid,
         bounces=bounces,
         wavenumber=wavenumber,
-        polarization=radar.polarization,
+        polarization=polarization,
         antenna=radar.tx_antenna,
         two_sided=not closed,
     )
@@ -265,10 +276,9 @@ def _returns(
     if not amplitude.any():
         return None
     centres = np.concatenate([groups.centres, *(chain.centres() for chain in chains)])
-    if is_shaped(radar.rx_antenna):
-        # A group, which its bounces leave last, is small against what a pattern resolves.
-        ways = centres - radar.rx[radar.rx_of_tx][:, :, None]
-        amplitude *= np.sqrt(radar.rx_antenna.relative(ways, radar.polarization))
+    # A group, which its bounces leave last, is small against what a pattern resolves.
+    ways = centres - radar.rx[radar.rx_of_tx][:, :, None]
+    amplitude *= pattern_of(radar.rx_antenna, ways, polarization)
     orders = [1, *(chain.order for chain in chains)]
     counts = [len(groups.centres), *(chain.count for chain in chains)]
     returns = RoomEchoes(
@@ -290,6 +300,7 @@ def _shot(
 ) -> tuple[Array, NDArray[np.complex128]]:
     """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
     surfaces, material, groups, chains, nodes, radar = sampling
+    polarization = Polarization(radar.polarization, radar.axes)
     tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
     wavenumber = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
     lengths = [
@@ -306,7 +317,7 @@ def _shot(
         visible = exits(surfaces, footprints, rx)
         turn, lit = _reflected(footprints, material, radar.centre_frequency_hz)
         lit = replace(lit, surface=group)
-        own = radiate(lit, visible, rx, wavenumber, lengths[-1], polarization=radar.polarization)
+        own = radiate(lit, visible, rx, wavenumber, lengths[-1], polarization=polarization)
         sums.append(turn * own)
     return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
 

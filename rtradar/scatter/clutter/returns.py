@@ -19,7 +19,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.polarization import antenna_field
+from rtradar.scatter.common.polarization import Polarization, antenna_field
 from rtradar.scatter.multipath.slab_series import WallSeries, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse, Wave
@@ -216,11 +216,12 @@ def _transmitted(
     """Echoes behind walls, in groups of equal delays, and their error [m]."""
     points = returns.points[0, 0, :, 0]
     walls = WallResponse(WallEdges.of(scene.walls, radar), series, returns.frequency)
+    polarization = Polarization(radar.polarization, radar.axes)
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
         ways = points - antennas[:, None]
         directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
-        sent = antenna_field(directions, radar.polarization, x_for_steep=True)
+        sent = antenna_field(directions, polarization, x_for_steep=True)
         waves = walls.transmitted(0, walls.start(sent), antennas[:, None], points)
         return [(wave, np.asarray((wave.field * sent).sum(axis=-1).conj())) for wave in waves]
 

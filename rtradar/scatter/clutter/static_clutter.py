@@ -159,7 +159,7 @@ class Clutter:
         whole, of_objects = 0.0, {"": 0.0}
         for own in self.objects:
             power = np.abs(own.amplitude[len(own.frequency) // 2]) ** 2
-            ends = own.points[..., [0, -1], 0] - self.radar.position_m[0]  # boresight is along x
+            ends = (own.points[..., [0, -1], :] - self.radar.position_m) @ self.radar.axes[:, 0]
             whole += float(power.sum())
             of_objects[own.name] = float((power * (ends < 0).any(axis=-1)).sum())
         leader = max(of_objects, key=of_objects.__getitem__)

@@ -45,7 +45,7 @@ from rtradar.scatter.clutter.returns import (
     delayed,
 )
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.polarization import sent_field
+from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain, images
 from rtradar.scatter.multipath.slab_series import DENSE_NODES, whole_walls
 from rtradar.scatter.multipath.wall_edges import WallEdges
@@ -113,9 +113,10 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
     sources = [image.reshape(-1, 3)[which] for image in images]
     ways = [end - source for source, end in zip(sources, ends[1:], strict=True)]
     ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
-    ahead = sent_field(radar.tx_antenna, ways[0], radar.polarization, x_for_steep=True)
+    polarization = Polarization(radar.polarization, radar.axes)
+    ahead = sent_field(radar.tx_antenna, ways[0], polarization, x_for_steep=True)
     sent = ahead * weight.ravel()[which, None]
-    received = sent_field(radar.rx_antenna, -ways[-1], radar.polarization, x_for_steep=True)
+    received = sent_field(radar.rx_antenna, -ways[-1], polarization, x_for_steep=True)
     spread = -2 * sqrt(pi) / length.ravel()[which]
     frequency = sweep_nodes(radar, DENSE_NODES)
     best = None
@@ -195,13 +196,14 @@ def _rough_face(
     frequency = np.array([radar.centre_frequency_hz])
     smooth = replace(wall, roughness_m=0.0)
     normal = -wall.normal if face.back else wall.normal
+    polarization = Polarization(radar.polarization, radar.axes)
 
     def legs(antennas: Array, element: Antenna | None) -> tuple[Array, Array, Array]:
         """Distances, cosines and fields that a smooth wall would reflect, (antenna, point)."""
         ways = points - antennas[:, None]
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
-        sent = sent_field(element, ways, radar.polarization, x_for_steep=True)
+        sent = sent_field(element, ways, polarization, x_for_steep=True)
         field = reflect(smooth, sent.astype(np.complex128), ways, frequency)[0]
         clear = ~tracer.blocked(antennas[:, None], points)
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from rtradar.radar import Radar
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+_KEPT_NODES = 32
+"""Radars at rest whose nodes are kept: of one that moves, poses that are looked at together."""
 
 
 def sweep_nodes(radar: Radar, count: int) -> Array:
@@ -89,7 +93,7 @@ class ArrayEnds:
 
     @classmethod
     def of(cls, radar: Radar) -> ArrayEnds:
-        """Return the ends of the lines of this radar."""
+        """Return the ends of the lines of this radar at rest."""
         lines = _tx_lines(radar)
         line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, 2))
         for number, (line, _) in enumerate(lines):
@@ -114,11 +118,13 @@ class ArrayEnds:
         )
 
 
+@lru_cache(maxsize=_KEPT_NODES)
 def shadow_nodes(radar: Radar, along_tx: int = 2, along_rx: int = 1) -> tuple[Array, Array, Array]:
     """Return places along the lines of Tx and those of Rx (node, 3) [m], and their weights.
 
     One place is the middle of a line, two are its ends; with as many as antennas or more each
     antenna is one. The weights of the places in each antenna, (tx, node) and (rx, node), follow.
+    The radar is at rest.
     """
     blocks, found = [], []
     for antennas, lines, count in (
@@ -172,11 +178,13 @@ def _blocks(radar: Radar, along: tuple[int, int]) -> Iterator[_Block]:
             yield _Block(tx_line, rx_line, ends, *(_evenly(int(count)) for count in counts))
 
 
+@lru_cache(maxsize=_KEPT_NODES)
 def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
     """Spread nodes evenly from end to end of each line, for polynomials in between.
 
     There are ``along_tx`` nodes of Tx times ``along_rx`` of Rx for each two lines. A line with
-    fewer antennas than that has a node at each; a single node is in the middle.
+    fewer antennas than that has a node at each; a single node is in the middle. The radar is at
+    rest.
     """
     places: list[Array] = []
     blocks = list(_blocks(radar, (along_tx, along_rx)))

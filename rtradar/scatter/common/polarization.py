@@ -1,4 +1,4 @@
-"""Polarisation: what antennas send and receive, and what surfaces do to it.
+"""Polarisation and patterns: what antennas send and receive, and what surfaces do to it.
 
 A surface multiplies the TE and the TM part of a field by one coefficient each. The body's surface
 is a perfect conductor, or a half-space such as skin.
@@ -7,7 +7,7 @@ is a perfect conductor, or a half-space such as skin.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, TypeGuard
+from typing import Any, Literal, NamedTuple, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ CONDUCTOR = "perfect-conductor"
 BODY_MATERIALS = (CONDUCTOR, "skin")
 
 STEEP = 1e-9
-"""Sine of the angle from the vertical below which v has no direction of its own."""
+"""Sine of the angle from the antenna's own up below which v has no direction of its own."""
 _NORMAL_INCIDENCE = 1e-9
 """Sine of incidence below which the plane of incidence has no direction of its own."""
 
@@ -36,38 +36,72 @@ def unit(vectors: Array) -> Array:
     return np.asarray(np.where(size > 1e-12, vectors / np.where(size > 1e-12, size, 1.0), 0.0))
 
 
+class Polarization(NamedTuple):
+    """How antennas are turned, and which way their field points.
+
+    ``axes`` (3, 3) are their boresight, left and up in the world, as columns, by default the
+    world's own. There may be one for each of the first indices of directions, (..., 3, 3).
+    """
+
+    kind: Literal["v", "h"]
+    axes: Array = np.eye(3)
+
+    @property
+    def up(self) -> Array:
+        """Unit vector (..., 3) across which h is, and along which v is as far as it can be."""
+        return self.axes[..., 2]
+
+    @property
+    def ahead(self) -> Array:
+        """Unit vector (..., 3) that takes the place of ``up`` in directions along that."""
+        return self.axes[..., 0]
+
+    def seen(self, directions: Array) -> Array:
+        """Return directions of the world (..., 3) in the axes of the antennas."""
+        flat = directions.reshape(*self.axes.shape[:-2], -1, 3)
+        return np.asarray((flat @ self.axes).reshape(directions.shape))
+
+
 def antenna_field(
-    directions: Array, polarization: Literal["v", "h"], *, x_for_steep: bool = False
+    directions: Array, polarization: Polarization, *, x_for_steep: bool = False
 ) -> Array:
     """Compute the polarisation of the field that an antenna sends in some directions.
 
-    The directions (..., 3) are unit vectors, and so is the result: v is world z projected across
-    the direction, h is across both. Straight above and below, x is used in place of z with
-    ``x_for_steep``; else the field is 0 there.
+    The directions (..., 3) are unit vectors, and so is the result: v is the antenna's up projected
+    across the direction, h is across both. Where the direction is along up, its boresight is used
+    in place of that with ``x_for_steep``; else the field is 0 there.
     """
-    up = np.array([0.0, 0.0, 1.0])
+    missing = (1,) * (directions.ndim - polarization.up.ndim)
+    up, ahead = (
+        own.reshape(*own.shape[:-1], *missing, 3) for own in (polarization.up, polarization.ahead)
+    )
     if x_for_steep:
-        steep = np.hypot(directions[..., 0], directions[..., 1]) < STEEP
-        up = np.where(steep[..., None], [1.0, 0.0, 0.0], up)
+        steep = np.linalg.norm(np.cross(directions, up), axis=-1, keepdims=True) < STEEP
+        up = np.where(steep, ahead, up)
     along = np.sum(up * directions, axis=-1, keepdims=True)
-    return unit(up - along * directions if polarization == "v" else np.cross(directions, up))
+    return unit(up - along * directions if polarization.kind == "v" else np.cross(directions, up))
 
 
 def sent_field(
     antenna: Antenna | None,
     directions: Array,
-    polarization: Literal["v", "h"],
+    polarization: Polarization,
     *,
     x_for_steep: bool = False,
 ) -> Array:
-    """Compute the field that an antenna sends, `antenna_field` times the root of its pattern.
-
-    The pattern is that of the power, relative to its peak; no antenna is isotropic.
-    """
+    """Compute the field that an antenna sends, `antenna_field` times `pattern_of`."""
     field = antenna_field(directions, polarization, x_for_steep=x_for_steep)
+    return field * pattern_of(antenna, directions, polarization)[..., None]
+
+
+def pattern_of(antenna: Antenna | None, directions: Array, polarization: Polarization) -> Array:
+    """Compute the amplitude that an antenna sends in directions (..., 3) of any length.
+
+    It is the root of the power pattern, relative to its peak (...); no antenna is isotropic.
+    """
     if not is_shaped(antenna):
-        return field
-    return field * np.sqrt(antenna.relative(directions, polarization))[..., None]
+        return np.ones(directions.shape[:-1])
+    return np.sqrt(antenna.relative(polarization.seen(directions), polarization.kind))
 
 
 def is_shaped(antenna: Antenna | None) -> TypeGuard[Antenna]:
@@ -108,7 +142,7 @@ def apply_te_tm(
     return np.asarray(in_te[..., None] * across + in_tm[..., None] * np.cross(across, leaving))
 
 
-def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Array:
+def copolar(to_tx: Array, to_rx: Array, polarization: Polarization) -> Array:
     """Compute the co-polar fraction of the field that a conductor reflects from Tx to Rx.
 
     ``to_tx`` and ``to_rx (..., 3)`` are vectors from the target to the antennas, of any length. The
@@ -129,9 +163,7 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
     return np.asarray(np.where(known, fraction, 1.0))
 
 
-def driven_currents(
-    to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]
-) -> tuple[Array, Array]:
+def driven_currents(to_tx: Array, to_rx: Array, polarization: Polarization) -> tuple[Array, Array]:
     """Compute what the currents of physical optics radiate, as a function of the normal n.
 
     The current 2 n x H radiates the co-polar obliquity ``along (...)`` times n.s_T plus n times the
@@ -179,9 +211,7 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     return apply_te_tm(field, directions, onward, normals, te, tm)
 
 
-def material_factor(
-    to_tx: Array, to_rx: Array, eta: Field, polarization: Literal["v", "h"]
-) -> Field:
+def material_factor(to_tx: Array, to_rx: Array, eta: Field, polarization: Polarization) -> Field:
     """Compute the co-polar echo over that of a perfect conductor of the same shape.
 
     ``to_tx`` and ``to_rx (..., 3)`` are vectors from the specular point to the antennas, of any
@@ -195,9 +225,7 @@ def material_factor(
     return over_copolar(back, tx, rx, polarization)
 
 
-def over_copolar(
-    field: Field, to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]
-) -> Field:
+def over_copolar(field: Field, to_tx: Array, to_rx: Array, polarization: Polarization) -> Field:
     """Divide a co-polar field (node, ...) by that of a conductor; 1 where that has none."""
     own = copolar(to_tx, to_rx, polarization)
     known = np.abs(own) > 1e-6
@@ -218,7 +246,7 @@ class Surfaces:
         # Over a sweep the reflection of skin changes by a few hundredths: that at its middle
         # serves for all of it.
         self._centre_hz = np.array([radar.centre_frequency_hz])
-        self._polarization = radar.polarization
+        self._kind = radar.polarization
 
     @property
     def conduct(self) -> bool:
@@ -259,5 +287,6 @@ class Surfaces:
             if not kind.conducts:
                 own = np.flatnonzero(self._of_part == name)
                 ways, eta = (to_tx[:, own], to_rx[:, own]), kind.eta(self._centre_hz)
-                out[:, own] = material_factor(*ways, eta, self._polarization)[0].conj()
+                sent = Polarization(self._kind, at.axes)
+                out[:, own] = material_factor(*ways, eta, sent)[0].conj()
         return out

@@ -109,7 +109,8 @@ class ChirpPoses(NamedTuple):
     """Body and antennas chirp by chirp, float64, world [m].
 
     ``tx_index (chirp,)``, ``tx (chirp, 3)``, ``rx (chirp, rx, 3)``, ``centres (chirp, part, 3)``,
-    ``frames (chirp, part, 3, 3)``, ``semi_axes (part, 3)``.
+    ``frames (chirp, part, 3, 3)``, ``semi_axes (part, 3)``; ``axes (chirp, 3, 3)`` are those of the
+    radar, each as `Radar.axes` is, or one (3, 3) for all chirps.
     """
 
     tx_index: NDArray[np.int64]
@@ -118,12 +119,13 @@ class ChirpPoses(NamedTuple):
     centres: NDArray[np.float64]
     frames: NDArray[np.float64]
     semi_axes: NDArray[np.float64]
+    axes: NDArray[np.float64] = np.eye(3)
 
 
 def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPoses:
-    """Compute the poses of a body at the centres of some chirps.
+    """Compute the poses of a radar and a body at the centres of some chirps.
 
-    Past the end of the recording the body rests in its last pose.
+    Past the end of the recording both rest in their last pose.
 
     Parameters
     ----------
@@ -139,9 +141,29 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
     ChirpPoses
     """
     times = np.minimum(radar.centres_of(chirps), body.duration_s)
-    poses = body.at(times)
-    tx_index = radar.tx_of_chirp(chirps)
-    return ChirpPoses(tx_index, radar.tx[tx_index], radar.rx[radar.rx_of_tx[tx_index]], *poses)
+    tx_index, number = radar.tx_of_chirp(chirps), np.arange(len(times))
+    tx, rx = radar.antennas_at(times)
+    ends = tx[number, tx_index], rx[number[:, None], radar.rx_of_tx[tx_index]]
+    return ChirpPoses(tx_index, *ends, *body.at(times), radar.poses_at(times)[0])
+
+
+def keyframe_time(radar: Radar, body: Body, chirp: int) -> float:
+    """Time of a keyframe, in the middle of a chirp of `Radar.gapless`; at most the body's last [s].
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar that transmits the chirps.
+    body : Body
+        Moving body.
+    chirp : int
+        Number of the chirp, counted without gaps.
+
+    Returns
+    -------
+    float
+    """
+    return min(float(radar.gapless.centres_of(np.array([chirp]))[0]), body.duration_s)
 
 
 def one_echo_a_part(

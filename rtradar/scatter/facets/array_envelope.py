@@ -54,7 +54,7 @@ class ArrayEnvelope:
         places: int = 8,
     ) -> None:
         self._radar, self._body, self._carriers, self._ratio = radar, body, carriers, ratio
-        self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
+        self._weights = array_nodes(radar, *_FINE).weights
         # From coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
@@ -65,8 +65,8 @@ class ArrayEnvelope:
     def _sample(self, place: float, parts: Indices, whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
-        pose = self._body.at([time])
-        coarse = self._at_nodes(time, pose, self._coarse, parts)
+        pose, radar = self._body.at([time]), self._radar.at(time)
+        coarse = self._at_nodes(time, pose, array_nodes(radar, *_COARSE), parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse, owners_of(self._body)) if whole is None else whole[parts]
@@ -75,7 +75,7 @@ class ArrayEnvelope:
             > self._unevenness * scale
         )
         if uneven.any():
-            fine = self._at_nodes(time, pose, self._fine, parts[uneven])
+            fine = self._at_nodes(time, pose, array_nodes(radar, *_FINE), parts[uneven])
             ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
         return Sample(ratio, strength)
 
@@ -98,7 +98,7 @@ class ArrayEnvelope:
         """
         amplitude = np.empty((nodes, *strength.shape), dtype=np.complex128)
         intervals, rest = keyframe_before(self._radar, chirps, self._step)
-        envelope, weights = self._envelope, self._fine.weights
+        envelope, weights = self._envelope, self._weights
         # Power is measured at keyframes, where nothing is asked of what comes after.
         between = set(intervals[rest != 0].tolist())
         in_order = sorted(set(intervals.tolist()))

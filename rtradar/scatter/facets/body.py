@@ -15,6 +15,7 @@ from rtradar.kernels.scatter.facets import Facets, Views, Waves
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, sweep_nodes
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
@@ -162,10 +163,11 @@ class FacetBody:
         seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
         index = np.arange(len(antennas))[None]
         places = (pose.centres, pose.frames), antennas[None], nodes.pairs
-        return self.amplitude(*places, length[None], seen, index, parts)[:, 0]
+        axes = self._radar.at(time).axes
+        return self.amplitude(*places, length[None], seen, index, parts, axes)[:, 0]
 
     def visible(
-        self, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
+        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]
     ) -> NDArray[np.complex128]:
         """What shadows leave (node, pair, n) of the amplitudes of parts (n,): 1 in full view.
 
@@ -179,8 +181,9 @@ class FacetBody:
         if len(cut):
             index, seen = np.arange(len(antennas))[None], seen.of(cut)
             places = (pose.centres, pose.frames), antennas[None], nodes.pairs, length[None, :, cut]
+            axes = self._radar.at(time).axes
             shadowed, free = (
-                self.amplitude(*places, own, index, parts[cut])[:, 0]
+                self.amplitude(*places, own, index, parts[cut], axes)[:, 0]
                 for own in (seen, seen.unhidden())
             )
             left[..., cut] = visible_fraction(shadowed, free)
@@ -195,13 +198,15 @@ class FacetBody:
         seen: Seen,
         index: NDArray[np.integer],
         parts: NDArray[np.int64],
+        axes: Array,
     ) -> NDArray[np.complex128]:
         """Amplitude (node, pose, pair, n) of `Echoes` for poses and pairs of antennas [m].
 
         ``pose`` are centres and frames of the body, ``antennas (pose, antenna, 3)``, world [m];
         ``pairs (pair, 2)`` Tx and Rx among these; ``length (pose, pair, n)`` the carriers [m] of
         the ``parts (n,)``; ``seen`` what some antennas see of them, and ``index (pose, antenna)``
-        the number of each antenna among those.
+        the number of each antenna among those; ``axes (pose, 3, 3)``, or (3, 3) for all poses,
+        those of the radar.
         """
         centres, frames = (array[:, parts] for array in pose)
         tasks, nodes = centres.shape[0] * len(parts), len(self.frequency)
@@ -217,7 +222,8 @@ class FacetBody:
         waves = Waves(pairs, carrier, np.broadcast_to(k, (tasks, nodes)), self._spreading)
         to_tx, to_rx = (antennas[:, None, pairs[:, side]] - centres[:, :, None] for side in (0, 1))
         ways = to_tx, to_rx, frames
-        waves, factor = with_obliquity(waves, *ways, self._radar.polarization, shadow=False)
+        polarization = Polarization(self._radar.polarization, axes)
+        waves, factor = with_obliquity(waves, *ways, polarization, shadow=False)
         field = facet_integral(self._facets, views, waves)
         field = field.reshape(*factor.shape, nodes) * factor[..., None]
         return np.asarray(np.conj(np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))))

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
@@ -54,7 +55,7 @@ def mesh_scattering(
     tx: Array,
     rx: Array,
     wavenumber: Array,
-    polarization: Literal["v", "h"],
+    polarization: Polarization,
     variant: str,
 ) -> NDArray[np.complex128]:
     """Co-polar scattering length (n,) of a mesh, see `facet_scattering`.

@@ -7,14 +7,12 @@ are far apart as the target sees them, the currents on all that Tx lights count.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.facets import Waves
-from rtradar.scatter.common.polarization import copolar, driven_currents, unit
+from rtradar.scatter.common.polarization import Polarization, copolar, driven_currents, unit
 
 Array = NDArray[np.float64]
 
@@ -36,7 +34,7 @@ def with_obliquity(
     to_tx: Array,
     to_rx: Array,
     frames: Array,
-    polarization: Literal["v", "h"],
+    polarization: Polarization,
     *,
     shadow: bool,
 ) -> tuple[Waves, Array]:

@@ -25,6 +25,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
@@ -140,7 +141,6 @@ class SkinFacets:
             [skin.part + first for skin, first in zip(self._skins, counts[:-1], strict=True)]
         )
         self._pieces = [_piece(fine, part, own) for own in range(counts[-1])]
-        self._eyes = shadow_nodes(radar)[0]
         self._tracing = threading.Lock()
         self._looks: KeyframeCache[int, NDArray[np.bool_]] = KeyframeCache(0, _KEPT)
 
@@ -188,8 +188,9 @@ class SkinFacets:
         lengths are reckoned.
         """
         vertices = np.concatenate([skin.posed(time)[1] for skin in self._skins])
-        seen = self._seen(time)
-        apart = np.linalg.norm(antennas[:, None] - self._eyes, axis=2)
+        seen, radar = self._seen(time), self._radar.at(time)
+        polarization = Polarization(radar.polarization, radar.axes)
+        apart = np.linalg.norm(antennas[:, None] - shadow_nodes(radar)[0], axis=2)
         row = np.argmin(apart, axis=1)[None]
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
         field = np.empty((len(parts), len(pairs), len(self.frequency)), dtype=np.complex128)
@@ -209,7 +210,7 @@ class SkinFacets:
             views = Views(np.zeros(1, dtype=np.int64), local, row, np.ascontiguousarray(lit))
             waves = Waves(pairs, length[None, :, place], k, self._spreading)
             ways = to_tx[None, place, None], to_rx[None, place, None], frame
-            waves, factor = with_obliquity(waves, *ways, self._radar.polarization, shadow=False)
+            waves, factor = with_obliquity(waves, *ways, polarization, shadow=False)
             field[place] = facet_integral(facets, views, waves)[0] * factor[0, 0, :, None]
         return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))))
 
@@ -232,12 +233,13 @@ class SkinFacets:
         they are of, if the eyes are far apart.
         """
         posed = [skin.posed(time)[0] for skin in self._skins]
+        eyes = shadow_nodes(self._radar.at(time))[0]
         # Each in a scene about its own middle: float32 rounds alike whoever else is there.
         scenes = [
             MeshSurfaces(self._mi, vertices, skin.coarse, same=_SAME)
             for skin, vertices in zip(self._skins, posed, strict=True)
         ]
-        ways = self._eyes[:, None] - np.array([vertices.mean(axis=0) for vertices in posed])
+        ways = eyes[:, None] - np.array([vertices.mean(axis=0) for vertices in posed])
         wide = bool((directions_apart(ways[:, None], ways[None]) > NEAR).any())
         found = []
         for skin, vertices, own in zip(self._skins, posed, scenes, strict=True):
@@ -245,8 +247,8 @@ class SkinFacets:
             normals = facet_normals(vertices[None], skin.coarse.astype(np.int32))[0][0]
             # Those at the corners, in their order, then the one between.
             middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
-            seen = np.zeros((len(self._eyes), len(corners), 4), dtype=bool)
-            for eye, place in enumerate(self._eyes):
+            seen = np.zeros((len(eyes), len(corners), 4), dtype=bool)
+            for eye, place in enumerate(eyes):
                 faces = np.sum(normals * (place - corners[:, 0]), axis=1) > 0
                 facing, away = np.flatnonzero(faces), np.flatnonzero(~faces)
                 points, whose = middles[facing].reshape(-1, 3), np.repeat(facing, 4)
@@ -256,7 +258,7 @@ class SkinFacets:
                     inward = -np.repeat(normals[away], 4, axis=0)
                     exits, whose = own.way_out(inside, inward, place, whose)
                     seen[eye, away] = _clear(place, exits, whose, own, scenes).reshape(-1, 4)
-            found.append(seen.reshape(len(self._eyes), -1))
+            found.append(seen.reshape(len(eyes), -1))
         return np.concatenate(found, axis=1)
 
 

@@ -14,6 +14,7 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.body import FacetShadows, Seen, visible_fraction
 from rtradar.scatter.facets.mesh_target import mesh_scattering
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
@@ -69,9 +70,10 @@ def facet_scattering(
         raise InputError(
             "facets: a mesh brings its own triangles; leave facets out, or subdivide the mesh"
         )
+    sent = Polarization(polarization)
     if not isinstance(solid, Ellipsoids):
-        return mesh_scattering(solid, tx, rx, wavenumber, polarization, variant)
-    pairs = _Pairs(tx, rx, wavenumber, polarization, wide=False)
+        return mesh_scattering(solid, tx, rx, wavenumber, sent, variant)
+    pairs = _Pairs(tx, rx, wavenumber, sent, wide=False)
     count = partial(_enough_facets, solid, facets)
     field = _block_by_block(solid, pairs, variant, count, _fields).sum(axis=1)
     return np.asarray(field * np.linalg.norm(tx, axis=1) * np.linalg.norm(rx, axis=1))
@@ -93,7 +95,7 @@ def visible_fractions(
     look at few facets tells.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    pairs = _Pairs(tx, rx, wavenumber, polarization, wide=False)
+    pairs = _Pairs(tx, rx, wavenumber, Polarization(polarization), wide=False)
     few = _block_by_block(target, pairs, variant, lambda *_: _FEW_FACETS, _rows)
     cut = few.any(axis=0)
     if not cut.any():
@@ -111,7 +113,7 @@ class _Pairs(NamedTuple):
     tx: Array
     rx: Array
     wavenumber: Array
-    polarization: Literal["v", "h"]
+    polarization: Polarization
     wide: bool
 
     def some(self, chosen: slice | NDArray[np.int64]) -> _Pairs:

@@ -62,14 +62,14 @@ class VisibleFractions:
 
     def _ratio(
         self,
-        _time: float,
+        time: float,
         pose: Poses,
         nodes: ArrayNodes,
         length: Array,
         _strength: Array,
         parts: NDArray[np.int64],
     ) -> NDArray[np.complex128]:
-        return self._surface.visible(pose, nodes, length, parts)
+        return self._surface.visible(time, pose, nodes, length, parts)
 
     def times(
         self, chirps: NDArray[np.int64], tx: NDArray[np.int64], strength: Array

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import Literal
 
 import numpy as np
@@ -40,22 +39,25 @@ def far_field_echo(
 
 
 def plane_wave_echo(
-    radar: Radar, at: Geometry, *, spreading: bool = True
+    at: Geometry,
+    places: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    spreading: bool = True,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Echo of each ellipsoid as the paper has it (eqs 8 to 11).
 
-    The range is that of the centre, and waves are plane over the array. Parameters and returns are
-    those of `far_field_echo`. The cross-section is the right one, not the paper code's. Where walls
-    mirror Tx and Rx differently, it is that for the direction half-way between both arrays.
+    The range is that of the centre, and waves are plane over the array, with the middles of all Tx
+    and of all Rx at ``places (chirp, 3)``. Other parameters and returns are those of
+    `far_field_echo`. The cross-section is the right one, not the paper code's. Where walls mirror
+    Tx and Rx differently, it is that for the direction half-way between both arrays.
     """
-    places = radar.tx.mean(axis=0), radar.rx.mean(axis=0)
     distances, sights = [], []
     for place in places:
-        sight = at.centres - place
+        sight = at.centres - place[:, None]
         distances.append(np.linalg.norm(sight, axis=-1))
         sights.append(sight / distances[-1][..., None])
     lead = np.einsum("ci,cpi->cp", at.tx - places[0], sights[0])[:, None]
-    lead = lead + np.einsum("cri,cpi->crp", at.rx - places[1], sights[1])
+    lead = lead + np.einsum("cri,cpi->crp", at.rx - places[1][:, None], sights[1])
     normal = np.einsum("cpji,cpj->cpi", at.frames, -unit(sights[0] + sights[1]))
     theta = np.arccos(np.clip(normal[..., 2], -1, 1))
     phi = np.arctan2(normal[..., 1], normal[..., 0])
@@ -67,29 +69,34 @@ def plane_wave_echo(
     return length, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
-class FormulaModel(BuiltInModel, ABC):
-    """An echo model that is one formula for a conductor, `conductor_echo`, without occlusion.
-
-    Its echoes in free space follow from the formula, and in rooms the direct echoes and those over
-    walls.
-    """
+class _Untraced(BuiltInModel):
+    """An echo model that is one formula for a conductor, without occlusion."""
 
     traces = False
-    fast_over_walls = True
     relative_cost = 1.0
-    tracer = None
 
-    def __init__(
-        self,
-        radar: Radar,
-        body: Body,
-        *,
-        spreading: bool = True,
-    ) -> None:
+    def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
         self._radar, self._body, self.spreading = radar, body, spreading
         self.variant: str | None = None
 
-    @abstractmethod
+
+class Analytic(_Untraced):
+    """`analytic`: closed-form cross-section at the specular range of each antenna."""
+
+    fast_over_walls = True
+
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target, alike in both polarisations."""
+        at = target_geometry(target, tx, rx)
+        return sum_of_echoes(*far_field_echo(at), at, frequency)
+
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
 
@@ -106,6 +113,7 @@ class FormulaModel(BuiltInModel, ABC):
         amplitude : (chirp, rx, part) float64
             Scattering length, over R1 R2 with ``spreading`` [m].
         """
+        return far_field_echo(at, spreading=self.spreading)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -114,31 +122,13 @@ class FormulaModel(BuiltInModel, ABC):
         return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
 
 
-class Analytic(FormulaModel):
-    """`analytic`: closed-form cross-section at the specular range of each antenna."""
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target, alike in both polarisations."""
-        at = target_geometry(target, tx, rx)
-        return sum_of_echoes(*far_field_echo(at), at, frequency)
-
-    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes in the far field."""
-        return far_field_echo(at, spreading=self.spreading)
-
-
-class AnalyticPaper(FormulaModel):
+class AnalyticPaper(_Untraced):
     """`analytic-paper`: range of the centre and plane waves over the array, as in the paper."""
 
-    fast_over_walls = False
-
-    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes as the paper has them."""
-        return plane_wave_echo(self._radar, at, spreading=self.spreading)
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        radar, at = self._radar, chirp_poses(self._radar, self._body, chirps)
+        tx, rx = radar.antennas_at(np.minimum(radar.centres_of(chirps), self._body.duration_s))
+        middles = tx.mean(axis=1), rx.mean(axis=1)
+        length, amplitude = plane_wave_echo(Geometry.of(at), middles, spreading=self.spreading)
+        return one_echo_a_part(at.tx_index, length, amplitude, radar.centre_frequency_hz)

@@ -18,7 +18,8 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, owners_of
+from rtradar.scatter.common.polarization import Polarization
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, keyframe_time, owners_of
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
@@ -122,18 +123,20 @@ class Rays(BuiltInModel):
         return self._shots.get((chirp, tx), partial(self._shoot, chirp, tx))
 
     def _shoot(self, chirp: int, tx: int) -> _Shot:
-        radar, axes = self._radar, self._body.semi_axes
+        time_s = keyframe_time(self._radar, self._body, chirp)
+        radar, axes = self._radar.at(time_s), self._body.semi_axes
         if self._posed is None or self._posed[0] != chirp:
-            at = chirp_poses(radar.gapless, self._body, np.array([chirp]))
-            self._posed = chirp, PosedGrid(self._grid, at.centres[0], at.frames[0], axes)
-            self._surfaces.pose(at.centres[0], at.frames[0])
+            (centres,), (frames,), _ = self._body.at([time_s])
+            self._posed = chirp, PosedGrid(self._grid, centres, frames, axes)
+            self._surfaces.pose(centres, frames)
+        sent = Polarization(radar.polarization, radar.axes)
         grid, stop_hz = self._posed[1], radar.start_frequency_hz + radar.bandwidth_hz
         shooter = Shooter(
             surfaces=self._surfaces,
             grid=grid,
             bounces=self._bounces,
             wavenumber=2 * np.pi * stop_hz / SPEED_OF_LIGHT_MPS,
-            polarization=radar.polarization,
+            polarization=sent,
             spreading=self._spreading,
         )
         place, rx = radar.tx[tx], radar.rx[radar.rx_of_tx[tx]]
@@ -152,7 +155,7 @@ class Rays(BuiltInModel):
                 rx,
                 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS,
                 lengths[-1],
-                polarization=radar.polarization,
+                polarization=sent,
                 spreading=self._spreading,
                 tapered=order > 0,
             )

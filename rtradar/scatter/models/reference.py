@@ -69,18 +69,19 @@ class Reference(BuiltInModel):
             rx_index = self._radar.rx_of_tx[at.tx_index[inside]] + self._radar.n_tx
             named = np.concatenate([at.tx_index[inside, None], rx_index], axis=1)
             views, index = np.unique(named, return_inverse=True)
-            antennas = np.concatenate([self._radar.tx, self._radar.rx])[views]
             middle_s = float(self._radar.cycle_times(cycle + 0.5))
             time = min(middle_s, self._body.duration_s)
-            middle = self._body.at([time])
+            middle, radar = self._body.at([time]), self._radar.at(time)
+            antennas = np.concatenate([radar.tx, radar.rx])[views]
             seen = self._surface.seen(middle.centres[0], middle.frames[0], antennas, parts)
             amplitude[:, inside] = self._surface.amplitude(
                 (at.centres[inside], at.frames[inside]),
-                antennas[index.reshape(named.shape)],
+                np.concatenate([at.tx[inside, None], at.rx[inside]], axis=1),
                 pairs,
                 length[inside],
                 seen,
                 index.reshape(named.shape),
                 parts,
+                at.axes[inside],
             )
         return one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)

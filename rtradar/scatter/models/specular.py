@@ -12,6 +12,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
     TwoBounceModel,
@@ -85,10 +86,8 @@ class Specular(TwoBounceModel):
         check_bounces("specular", bounces)
         check_terms(terms)
         check_visibility(visibility)
-        at = target_geometry(target, tx, rx)
-        length, amplitude, points = solve_specular_points(
-            at, polarization=polarization, points=True
-        )
+        at, sent = target_geometry(target, tx, rx), Polarization(polarization)
+        length, amplitude, points = solve_specular_points(at, polarization=sent, points=True)
         tracer = BodyTracer(use(select(variant)), target.semi_axes)
         tracer.pose(target.centres, target.frames)
         if visibility == "gradual":
@@ -98,7 +97,7 @@ class Specular(TwoBounceModel):
             left = unobstructed(tracer, at.tx, at.rx, points).astype(np.complex128)
         if terms == 2:
             k = 2 * np.pi * frequency[:, None, None] / SPEED_OF_LIGHT_MPS
-            left *= with_second_term(at, points, polarization, k)
+            left *= with_second_term(at, points, sent, k)
         field = sum_of_echoes(length, amplitude * left, at, frequency)
         if bounces == 2:
             field += double_scattering(target, tx, rx, frequency, polarization, tracer)
@@ -147,7 +146,8 @@ class Specular(TwoBounceModel):
         if self._terms == 2:
             k = np.array(2 * np.pi * self._radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
             # The amplitude of an echo is the conjugate of the scattering length.
-            echo *= with_second_term(at, points, self._radar.polarization, k).conj()
+            sent = Polarization(self._radar.polarization, at.axes)
+            echo *= with_second_term(at, points, sent, k).conj()
         single = one_echo_a_part(at.tx_index, length, echo, frequency)
         return self._with_doubles(single, chirps)
 
@@ -175,7 +175,7 @@ class Specular(TwoBounceModel):
         length, amplitude, found = solve_specular_points(
             at,
             start=known if start is None else start,
-            polarization=self._radar.polarization,
+            polarization=Polarization(self._radar.polarization, at.axes),
             spreading=self.spreading,
             points=points,
         )

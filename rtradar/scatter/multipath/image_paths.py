@@ -7,7 +7,7 @@ All of this is closed form in float64; nothing is traced.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate, product
 from typing import NamedTuple
@@ -73,16 +73,6 @@ def wall_paths(
         paths += [WallPath((), (face,)), WallPath((face,), ())]
     return tuple(
         sorted((path for path in paths if path.order <= order), key=lambda path: path.order)
-    )
-
-
-def paths_seen(paths: Sequence[WallPath], change: Callable[[Wall], Wall]) -> tuple[WallPath, ...]:
-    """Return the paths over other walls, which ``change`` makes of each wall."""
-    walls = {face.wall: None for path in paths for leg in (path.out, path.back) for face in leg}
-    other = {wall: change(wall) for wall in walls}
-    return tuple(
-        WallPath(*(tuple(face._replace(wall=other[face.wall]) for face in leg) for leg in legs))
-        for legs in ((path.out, path.back) for path in paths)
     )
 
 

@@ -18,7 +18,7 @@ class ImageRadar(Radar):
     """A radar whose Tx stand at their images over one leg, and whose Rx at those over another.
 
     What mirrors do to polarisation and to the patterns of antennas belongs to the legs: here
-    antennas are isotropic, and upright.
+    antennas are isotropic, and turned as those of the radar are.
     """
 
     out: Leg = ()

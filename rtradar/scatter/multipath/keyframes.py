@@ -23,6 +23,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
+    Polarization,
     Surfaces,
     bisector,
     over_copolar,
@@ -79,6 +80,17 @@ class Surroundings(NamedTuple):
     ends: ArrayEnds
     paths: Sequence[WallPath]
     whole_level: bool
+
+    @property
+    def polarization(self) -> Polarization:
+        """Polarisation of the antennas."""
+        return Polarization(self.radar.polarization, self.radar.axes)
+
+    def before(self, radar: Radar) -> Surroundings:
+        """Return the same before a radar at rest."""
+        if radar is self.radar:
+            return self
+        return self._replace(radar=radar, ends=ArrayEnds.of(radar))
 
 
 def path_keyframes(
@@ -214,7 +226,7 @@ def _carry(
         along, extent = around.walls.edges.leg(leg, *ends)
         valid[..., chosen] = extent != 0
         ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        sent = sent_field(antenna, ways[0], around.radar.polarization)
+        sent = sent_field(antenna, ways[0], around.polarization)
         waves = around.walls.along(leg, along, ways, sent * extent[..., None])
         for step, (origins, targets) in enumerate(pairwise(along)):
             start, end = np.broadcast_arrays(origins, targets)
@@ -269,7 +281,7 @@ def _left(
     if len(own):
         # The bare return of these holds the co-polar fraction of a conductor.
         ways = to_tx[..., own, :], to_rx[..., own, :]
-        factor[..., own] = over_copolar(factor[..., own], *ways, around.radar.polarization)
+        factor[..., own] = over_copolar(factor[..., own], *ways, around.polarization)
     return factor
 
 

@@ -75,7 +75,7 @@ class LegImages:
         """
         shape = (*poses.rx.shape[:2], len(path))
         length, amplitude = np.empty(shape), np.empty(shape)
-        (tx, rx), bodies = self.antennas, Ellipsoids(*poses[3:])
+        (tx, rx), bodies = self.antennas, Ellipsoids(*poses[3:6])
         if formula is None:
             legs = np.ascontiguousarray(self.of_path[path].T)
             antennas = Images(tx, self._in_lanes, self._middle, legs[0], legs[1], part)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
-from rtradar.body.body import Poses
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
 from rtradar.scatter.multipath.path_echoes import EchoColumns
 
@@ -28,20 +25,10 @@ _KEYFRAMES_AT_ONCE = 32
 
 
 class RoomKeyframes:
-    """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps.
+    """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps."""
 
-    Where the radar moves, ``around_at`` gives the surroundings that it has at some time [s].
-    """
-
-    def __init__(
-        self,
-        around: Surroundings,
-        columns: EchoColumns,
-        body: Body,
-        around_at: Callable[[float], Surroundings] | None = None,
-    ) -> None:
+    def __init__(self, around: Surroundings, columns: EchoColumns, body: Body) -> None:
         self._around, self.columns, self._body = around, columns, body
-        self._around_at = around_at
         self.step = keyframe_step(around.radar, KEYFRAMES_S)
         self._cache: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
 
@@ -84,14 +71,13 @@ class RoomKeyframes:
         cache = self._cache
         found = {number: cache[number] for number in numbers if number in cache}
         missing = [number for number in numbers if number not in cache]
-        at_once = _KEYFRAMES_AT_ONCE if self._around_at is None else 1
+        radar, gapless = self._around.radar, self._around.radar.gapless
+        at_once = 1 if radar.is_moving else _KEYFRAMES_AT_ONCE
         for first in range(0, len(missing), at_once):
             some = missing[first : first + at_once]
-            chirps = np.array(some) * self.step
-            gapless = self._around.radar.gapless
-            times = gapless.centres_of(chirps)
-            poses = Poses(*chirp_poses(gapless, self._body, chirps)[3:])
-            around = self._around if self._around_at is None else self._around_at(float(times[0]))
+            times = gapless.centres_of(np.array(some) * self.step)
+            poses = self._body.at(np.minimum(times, self._body.duration_s))
+            around = self._around.before(radar.at(float(times[0])))
             keyframes = path_keyframes(around, self.columns, poses, times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))

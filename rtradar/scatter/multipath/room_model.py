@@ -12,7 +12,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 from typing import Any, Protocol, cast, runtime_checkable
 
@@ -28,17 +27,11 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import take, times_factor, together, weakest
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import chirps_by_steps
-from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces
+from rtradar.scatter.common.polarization import CONDUCTOR, Polarization, Surfaces
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
-from rtradar.scatter.multipath.image_paths import (
-    Face,
-    WallPath,
-    corners,
-    paths_seen,
-    wall_paths,
-)
+from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
 from rtradar.scatter.multipath.image_radar import ImageRadar
 from rtradar.scatter.multipath.keyframes import Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
@@ -47,7 +40,6 @@ from rtradar.scatter.multipath.room_keyframes import RoomKeyframes, nearby_point
 from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.radar_axes import MovingScene, in_world, wall_seen
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
@@ -143,33 +135,27 @@ class RoomModel:
         self.variant: str | None = None
         if variant is not None:
             backend = select(variant)
-            self.variant, self._mi = backend.kind, use(backend)
-            tracers = BodyTracer(self._mi, body.semi_axes), RoomTracer(self._mi, scene)
-        self._moving = scene if isinstance(scene, MovingScene) else None
-        self._where, every_body = in_world(scene, body)
+            self.variant, mi = backend.kind, use(backend)
+            tracers = BodyTracer(mi, body.semi_axes), RoomTracer(mi, scene)
         faces: tuple[Face, ...] = ()
         self.faces: tuple[FaceSummary, ...] = ()
-        places = _places(radar, self._moving)
-        if order and not (self._fast or self._moving is None):
+        places = _places(radar)
+        if order and radar.is_moving and (scene.walls or scene.furniture) and not self._fast:
             raise InputError(
                 f"scene '{scene.name}': radar '{radar.name}' moves; echoes over walls are then "
                 "those of analytic or specular: take one of these as fidelity, or order = 0"
             )
         if order:
-            room = tracers and (
-                tracers[1] if self._moving is None else RoomTracer(self._mi, self._where)
-            )
-            found = [reflecting_faces(self._where, radar, own, every_body, room) for own in places]
+            room = tracers and tracers[1]
+            found = [reflecting_faces(scene, radar, own, body, room) for own in places]
             faces = tuple(dict.fromkeys(face for some, _ in found for face in some))
             self.faces = _summaries([summaries for _, summaries in found])
-        paths = [wall_paths(self._where.walls, place, order, faces) for place in places]
+        paths = [wall_paths(scene.walls, place, order, faces) for place in places]
         self.paths = tuple(
             sorted(dict.fromkeys(chain.from_iterable(paths)), key=lambda path: path.order)
         )
-        self._every = *series.walls, *(HALF_SPACE,) * len(faces)
-        walls = WallResponse(
-            WallEdges.of(self._where.walls, radar, faces), self._every, series.frequency
-        )
+        every = *series.walls, *(HALF_SPACE,) * len(faces)
+        walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages.of(radar, self.paths)
         columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
         self._around = Surroundings(
@@ -180,42 +166,18 @@ class RoomModel:
             ArrayEnds.of(radar),
             self.paths,
             # A formula alone knows neither polarisation nor occlusion.
-            whole_level=not (self._fast or isinstance(conductor, HasFormula)),
+            whole_level=not self._fast and getattr(conductor, "traces", True),
         )
-        around_at = None if self._moving is None else partial(self._around_at, self._moving)
-        self._keyframes = RoomKeyframes(self._around, columns, body, around_at)
+        self._keyframes = RoomKeyframes(self._around, columns, body)
         self.not_followed: dict[str, float] = {}
         self.left_out, self.left_out_m2 = 0, 0.0
 
-    def _around_at(self, scene: MovingScene, time_s: float) -> Surroundings:
-        """What a radar that moves has around it at some time [s], in its axes then."""
-        (axes,), (origin,) = scene.radar.poses_at([time_s])
-        centre = np.array(self._radar.position_m)
-        edges = self._around.walls.edges
-        seen = {wall: wall_seen(wall, axes, origin, centre) for wall in edges.surfaces}
-        turned = paths_seen(self.paths, seen.__getitem__)
-        faces = tuple(Face(seen[wall], False) for wall in edges.surfaces[len(edges.walls) :])
-        at = WallEdges.of(tuple(seen[wall] for wall in edges.walls), self._radar, faces)
-        walls = WallResponse(at, self._every, self._around.walls.frequency)
-        tracers = self._around.tracers
-        if tracers is not None:
-            now = MovingScene.of(scene.radar, scene.world, time_s)
-            tracers = tracers[0], RoomTracer(self._mi, now)
-        return self._around._replace(walls=walls, tracers=tracers, paths=turned)
-
-    def _before_walls(
-        self, chirps: NDArray[np.int64], at: ChirpPoses
-    ) -> tuple[ChirpPoses, LegImages]:
-        """Poses and images of the antennas, in the axes of the walls: each chirp has its own."""
-        if self._moving is None:
+    def _images(self, at: ChirpPoses) -> tuple[ChirpPoses, LegImages]:
+        """Poses with numbers of images of the antennas, and these: each chirp may have its own."""
+        if not self._radar.is_moving:
             return at, self._legs
-        radar, body = self._radar, in_world(self._moving, self._body)[1]
-        times = np.minimum(radar.centres_of(chirps), body.duration_s)
-        tx, rx = self._moving.antennas(times)
-        number = np.arange(len(chirps))
-        tx, rx = tx[number, at.tx_index], rx[number[:, None], radar.rx_of_tx[at.tx_index]]
-        there = ChirpPoses(number, tx, rx, *body.at(times))
-        return there, LegImages(self.paths, tx, rx, rx.mean(axis=1))
+        own = at._replace(tx_index=np.arange(len(at.tx)))
+        return own, LegImages(self.paths, at.tx, at.rx, at.rx.mean(axis=1))
 
     @property
     def _columns(self) -> EchoColumns:
@@ -266,8 +228,9 @@ class RoomModel:
             if self._fast:
                 found = [cast(HasSpecularPoints, model).specular_echo(chirps, at, start)]
             else:
-                found = [solve_specular_points(at, start=start)[:2]]
-        there, legs = self._before_walls(chirps, at)
+                sent = Polarization(self._radar.polarization, at.axes)
+                found = [solve_specular_points(at, start=start, polarization=sent)[:2]]
+        there, legs = self._images(at)
         if n_echoes > n_direct:
             others = slice(n_direct, n_echoes)
             own = columns.path[others], columns.part[others]
@@ -304,7 +267,7 @@ class RoomModel:
     @property
     def has_ghost_tones(self) -> bool:
         """Whether `ghosts` can be asked for, and there are any: not before a radar that moves."""
-        return self._fast and self._moving is None and not self._columns.direct.all()
+        return self._fast and not (self._radar.is_moving or self._columns.direct.all())
 
     def ghosts(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes over walls of a fast model; they have lengths where they are not seen.
@@ -330,7 +293,7 @@ class RoomModel:
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
             factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
-            there, legs = self._before_walls(chirps, at)
+            there, legs = self._images(at)
             points = nearby_points(blend, before, after).places()
             extra = columns.lengths(legs, there, points, extra)
         nodes = self._around.walls.frequency
@@ -358,20 +321,12 @@ class RoomModel:
             self._models[path] = self._before(ImageRadar.over(self._radar, self.paths[path]))
         return self._models[path]
 
-    def paths_in_world(self, radar: Radar) -> tuple[WallPath, ...]:
-        """Return the paths in the axes of the world, where the radar may be turned."""
-        if self._moving is not None or not radar.is_turned:
-            return self.paths
-        centre, back = np.array(radar.position_m), radar.axes.T
-        return paths_seen(self.paths, lambda wall: wall_seen(wall, back, centre, centre))
-
     def course(self, name: str, point: Array, radar: Radar) -> Array:
         """Return the corners (corner, 3) of a path over a point (3,) and back, world [m].
 
         The path, given by its name, begins and ends at the middle of the array of a radar at rest.
         """
-        paths = self.paths_in_world(radar)
-        path = next(path for path in paths if path.name == name)
+        path = next(path for path in self.paths if path.name == name)
         middle = np.asarray(radar.position_m, dtype=np.float64)
         out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
         return np.array([*out, *reversed(back[:-1])])
@@ -433,12 +388,11 @@ class RoomModel:
         return summaries
 
 
-def _places(radar: Radar, moving: MovingScene | None) -> Array:
+def _places(radar: Radar) -> Array:
     """Where the middle of the array is looked for walls and faces from (place, 3), world [m]."""
-    if moving is None:
+    if radar.path_times_s is None:
         return np.array([radar.position_m])
-    knots = moving.radar.path_times_s or ()
-    return moving.radar.poses_at(np.linspace(knots[0], knots[-1], _PLACES))[1]
+    return radar.poses_at(np.linspace(radar.path_times_s[0], radar.path_times_s[-1], _PLACES))[1]
 
 
 def _summaries(found: Sequence[tuple[FaceSummary, ...]]) -> tuple[FaceSummary, ...]:

@@ -24,12 +24,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.system.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ def radiate(
     wavenumber: Array,
     length: Array,
     *,
-    polarization: Literal["v", "h"] = "v",
+    polarization: Polarization,
     spreading: bool = True,
     tapered: bool = False,
 ) -> NDArray[np.complex128]:
@@ -115,7 +115,8 @@ def radiate(
         group = np.zeros_like(f.surface) if length.shape[1] == 1 else f.surface
         arrays = (f.places, f.path, f.directions[:, 3], f.normals[:, 3], f.field, group)
         tubes = Tubes._make(np.ascontiguousarray(array) for array in arrays)
-        given = (np.ascontiguousarray(array) for array in (visible, rx, wavenumber, length))
-        options = polarization == "h", spreading, tapered
+        others = visible, rx, polarization.axes, wavenumber, length
+        given = (np.ascontiguousarray(array) for array in others)
+        options = polarization.kind == "h", spreading, tapered
         in_threads(radiate_tubes, chunks * len(rx), tubes, *given, *options, parts)
     return 1j * np.asarray(wavenumber)[:, None, None] / np.sqrt(np.pi) * parts.sum(axis=0)

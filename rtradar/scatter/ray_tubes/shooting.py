@@ -17,13 +17,12 @@ Ling, Chou, Lee, IEEE Trans. Antennas Propag. 37 (1989) 194: Shooting and bounci
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
-from rtradar.scatter.common.polarization import sent_field
+from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.ray_tubes.footprints import Footprints
 from rtradar.scatter.ray_tubes.tubes import Grid
 from rtradar.trace.bounces import Surfaces
@@ -55,7 +54,7 @@ class Shooter:
     grid: Grid
     bounces: int
     wavenumber: float
-    polarization: Literal["v", "h"]
+    polarization: Polarization
     antenna: Antenna | None = None
     spreading: bool = True
     two_sided: bool = False

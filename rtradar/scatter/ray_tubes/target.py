@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, PosedGrid
@@ -51,13 +52,14 @@ def rays_scattering(
         return field
     mi = use(select(variant))
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    sent = Polarization(polarization)
     surfaces, grid = _scene(mi, solid, 2 * np.pi / wavenumber.max() / rays_per_wavelength)
     shooter = Shooter(
         surfaces=surfaces,
         grid=grid,
         bounces=bounces,
         wavenumber=float(wavenumber.max()),
-        polarization=polarization,
+        polarization=sent,
         two_sided=not (isinstance(solid, Ellipsoids) or solid.closed),
     )
     for transmitter, of_tx in _alike(tx):
@@ -68,7 +70,7 @@ def rays_scattering(
             for order, each in enumerate(shots):
                 to = exits(surfaces, each, receiver[None]), receiver[None], wavenumber[own], length
                 tapered = order > 0 and not surfaces.flat
-                sums = radiate(each, *to, polarization=polarization, tapered=tapered)
+                sums = radiate(each, *to, polarization=sent, tapered=tapered)
                 field[own] += sums[:, 0, 0]
             field[own] *= np.linalg.norm(transmitter) * np.linalg.norm(receiver)
     return field

@@ -21,6 +21,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import SHEET_BOUNCES
 from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
@@ -89,7 +90,8 @@ class SheetBounces:
     def _knot(self, number: int) -> NDArray[np.complex128]:
         """Amplitudes (tx, rx, node, echo) at one knot, the echoes of each number of bounces."""
         time_s = number * self._knot_s
-        radar, ((rotation,), (at,)) = self._radar, self._pose(np.array([time_s]))
+        radar, ((rotation,), (at,)) = self._radar.at(time_s), self._pose(np.array([time_s]))
+        polarization = Polarization(radar.polarization, radar.axes)
         corners = (self._triangles @ rotation.T + at).reshape(-1, 3)
         surfaces = MeshSurfaces(self._mi, corners, np.arange(len(corners)).reshape(-1, 3))
         shooter = Shooter(
@@ -97,7 +99,7 @@ class SheetBounces:
             grid=MeshGrid(self._grid.corners @ rotation.T + at, self._grid.face),
             bounces=SHEET_BOUNCES,
             wavenumber=float(self._wavenumber.max()),
-            polarization=radar.polarization,
+            polarization=polarization,
             spreading=self._spreading,
             two_sided=True,
         )
@@ -110,13 +112,19 @@ class SheetBounces:
             for order, footprints in enumerate(shooter.shoot(tx)[1:]):
                 if len(footprints):
                     visible = exits(surfaces, footprints, rx)
-                    out[index, order] = self._shared(footprints, visible, rx, over)
+                    given = footprints, visible, rx, over, polarization
+                    out[index, order] = self._shared(*given)
             out[index] *= open_tx[index] * open_rx[radar.rx_of_tx[index]][:, None]
         out = np.moveaxis(out.conj(), 1, 3)
         return out.reshape(*out.shape[:1], len(self._wavenumber), radar.n_rx, -1).swapaxes(1, 2)
 
     def _shared(
-        self, footprints: Footprints, visible: NDArray[np.bool_], rx: Array, over: Array
+        self,
+        footprints: Footprints,
+        visible: NDArray[np.bool_],
+        rx: Array,
+        over: Array,
+        polarization: Polarization,
     ) -> NDArray[np.complex128]:
         """Field (node, rx, echo) of footprints, shared between the two echoes next to each."""
         middle = rx.mean(axis=0)
@@ -126,7 +134,7 @@ class SheetBounces:
         fraction = np.clip(place - cell, 0.0, 1.0)
         after = fraction**2 * (3 - 2 * fraction)
         lengths = over[:, None] + (np.arange(self._count) - self._half) * self._step
-        radar, total = self._radar, np.zeros((len(self._wavenumber), *lengths.shape), complex)
+        total = np.zeros((len(self._wavenumber), *lengths.shape), complex)
         for own, share in ((cell, 1 - after), (cell + 1, after)):
             lit = replace(footprints, field=footprints.field * share[:, None], surface=own)
             total += radiate(
@@ -135,7 +143,7 @@ class SheetBounces:
                 rx,
                 self._wavenumber,
                 lengths,
-                polarization=radar.polarization,
+                polarization=polarization,
                 spreading=self._spreading,
             )
         return total

@@ -36,7 +36,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import flat_edge, small_facets
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.multipath.image_paths import WallPath
+from rtradar.scatter.multipath.image_paths import WallPath, images
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
@@ -112,7 +112,7 @@ class RigidEchoes:
             walls, radar, most_nodes=_NODES, enough=_WALL_ERROR, bounces=path.order
         )
         response = WallResponse(WallEdges.of(walls, radar), series.walls, self.frequency)
-        self._legs = RigidLegs(radar, path, response, past)
+        self._legs = RigidLegs(radar.at(0.0), path, response, past)
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
@@ -159,33 +159,37 @@ class RigidEchoes:
         rate of paths against that over the point of reference [m/s]; range rates (instant, vertex)
         [m/s]; and the largest rate of rotation [rad/s].
         """
-        shape, middles = self.moving.shape, self._legs.middles[:, None, None]
+        shape = self.moving.shape
         # Evenly spaced ones may all fall on one phase of a rotation.
         random = np.random.default_rng(0).uniform(0.0, duration_s, _SAMPLES)
         times = np.array([0.0, *np.sort(random), duration_s])
         points = np.concatenate([shape.vertices, self._reference[None]])
-        poses = [self.moving.pose(at) for at in (times, times + _STEP_S)]
-        early, late = (
-            np.einsum("tij,vj->tvi", rotation, points) + place[:, None] for rotation, place in poses
-        )
-        # Of both legs (2, instant, vertex).
-        ranges, later = (np.linalg.norm(at - middles, axis=-1) for at in (early, late))
+        ranges, seen = [], []
+        for at in (times, times + _STEP_S):
+            rotation, place = self.moving.pose(at)
+            axes, middle = self._radar.poses_at(at)
+            now = np.einsum("tij,vj->tvi", rotation, points) + place[:, None]
+            # Of both legs (2, instant, vertex).
+            middles = np.stack([images(leg, middle) for leg in (self.path.out, self.path.back)])
+            ranges.append(np.linalg.norm(now - middles[:, :, None], axis=-1))
+            seen.append(np.einsum("tji,tjk->tik", axes, rotation))
+        ranges, later = ranges
         speeds = (later - ranges).sum(axis=0) / _STEP_S
         if self.path.order == 0:
             self._refuse_too_near(times, ranges[0])
         rates = float(np.abs(speeds[:, :-1] - speeds[:, -1:]).max())
         # The chord of a small rotation, over all three axes, is sqrt(2) of its angle.
-        change = np.linalg.norm(poses[1][0] - poses[0][0], axis=(1, 2)) / math.sqrt(2)
+        change = np.linalg.norm(seen[1] - seen[0], axis=(1, 2)) / math.sqrt(2)
         return float(ranges.min()), rates, speeds[:, :-1] / 2, float(change.max()) / _STEP_S
 
     def _refuse_too_near(self, times: Array, ranges: Array) -> None:
         radar = self._radar
-        antennas = np.concatenate([radar.tx, radar.rx])
-        around = float(np.linalg.norm(antennas - np.array(radar.position_m), axis=1).max())
+        around = float(np.linalg.norm(np.concatenate([radar.tx_m, radar.rx_m]), axis=1).max())
         size = float(np.ptp(self.moving.shape.vertices, axis=0).max())
         least = MINIMUM_ANTENNA_DISTANCE_M
         for number in np.flatnonzero(ranges.min(axis=1) < least + around + size):
             mesh = self.moving.triangles(float(times[number]))
+            antennas = np.concatenate(radar.antennas_at(times[[number]]), axis=1)[0]
             gap = min(mesh.distance_m(antenna) for antenna in antennas)
             if gap < least:
                 raise InputError(
@@ -265,14 +269,21 @@ class RigidEchoes:
 
     def _over_reference(self, times: Array, tx: Indices) -> Array:
         """Paths over the point of reference (task, rx) [m]."""
-        legs, at = self._legs, self._pose(times)[1]
-        out = np.linalg.norm(legs.tx[tx] - at, axis=1)
-        back = np.linalg.norm(legs.rx[self._radar.rx_of_tx[tx]] - at[:, None], axis=2)
-        return np.asarray(out[:, None] + back)
+        at, (from_tx, to_rx) = self._pose(times)[1], self._images(times, tx)
+        out = np.linalg.norm(from_tx - at, axis=1)
+        return np.asarray(out[:, None] + np.linalg.norm(to_rx - at[:, None], axis=2))
+
+    def _images(self, times: Array, tx: Indices) -> tuple[Array, Array]:
+        """Images of the Tx (task, 3) of tasks and of the Rx (task, rx, 3) kept with them [m]."""
+        every_tx, every_rx = self._radar.antennas_at(times)
+        number, kept = np.arange(len(tx)), self._radar.rx_of_tx[tx]
+        ends = every_tx[number, tx], every_rx[number[:, None], kept]
+        return images(self.path.out, ends[0]), images(self.path.back, ends[1])
 
     def _field(self, times: Array, tx: Indices) -> NDArray[np.complex128]:
         """Amplitudes (task, rx, node, echo) at the times of tasks and for their Tx."""
         legs, (rotation, at) = self._legs, self._pose(times)
+        from_tx, to_rx = self._images(times, tx)
         place = times / self._keyframe_s
         before = np.floor(place).astype(np.int64)
         numbers = np.unique([before, before + 1])
@@ -282,8 +293,8 @@ class RigidEchoes:
         ]
         rx = self._radar.rx_of_tx[tx]
         views = RigidViews(
-            tx=np.einsum("tji,tj->ti", rotation, legs.tx[tx] - at),
-            rx=np.einsum("tji,trj->tri", rotation, legs.rx[rx] - at[:, None]),
+            tx=np.einsum("tji,tj->ti", rotation, from_tx - at),
+            rx=np.einsum("tji,trj->tri", rotation, to_rx - at[:, None]),
             before=np.searchsorted(numbers, before),
             after=np.searchsorted(numbers, before + 1),
             fraction=place - before,
@@ -304,21 +315,22 @@ class RigidEchoes:
 
     def _keyframe(self, number: int) -> _Keyframe:
         time_s, facets = number * self._keyframe_s, self._facets
+        legs = self._legs.before(self._radar.at(time_s))
         (rotation,), (at,) = self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
         normals = facets.normals @ rotation.T
-        facing = np.einsum("fi,pfi->pf", normals, self._legs.places[:, None] - middles)
+        facing = np.einsum("fi,pfi->pf", normals, legs.places[:, None] - middles)
         asked = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
-        seen = self._legs.seen(time_s, middles, asked)
+        seen = legs.seen(time_s, middles, asked)
         given = middles, normals, self.moving.material, self._longer_m
-        return _Keyframe(seen.astype(np.float32), self._legs.factor(*given))
+        return _Keyframe(seen.astype(np.float32), legs.factor(*given))
 
     def _open_at(self, time_s: float) -> tuple[Array, Array]:
         """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times what is left.
 
         That is the root of what walls and patterns of antennas leave of both legs.
         """
-        legs, facets = self._legs, self._facets
+        legs, facets = self._legs.before(self._radar.at(time_s)), self._facets
         (rotation,), (at,) = self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
         asked = np.ones((len(legs.places), len(middles)), dtype=bool)

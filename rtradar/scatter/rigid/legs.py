@@ -18,7 +18,13 @@ from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
-from rtradar.scatter.common.polarization import antenna_field, bisector, sent_field, unit
+from rtradar.scatter.common.polarization import (
+    Polarization,
+    antenna_field,
+    bisector,
+    sent_field,
+    unit,
+)
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.rigid.people import OccludingPeople
@@ -43,11 +49,10 @@ class Past(NamedTuple):
 
 
 class RigidLegs:
-    """The legs of one path, with the walls of the room as they answer at given frequencies.
+    """The legs of one path of a radar at rest, with the walls as they answer at given frequencies.
 
-    ``tx`` and ``rx (n, 3)`` are the images of the antennas [m]; ``places (place, 3)`` those from
-    which visibility is asked, with weights ``tx_weight (tx, place)`` and ``rx_weight (rx, place)``.
-    ``middles (2, 3)`` are the images of the array's middle over both legs.
+    ``places (place, 3)`` are the images of those from which visibility is asked [m], with weights
+    ``tx_weight (tx, place)`` and ``rx_weight (rx, place)``.
     """
 
     def __init__(
@@ -58,14 +63,18 @@ class RigidLegs:
             (path.out, radar.tx_antenna),
             (path.back, radar.rx_antenna),
         )
-        self.tx, self.rx = images(path.out, radar.tx), images(path.back, radar.rx)
+        self._polarization = Polarization(radar.polarization, radar.axes)
         self._real, self.tx_weight, self.rx_weight = shadow_nodes(radar)
         self._sends: Bools = np.any(self.tx_weight != 0, axis=0)
         self.places = np.where(
             self._sends[:, None], images(path.out, self._real), images(path.back, self._real)
         )
-        position = np.array(radar.position_m)
-        self.middles = np.stack([images(leg, position) for leg, _ in self._sides])
+
+    def before(self, radar: Radar) -> RigidLegs:
+        """Return the legs of another radar at rest."""
+        if radar is self._radar:
+            return self
+        return RigidLegs(radar, self.path, self._walls, self._past)
 
     def seen(
         self, time_s: float, points: Array, asked: Bools, *, but: Object | None = None
@@ -132,7 +141,7 @@ class RigidLegs:
         way = -normal
         cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)
         across = unit(np.cross(way, normals))
-        te = np.sum(antenna_field(way, radar.polarization) * across, axis=-1) ** 2
+        te = np.sum(antenna_field(way, self._polarization) * across, axis=-1) ** 2
         eta = made_of.eta(np.array([radar.centre_frequency_hz]))
         in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
         # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
@@ -145,9 +154,9 @@ class RigidLegs:
 
         Lengths (point,) [m], fields (node, point, 3), and the direction of arrival (point, 3).
         """
-        radar, middle = self._radar, np.array(self._radar.position_m)
+        middle = np.array(self._radar.position_m)
         along, extent = self._walls.edges.leg(leg, middle, points)
         ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        sent = sent_field(antenna, ways[0], radar.polarization)
+        sent = sent_field(antenna, ways[0], self._polarization)
         waves = self._walls.along(leg, along, ways, sent * extent[..., None])
         return [(wave.extra_m, wave.field) for wave in waves], ways[-1]

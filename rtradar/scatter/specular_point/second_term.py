@@ -12,15 +12,13 @@ times for one in it: exactly so for a sphere, by the series of Mie.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.scatter.common.polarization import antenna_field, unit
+from rtradar.scatter.common.polarization import Polarization, antenna_field, unit
 from rtradar.scatter.common.poses import ChirpPoses
 
 Array = NDArray[np.float64]
@@ -41,7 +39,7 @@ def check_terms(terms: int) -> None:
 
 
 def with_second_term(
-    at: Geometry | ChirpPoses, points: Array, polarization: Literal["v", "h"], wavenumber: Array
+    at: Geometry | ChirpPoses, points: Array, polarization: Polarization, wavenumber: Array
 ) -> NDArray[np.complex128]:
     """Both terms over the first, for specular points (chirp, rx, part, 3), world [m].
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.scatter.specular_point import Geometry, Options, solve
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.system.threads import thread_map
 
@@ -19,17 +18,17 @@ def solve_specular_points(
     at: Geometry | ChirpPoses,
     *,
     start: NDArray[np.float64] | None = None,
-    polarization: Literal["v", "h"] = "v",
+    polarization: Polarization | None = None,
     spreading: bool = True,
     points: bool = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Path length, amplitude and specular point of every ellipsoid, as if each stood alone.
 
     The search begins at ``start (chirp, part, 3)``, in the ellipsoid's axes [m], NaN where nothing
-    is known. Both antennas have the same polarisation, v along world z. Returned are the lengths
-    |T - p| + |R - p| (chirp, rx, part) [m]; the co-polar scattering lengths (chirp, rx, part), over
-    R1 R2 with ``spreading`` [m]; and, if ``points`` are wanted, for they are many, the specular
-    points (chirp, rx, part, 3), world [m].
+    is known. Returned are the lengths |T - p| + |R - p| (chirp, rx, part) [m]; the scattering
+    lengths (chirp, rx, part), over R1 R2 with ``spreading`` [m], co-polar where both antennas have
+    a ``polarization``, else without regard to it; and, if ``points`` are wanted, for they are many,
+    the specular points (chirp, rx, part, 3), world [m].
 
     Equations :eq:`specular-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page,
     times :eq:`polarization`.
@@ -40,11 +39,14 @@ def solve_specular_points(
     point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
     begin = np.full(at.centres.shape, np.nan) if start is None else start
     begin = np.ascontiguousarray(begin, dtype=np.float64)
-    options = Options(polarized=True, horizontal=polarization == "h", spreading=spreading)
+    above, horizontal = np.zeros(at.tx.shape), False
+    if polarization is not None:
+        above[:], horizontal = polarization.up, polarization.kind == "h"
+    options = Options(horizontal, spreading)
 
     def some(first: int) -> None:
         last = min(first + _CHIRPS_PER_THREAD, len(at.tx))
-        solve(first, last, at, begin, options, length, amplitude, point)
+        solve(first, last, at, above, begin, options, length, amplitude, point)
 
     thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
     return length, amplitude, point

@@ -19,7 +19,7 @@ from rtradar.body import Body
 from rtradar.kernels.elementary import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
+from rtradar.scatter.common.poses import ChirpPoses, keyframe_time
 from rtradar.scatter.specular_point.solver import local_points
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -85,16 +85,13 @@ class SpecularVisibility:
         return Keyframe(visible.reshape(shape), start)
 
     def _trace(self, chirp: int) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-        every_tx = chirp_poses(self._radar.gapless, self._body, np.array([chirp]))
-        n_tx = self._radar.n_tx
-        at = ChirpPoses(
-            np.arange(n_tx),
-            self._radar.tx,
-            self._radar.rx[self._radar.rx_of_tx],
-            np.repeat(every_tx.centres, n_tx, axis=0),
-            np.repeat(every_tx.frames, n_tx, axis=0),
-            every_tx.semi_axes,
+        time_s = keyframe_time(self._radar, self._body, chirp)
+        radar, poses = self._radar.at(time_s), self._body.at([time_s])
+        centres, frames = (
+            np.repeat(own, radar.n_tx, axis=0) for own in (poses.centres, poses.frames)
         )
+        ends = radar.tx, radar.rx[radar.rx_of_tx]
+        at = ChirpPoses(np.arange(radar.n_tx), *ends, centres, frames, poses.semi_axes)
         visible, start = trace_keyframe(self._tracer, at)
         return np.packbits(visible), start
 

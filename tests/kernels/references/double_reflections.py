@@ -60,7 +60,7 @@ def _least_path(bodies, ends):
     return units
 
 
-def _reflected_twice(units, bodies, ends, horizontal):
+def _reflected_twice(units, bodies, ends, horizontal, up):
     """Length and amplitude of the path over two points."""
     ways = _three_ways(units, bodies, ends)
     ranges = [np.linalg.norm(way) for way in ways]
@@ -72,8 +72,7 @@ def _reflected_twice(units, bodies, ends, horizontal):
     cosines = -s1 @ normals[0], -s3 @ normals[1]
     if min(*cosines, s2 @ normals[0], -s2 @ normals[1]) <= 0:
         return sum(ranges), 0.0
-    up = np.array([0.0, 0.0, 1.0])
-    fields = [np.cross(s, up) if horizontal else up - s * s[2] for s in (s1, s3)]
+    fields = [np.cross(s, up) if horizontal else up - s * (s @ up) for s in (s1, s3)]
     sent, received = (field / np.linalg.norm(field) for field in fields)
     for normal in normals:
         sent = 2 * (normal @ sent) * normal - sent
@@ -82,7 +81,7 @@ def _reflected_twice(units, bodies, ends, horizontal):
     return sum(ranges), value / np.prod(ranges)
 
 
-def solve_double_reference(at, pairs, horizontal):
+def solve_double_reference(at, pairs, horizontal, up=(0.0, 0.0, 1.0)):
     """Length and amplitude as by `solve_double` with spreading, each path from cold."""
     shape = (*at.rx.shape[:2], len(pairs))
     length, amplitude = np.empty(shape), np.empty(shape)
@@ -92,7 +91,9 @@ def solve_double_reference(at, pairs, horizontal):
         posed = at.centres[chirp], at.frames[chirp], at.semi_axes
         bodies = [tuple(array[part] for array in posed) for part in pairs[pair]]
         units = _least_path(bodies, ends)
-        length[place], amplitude[place] = _reflected_twice(units, bodies, ends, horizontal)
+        length[place], amplitude[place] = _reflected_twice(
+            units, bodies, ends, horizontal, np.array(up)
+        )
     return length, amplitude
 
 
@@ -103,7 +104,9 @@ def _solve_double() -> Pair:
         centres=np.array([[[4.0, 0.7 * n, 1.0 - 0.1 * n] for n in range(3)]])
     )
     pairs, shape = np.array([[0, 1], [2, 1], [0, 2]]), (1, 2, 3)
-    given = at, pairs, np.full((1, 3, 2, 3), np.nan), Options(True, False, spreading=True)
+    start, options = np.full((1, 3, 2, 3), np.nan), Options(False, spreading=True)
+    up = np.array([[0.6, 0.0, 0.8]])
+    given = at, up, pairs, start, options
     out = np.empty(shape), np.empty(shape), np.empty((*shape, 2, 3))
     *found, _ = filled(solve_double, 0, 1, *given, out=out)
-    return tuple(found), solve_double_reference(at, pairs, horizontal=False)
+    return tuple(found), solve_double_reference(at, pairs, horizontal=False, up=up[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from references.cases import Pair, filled, kernel_case
 from references.specular_point import geometry
@@ -166,29 +167,32 @@ def _facets_by_length() -> Pair:
     return (shared * turned).sum(axis=3), facets_by_length_reference(facets, views, grid, True)
 
 
-def amplitudes_reference(tubes, rx):
-    """Amplitudes (tube,) of `_amplitude` over the distance, not tapered, for v and one Rx (3,)."""
+def amplitudes_reference(tubes, rx, axes):
+    """Amplitudes (tube,) of `_amplitude` over the distance, not tapered, for v and one Rx (3,).
+
+    ``axes`` (3, 3) are those of the receiver.
+    """
     corners, d, e = tubes.places[:, :3], tubes.direction, tubes.field
     n = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     n *= np.sign(np.sum(n * tubes.normal, axis=1))[:, None]
     s = rx - tubes.places[:, 3]
     leg = np.linalg.norm(s, axis=1, keepdims=True)
     s = s / leg
-    p = np.cross(s, np.cross([0.0, 0.0, 1.0], s))
+    p = np.cross(s, np.cross(axes[:, 2], s))
     p /= np.linalg.norm(p, axis=1, keepdims=True)
     ahead, across = np.sum(n * (s - d), axis=1), np.sum(d * p, axis=1) * np.sum(n * e, axis=1)
     aside = np.sum(e * s, axis=1) * np.sum(n * p, axis=1)
     return (np.sum(e * p, axis=1) * ahead + across - aside) / 2 / leg[:, 0]
 
 
-def radiate_tubes_reference(tubes, rx, wavenumber, length):
+def radiate_tubes_reference(tubes, rx, axes, wavenumber, length):
     """What visible tubes send to one receiver (3,), not tapered, for v, by sums over triangles."""
     path = tubes.path + np.linalg.norm(rx - tubes.places, axis=2) - length
     corners = path[:, :3]
     bow = 0.75 * (path[:, 3:] - corners.mean(axis=1, keepdims=True))
     phase = corners @ midpoints(48).T + bow
     mean = np.exp(-1j * wavenumber * phase).mean(axis=1)
-    return np.sum(amplitudes_reference(tubes, rx) * mean)
+    return np.sum(amplitudes_reference(tubes, rx, axes) * mean)
 
 
 @kernel_case(radiate_tubes, 1e-3)
@@ -201,6 +205,7 @@ def _radiate_tubes() -> Pair:
     tubes = Tubes(places, path, directions, -directions, fields, np.zeros(count, dtype=np.int64))
     rx, wavenumber = np.array([[-4.0, 0.5, 0.2]]), np.array([_WAVENUMBER])
     out, length = (np.empty((8, 1, 1, 1), dtype=np.complex128),), np.full((1, 1), 8.0)
-    given = tubes, np.ones((1, count), dtype=np.bool_), rx, wavenumber, length
+    axes = np.ascontiguousarray(Rotation.random(random_state=0).as_matrix())
+    given = tubes, np.ones((1, count), dtype=np.bool_), rx, axes, wavenumber, length
     (found,) = filled(radiate_tubes, 0, 8, *given, False, True, False, out=out, adds=True)
-    return found.sum(), radiate_tubes_reference(tubes, rx[0], _WAVENUMBER, 8.0)
+    return found.sum(), radiate_tubes_reference(tubes, rx[0], axes, _WAVENUMBER, 8.0)

@@ -11,7 +11,7 @@ from references.cases import OfEach, Pair, filled, kernel_case
 from rtradar.kernels.scatter.far_field import _NO_BISECTOR, far_field
 from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
 from rtradar.kernels.scatter.specular_point import ROOT_PI, Geometry, Options, solve
-from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.polarization import Polarization, copolar
 
 
 def geometry(chirps: int, receivers: int, parts: int) -> Geometry:
@@ -73,14 +73,16 @@ def solve_reference(at):
 )
 def _solve(receivers: int, polarization: str | None) -> Pair:
     at, shape = geometry(5, receivers, 6), (5, receivers, 6)
-    options = Options(polarization is not None, polarization == "h", spreading=True)
+    options, turn = Options(polarization == "h", spreading=True), Rotation.random(random_state=2)
+    sent = Polarization(polarization or "v", turn.as_matrix())
+    up = np.tile(sent.up if polarization else np.zeros(3), (5, 1))
     given, start = Geometry.of(at), np.full(at.centres.shape, np.nan)
     out = np.empty(shape), np.empty(shape), np.empty((*shape, 3))
-    found = filled(solve, 0, 5, given, start, options, out=out)
+    found = filled(solve, 0, 5, given, up, start, options, out=out)
     length, amplitude, point = solve_reference(at)
     if polarization is not None:
         away = [a - point for a in (at.tx[:, None, None], at.rx[:, :, None])]
-        amplitude *= copolar(*away, polarization)
+        amplitude *= copolar(*away, sent)
     return found, (length, amplitude, point)
 
 

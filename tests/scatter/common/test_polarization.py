@@ -1,5 +1,7 @@
 """The surface of the body: a conductor by vectors, skin by Fresnel's formulas."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,17 +10,20 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
+from rtradar.antenna import Antenna
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import (
+    Polarization,
     antenna_field,
     bisector,
     body_material,
     body_reflection,
     material_factor,
+    sent_field,
 )
 from rtradar.scene import material
 
@@ -84,11 +89,13 @@ def test_skin_takes_some_and_gives_nothing(seed: int) -> None:
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("frequency", [14e9, 79e9])
-def test_straight_on_skin_gives_back_its_coefficient(frequency: float, polarization: str) -> None:
+def test_straight_on_skin_gives_back_its_coefficient(
+    frequency: float, polarization: Literal["v", "h"]
+) -> None:
     eta = SKIN.eta(np.array([frequency]))
     way = np.array([-4.0, 1.0, 0.3])
     expected = (np.sqrt(eta[0]) - 1) / (np.sqrt(eta[0]) + 1)
-    found = material_factor(way, 2 * way, eta, polarization)  # type: ignore[arg-type]
+    found = material_factor(way, 2 * way, eta, Polarization(polarization))
     assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
@@ -97,26 +104,45 @@ def test_at_10_ghz_skin_is_as_published() -> None:
     # 8.01 S/m.
     published = np.sqrt(31.29 - 8.01j / (2 * np.pi * 10e9 * 8.854e-12))
     way = np.array([-4.0, 1.0, 0.3])
-    found = material_factor(way, way, SKIN.eta(np.array([10e9])), "v")
+    found = material_factor(way, way, SKIN.eta(np.array([10e9])), Polarization("v"))
     # Four digits are published.
     assert found[0] == pytest.approx((published - 1) / (published + 1), rel=1e-3)
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
-def test_a_conductor_is_what_others_are_told_by(polarization: str) -> None:
+def test_a_conductor_is_what_others_are_told_by(polarization: Literal["v", "h"]) -> None:
     rng = np.random.default_rng(0)
     tx = rng.normal(size=(50, 3))
     rx = tx + 0.3 * rng.normal(size=(50, 3))
-    np.testing.assert_allclose(material_factor(tx, rx, CONDUCTOR, polarization), 1, rtol=1e-9)  # type: ignore[arg-type]
+    found = material_factor(tx, rx, CONDUCTOR, Polarization(polarization))
+    np.testing.assert_allclose(found, 1, rtol=1e-9)
 
 
 def test_antennas_send_across_their_way() -> None:
     ways = unit(np.array([[1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, -1.0]]))
-    np.testing.assert_allclose(antenna_field(ways, "v")[:2], [[0, 0, 1], [0, 0, 1]])
-    np.testing.assert_allclose(antenna_field(ways, "v")[2], np.array([1, 0, 1]) / np.sqrt(2))
-    np.testing.assert_allclose(np.abs(antenna_field(ways, "h")[0]), [0, 1, 0])
-    # Straight up there is no v.
-    np.testing.assert_array_equal(antenna_field(np.array([[0.0, 0.0, 1.0]]), "v"), 0)
+    v, h = Polarization("v"), Polarization("h")
+    np.testing.assert_allclose(antenna_field(ways, v)[:2], [[0, 0, 1], [0, 0, 1]])
+    np.testing.assert_allclose(antenna_field(ways, v)[2], np.array([1, 0, 1]) / np.sqrt(2))
+    np.testing.assert_allclose(np.abs(antenna_field(ways, h)[0]), [0, 1, 0])
+    # Straight up there is no v, or that of the boresight.
+    up = np.array([[0.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(antenna_field(up, v), 0)
+    np.testing.assert_array_equal(antenna_field(up, v, x_for_steep=True), [[1, 0, 0]])
+
+
+@pytest.mark.parametrize("kind", ["v", "h"])
+def test_a_turned_antenna_sends_its_field_turned(kind: Literal["v", "h"]) -> None:
+    turns = Rotation.random(3, random_state=0).as_matrix()
+    ways = unit(np.random.default_rng(0).normal(size=(3, 4, 5, 3)))
+    ways[:, 0, 0] = [0, 0, 1]
+    turned = np.einsum("tij,tabj->tabi", turns, ways)
+    # One antenna for each of the first index, as of a radar that moves, or one for all.
+    for one, own, there in ((turns, ways, turned), (turns[0], ways[0], turned[0])):
+        antenna = Antenna(pattern="dipole")
+        upright = sent_field(antenna, own, Polarization(kind), x_for_steep=True)
+        found = sent_field(antenna, there, Polarization(kind, one), x_for_steep=True)
+        back = Polarization(kind, one).seen(found)
+        np.testing.assert_allclose(back, upright, atol=1e-7)
 
 
 def test_unknown_materials_and_frequencies_are_refused() -> None:

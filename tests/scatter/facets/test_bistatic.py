@@ -7,6 +7,7 @@ import trimesh
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facets import Waves
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.obliquity import with_obliquity
 
 RADIUS_M, FREQUENCY_HZ, FAR_M = 0.03, 14e9, 1e4
@@ -77,7 +78,7 @@ def test_in_a_run_a_body_casts_no_shadow_of_its_own(angle_deg: float, alike: boo
     to_tx = np.array([4.0, 0.0, 0.1]).reshape(1, 1, 1, 3)
     to_rx = np.array([4.0 * np.cos(angle), 4.0 * np.sin(angle), 0.1]).reshape(1, 1, 1, 3)
     waves = Waves(np.array([[0, 1]]), np.zeros((1, 1)), np.ones((1, 1)), spreading=True)
-    given = waves, to_tx, to_rx, np.eye(3)[None, None], "v"
+    given = waves, to_tx, to_rx, np.eye(3)[None, None], Polarization("v")
     whole, factor = with_obliquity(*given, shadow=True)
     run, in_run = with_obliquity(*given, shadow=False)
     assert np.array_equal(run.currents, whole.currents) == alike

@@ -12,7 +12,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
-from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.polarization import Polarization, copolar
 from rtradar.scatter.facets.surfaces import (
     ellipsoid_facets,
     facet_integral,
@@ -252,9 +252,8 @@ def test_polarization_of_a_mirror_by_hand() -> None:
     # Tx along x, Rx along y: the mirror is at 45 degrees. v lies along its surface and is reversed,
     # as everywhere; h is carried over from y to x, and kept.
     tx, rx = np.array([1.0, 0, 0]), np.array([0, 2.0, 0])
-    assert copolar(tx, rx, "v") == pytest.approx(1)
-    assert copolar(tx, rx, "h") == pytest.approx(1)
-    for polarization in ("v", "h"):
+    for polarization in (Polarization("v"), Polarization("h")):
+        assert copolar(tx, rx, polarization) == pytest.approx(1)
         assert copolar(tx, tx, polarization) == 1
         assert copolar(tx, -tx, polarization) == 1
         assert copolar(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]), polarization) == 1

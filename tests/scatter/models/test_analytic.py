@@ -234,9 +234,9 @@ def model(
     if not paper:
         return one(tx, rx, body, spreading=spreading)
     pose = (body.centres[None], body.frames[None], body.semi_axes)
-    length, amplitude = plane_wave_echo(
-        FLAT, Geometry(tx[None], rx[None, None], *pose), spreading=spreading
-    )
+    at = Geometry(tx[None], rx[None, None], *pose)
+    middles = FLAT.tx.mean(axis=0)[None], FLAT.rx.mean(axis=0)[None]
+    length, amplitude = plane_wave_echo(at, middles, spreading=spreading)
     return length[0, 0], amplitude[0, 0]
 
 

@@ -108,7 +108,7 @@ def test_a_wall_reflects_only_where_it_is(
         found.append(np.abs(model.echoes(chirps).amplitude[0, :, 0, 1]))
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     _, _, point = solve_specular_points(
-        Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:]), points=True
+        Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:6]), points=True
     )
     # Both stand equally far from the wall but for the body's surface: the fraction of the way by
     # similar triangles.

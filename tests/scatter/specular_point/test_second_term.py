@@ -12,6 +12,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter import build_model
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.specular_point.second_term import with_second_term
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -49,7 +50,7 @@ def test_of_a_sphere_it_is_that_of_the_exact_series() -> None:
     place = target_geometry(sphere, at, at)
     points = solve_specular_points(place, points=True)[2]
     for polarization in ("v", "h"):
-        found = with_second_term(place, points, polarization, np.array(k))
+        found = with_second_term(place, points, Polarization(polarization), np.array(k))
         np.testing.assert_allclose(found, 1 + 0.5j / (k * radius), rtol=0, atol=1e-9)
 
 
@@ -104,7 +105,7 @@ def test_antennas_apart_have_the_coefficient_of_the_exact_series(
     tx, rx = (1e6 * np.array([[np.cos(half), way * np.sin(half), 0.0]]) for way in (-1, 1))
     place = target_geometry(sphere, tx, rx)
     points = solve_specular_points(place, points=True)[2]
-    found = with_second_term(place, points, polarization, np.array(k))
+    found = with_second_term(place, points, Polarization(polarization), np.array(k))
     coefficient = (1 + sign * np.tan(half) ** 2) / np.cos(half)
     np.testing.assert_allclose(found, 1 + 0.5j * coefficient / (k * radius), rtol=0, atol=1e-5)
 
