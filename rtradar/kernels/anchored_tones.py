@@ -53,7 +53,7 @@ class Anchors(NamedTuple):
     change: NDArray[np.float32]
 
 
-class Between(NamedTuple):
+class BetweenAnchors(NamedTuple):
     """Where chirps are between anchors.
 
     Each chirp has the number of the ``first (chirp,)`` of its `ANCHORS` anchors and their ``weight
@@ -118,7 +118,7 @@ class _Windows(NamedTuple):
 
 
 def add_anchored_tones(
-    anchors: Anchors, between: Between, sweep: Sweep, out: NDArray[np.complex64]
+    anchors: Anchors, between: BetweenAnchors, sweep: Sweep, out: NDArray[np.complex64]
 ) -> None:
     """Add the sum of the tones to ``out (chirp, rx, sample)`` [m].
 
@@ -133,7 +133,7 @@ def add_anchored_tones(
     def fill(begin: int) -> None:
         some = order[begin : begin + _CHIRPS_AT_ONCE]
         first, weight, tx, carrier = between
-        own = Between(first[some], weight[some], tx[some], carrier[some])
+        own = BetweenAnchors(first[some], weight[some], tx[some], carrier[some])
         changed = (np.diff(own.first) != 0) | (np.diff(own.tx) != 0)
         runs = np.concatenate([[0], np.flatnonzero(changed) + 1, [len(some)]])
         grid = np.empty((len(some), receivers, cells), dtype=np.complex64)

@@ -13,7 +13,7 @@ from rtradar.kernels.jit import compiled
 Array = NDArray[np.float64]
 
 
-class Looks(NamedTuple):
+class EchoesAtInstants(NamedTuple):
     """Echoes at the instants at which they are looked at.
 
     ``at (instant,)`` are cycles and ``cycle_s`` the duration of one [s]. Ranges [m], range rates

@@ -13,12 +13,13 @@ from tqdm import tqdm
 
 from rtradar.body import Body, Person
 from rtradar.echoes import Echoes
-from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.prepared_room import PreparedRoom
 from rtradar.pipeline.processing import Processing, block_chirps
 from rtradar.pipeline.timing import Stages
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
+from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.signal import Noise, receive, synthesize
@@ -47,13 +48,12 @@ class Capture:
 
     ``people`` are those of the scene and those who were given, ``body`` is all of them at their
     places, and ``processing`` has the radar at its position in the scene.
-    ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or
-    None. ``tones`` is the model of the echoes that are summed at every chirp: all but ghosts that
-    ``inside`` approximates.
-    ``link_budget`` is that of the person's parts, ``warned`` its warnings. ``n_chirps`` are
-    whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
-    the IF samples, ``receiver`` what else their receiver adds, and ``warmup_s`` the time until
-    everything was compiled or loaded [s].
+    ``model`` includes the paths over walls if the scene has any; ``room`` is the room, or None.
+    ``summed`` is the model of the echoes that are summed at every chirp: all but ghosts that the
+    room approximates. ``link_budget`` is that of the people's parts, ``warned`` its warnings.
+    ``n_chirps`` are whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame,
+    ``noise`` is that of the IF samples, ``receiver`` what else their receiver adds, and
+    ``warmup_s`` the time until everything was compiled or loaded [s].
     """
 
     people: tuple[Person, ...]
@@ -61,9 +61,9 @@ class Capture:
     settings: RunSettings
     processing: Processing
     body: Body
-    model: EchoModel
-    tones: EchoModel
-    inside: Indoors | None
+    model: PeopleAndObjects
+    summed: EchoModel
+    room: PreparedRoom | None
     link_budget: LinkBudget
     warned: tuple[str, ...]
     noise: Noise
@@ -91,7 +91,7 @@ class Capture:
     def title(self) -> str:
         """Title of pictures and of the progress bar."""
         names = [self.motion, self.radar.name, self.settings.fidelity]
-        return ", ".join(names + ([self.scene.name] if self.inside else []))
+        return ", ".join(names + ([self.scene.name] if self.room else []))
 
     def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
         """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.
@@ -120,7 +120,7 @@ class Capture:
         come in the same array. With DDM there is one row for each cycle.
         """
         radar, stages, most = self.radar, self.stages, block_chirps(self.radar)
-        room, ghosts = (self.inside.room, self.inside.ghosts) if self.inside else (None, None)
+        clutter, ghosts = (self.room.clutter, self.room.ghosts) if self.room else (None, None)
         # The largest array but for the frames. Allocated anew for each block, it would now and then
         # find no hole in the heap.
         samples_of = np.empty((at_once, radar.n_rx, radar.samples_per_chirp), np.complex64)
@@ -140,9 +140,9 @@ class Capture:
                 with stages.time("receiver"):
                     phases = self.receiver.phases(echoes, first)
                     self.receiver.turn_moving(samples, phases)
-            if room is not None:
+            if clutter is not None:
                 with stages.time("clutter"):
-                    room.add(samples, chirps)
+                    clutter.add(samples, chirps)
             if self.receiver is not None:
                 with stages.time("receiver"):
                     self.receiver.transmit(samples, phases, first)
@@ -158,9 +158,9 @@ class Capture:
         # block is computed.
         def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
             with stages.time("scatter"), one_blas_thread():
-                if room is not None:
-                    room.begin(chirps)
-                echoes = self.tones.echoes(chirps)
+                if clutter is not None:
+                    clutter.begin(chirps)
+                echoes = self.summed.echoes(chirps)
                 if ghosts is not None:
                     ghosts.compute(chirps, AHEAD)
             for begin in range(0, len(chirps), at_once):

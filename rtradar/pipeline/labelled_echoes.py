@@ -14,7 +14,6 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.output.truth import parts_of
 from rtradar.scatter.common.echo_sets import at_nodes
-from rtradar.scatter.world import path_names
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +61,7 @@ def labelled_echoes(capture: Capture, chirps: NDArray[np.int64]) -> xr.Dataset:
             "time": ("chirp", radar.centres_of(chirps), {"units": "s"}),
             "tx": ("chirp", echoes.tx),
             "part": ("echo", np.array(parts.names)[echoes.part]),
-            "path": ("echo", np.array(path_names(capture.model))[echoes.path]),
+            "path": ("echo", np.array(capture.model.path_names)[echoes.path]),
             "person": ("echo", parts.person[echoes.part], {"long_name": "number; -1: an object"}),
             "bounces": ("echo", echoes.bounces),
         },

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.indoors import Indoors, indoors
+from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
 from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import reuse_freed_memory, stage_line
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
@@ -28,10 +29,9 @@ from rtradar.scatter import EchoModel
 from rtradar.scatter.binary_phase import BinaryPhaseModel
 from rtradar.scatter.common.poses import has_mesh
 from rtradar.scatter.link_budget import LinkBudget, link_budget, power_of_parts_alone
-from rtradar.scatter.multipath.room_model import RoomModel
+from rtradar.scatter.people_and_objects import PeopleAndObjects, build_model_of_all
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.validity import warn_of
-from rtradar.scatter.world import World, build_world, model_of_people
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
@@ -55,8 +55,61 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     """
     check_radar(radar)
     scene, everyone = people_in(scene, moving)
+    _refuse_together(radar, scene, settings)
     reuse_freed_memory()
     processing = Processing.of(radar, settings)
+    with stage_line("preparing"):
+        with processing_compiled_beside():
+            # People, objects and the radar at their places in the world.
+            with processing.stages.time("motion"):
+                body = body_of_people(everyone, settings)
+                radar = scene.place(radar)
+                processing = replace(processing, radar=radar)
+            n_chirps, frame_starts = _frames(radar, body)
+            # What they return at this level, over every path.
+            warm_up_start = time.perf_counter()
+            model = _echo_model(radar, body, scene, settings)
+            first = _first_echoes(model, radar, body)
+        warm_up_processing(first, radar)
+        warmup_s = time.perf_counter() - warm_up_start
+    # How strong people are without the room, and with that the noise.
+    with processing.stages.time("survey"):
+        budget, warned = _surveyed(model, radar, body, n_chirps, scene, settings)
+    noise = _noise(radar, budget, settings)
+    # The room: its clutter, and which echoes over its walls are worth their cost beside the noise.
+    room, summed = None, cast(EchoModel, model)
+    if radar.multiplexing == "bpm":
+        summed = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
+    if model.room is not None:
+        with processing.stages.time("room"):
+            powers = budget.power, noise.power
+            given = radar, body, scene, settings, n_chirps
+            room = prepare_room(model.room, model, *given, *powers)
+            summed = room.summed
+    # What else the receiver does to the samples, by the strongest that moves.
+    movers = _movers(budget, model, first, n_chirps) if radar.receiver is not None else ()
+    receiver = _receiver(radar, movers, noise, room, n_chirps, settings)
+    return Capture(
+        people=everyone,
+        scene=scene,
+        settings=settings,
+        processing=processing,
+        body=body,
+        model=model,
+        summed=summed,
+        room=room,
+        link_budget=budget,
+        warned=warned,
+        noise=noise,
+        receiver=receiver,
+        n_chirps=n_chirps,
+        frame_starts=frame_starts,
+        warmup_s=warmup_s,
+    )
+
+
+def _refuse_together(radar: Radar, scene: Scene, settings: RunSettings) -> None:
+    """Raise InputError for a radar, a scene and settings that do not go together."""
     if settings.snr_db == "physical":
         # They report a missing value before the work.
         radar.noise_power_w, radar.watts_per_m2  # noqa: B018
@@ -70,67 +123,39 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
             f"scene '{scene.name}': radar '{radar.name}' has multiplexing = 'bpm', which is "
             "simulated in free space only; take 'tdm', or leave the scene out"
         )
-    with stage_line("preparing"):
-        with processing_compiled_beside():
-            with processing.stages.time("motion"):
-                body = body_of_people(everyone, settings)
-                radar = scene.place(radar)
-                processing = replace(processing, radar=radar)
-            n_chirps, frame_starts = _frames(radar, body)
-            warm_up_start = time.perf_counter()
-            model = _echo_model(radar, body, scene, settings)
-            chirps = np.arange(2 * radar.n_tx)
-            around = model.person if isinstance(model, World) else model
-            # Which paths need a model of their own is not yet known.
-            quick = around.optical_echoes if isinstance(around, RoomModel) else model.echoes
-            echoes = quick(chirps)
-            # Not every model has specular points; the report shows them of all.
-            geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
-            solve_specular_points(geometry, points=True)
-        warm_up_processing(echoes, radar)
-        warmup_s = time.perf_counter() - warm_up_start
-    with warnings.catch_warnings(record=True) as caught, processing.stages.time("survey"):
+
+
+def _first_echoes(model: PeopleAndObjects, radar: Radar, body: Body) -> Echoes:
+    """Compute some echoes, and specular points, which the report shows of every level."""
+    chirps = np.arange(2 * radar.n_tx)
+    # Which paths of a room need a model of their own is not yet known.
+    room = model.room
+    echoes = model.echoes(chirps) if room is None else room.optical_echoes(chirps)
+    geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
+    solve_specular_points(geometry, points=True)
+    return echoes
+
+
+def _surveyed(
+    model: PeopleAndObjects,
+    radar: Radar,
+    body: Body,
+    n_chirps: int,
+    scene: Scene,
+    settings: RunSettings,
+) -> tuple[LinkBudget, tuple[str, ...]]:
+    """Return the link budget with the limits of the objects, and the warnings that were given."""
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
-        person, spreading = model_of_people(model), settings.spreading
-        budget = link_budget(person, radar, body, n_chirps, spreading=spreading, scene=scene)
-        if isinstance(model, World):
-            budget = replace(budget, limits=(*budget.limits, *model.limits))
-            for limit in model.limits:
-                warn_of(limit)
+        alone, spreading = model.people_alone, settings.spreading
+        budget = link_budget(alone, radar, body, n_chirps, spreading=spreading, scene=scene)
+        limits = model.limits
+        for limit in limits:
+            warn_of(limit)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    noise = _noise(radar, budget, settings)
-    movers = _movers(budget, model, echoes, n_chirps) if radar.receiver is not None else ()
-    inside, tones = None, model
-    if radar.multiplexing == "bpm":
-        tones = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
-    if isinstance(around, RoomModel):
-        with processing.stages.time("room"):
-            powers = budget.power, noise.power
-            inside = indoors(around, radar, body, scene, settings, n_chirps, *powers)
-            if isinstance(model, World):
-                objects = model.prune(radar, n_chirps, 0.0 if settings.keep_all else noise.power)
-                inside = inside._replace(summary=inside.summary | {"objects": objects})
-            if inside.ghosts is not None:
-                direct = around.without_ghosts()
-                tones = model.with_person(direct) if isinstance(model, World) else direct
-    return Capture(
-        people=everyone,
-        scene=scene,
-        settings=settings,
-        processing=processing,
-        body=body,
-        model=model,
-        tones=tones,
-        inside=inside,
-        link_budget=budget,
-        warned=tuple(str(warning.message) for warning in caught),
-        noise=noise,
-        receiver=_receiver(radar, movers, noise, inside, n_chirps, settings),
-        n_chirps=n_chirps,
-        frame_starts=frame_starts,
-        warmup_s=warmup_s,
-    )
+    said = tuple(str(warning.message) for warning in caught)
+    return replace(budget, limits=(*budget.limits, *limits)), said
 
 
 def check_radar(radar: object) -> None:
@@ -181,8 +206,8 @@ def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
     return n_chirps, starts
 
 
-def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> EchoModel:
-    return build_world(
+def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> PeopleAndObjects:
+    return build_model_of_all(
         settings.fidelity,
         radar,
         body,
@@ -212,10 +237,10 @@ def power_alone(
 
 
 def _movers(
-    budget: LinkBudget, model: EchoModel, echoes: Echoes, n_chirps: int
+    budget: LinkBudget, model: PeopleAndObjects, echoes: Echoes, n_chirps: int
 ) -> tuple[Mover, ...]:
     """Return people, by the link budget and some echoes of everything, and each moving object."""
-    objects = model.movers(n_chirps) if isinstance(model, World) else ()
+    objects = model.movers(n_chirps)
     own = echoes.part < len(budget.part_power)
     delays = mean_delays(replace(echoes, amplitude=np.where(own, echoes.amplitude, 0)))
     power = sum(budget.person_power)
@@ -227,7 +252,7 @@ def _receiver(
     radar: Radar,
     movers: tuple[Mover, ...],
     noise: Noise,
-    inside: Indoors | None,
+    room: PreparedRoom | None,
     n_chirps: int,
     settings: RunSettings,
 ) -> ReceiverStage | None:
@@ -243,7 +268,7 @@ def _receiver(
         Expected(movers, noise.power, noise.power * gain),
         n_chirps=n_chirps,
         seed=settings.seed,
-        room=inside.room if inside else None,
+        room=room.clutter if room else None,
         keep_all=settings.keep_all,
     )
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.expected_echoes import Looks, fields_in_bins, follow_echoes
+from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
 from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.processing import CellSources
 from rtradar.process import range_spectrum
@@ -126,7 +126,7 @@ class Sources:
         cycles = (columns - n_cycles // 2) % n_cycles
         return np.asarray(radar.n_channels * found[cycles, of_cells])
 
-    def _looks(self, start_cycle: int) -> tuple[Looks, NDArray[np.int64]]:
+    def _looks(self, start_cycle: int) -> tuple[EchoesAtInstants, NDArray[np.int64]]:
         """The echoes at the instants of a frame that are not weak in it, and their parts."""
         at, looks = self._table.frame(start_cycle)
         radar, count = self._capture.radar, min(len(one.part) for one in looks)
@@ -139,16 +139,16 @@ class Sources:
         kept = np.flatnonzero(power_m2.max(axis=0) > max(self._weak_m2, 0.0))
         # One layout and type, or Numba would compile for each that comes.
         own = (np.take(array, kept, axis=1) for array in (range_m, rate_mps, power_m2))
-        return Looks(at, radar.cycle_duration_s, *own), looks[0].part[kept]
+        return EchoesAtInstants(at, radar.cycle_duration_s, *own), looks[0].part[kept]
 
     @cached_property
     def _still(self) -> Array:
         """Power of the room in each cell, none where its clutter is removed [m^2]."""
         capture, radar = self._capture, self._capture.radar
         power = np.zeros((radar.samples_per_chirp, self._cycles))
-        if capture.inside is not None and capture.settings.clutter_removal == "none":
+        if capture.room is not None and capture.settings.clutter_removal == "none":
             samples = np.zeros((radar.n_tx, radar.n_rx, len(power)), np.complex64)
-            capture.inside.room.add(samples, np.arange(radar.n_tx))
+            capture.room.clutter.add(samples, np.arange(radar.n_tx))
             windows = capture.processing.window_functions
             spectra = range_spectrum(samples, radar, window_functions=windows)
             by_range = (np.abs(spectra.astype(np.complex128)) ** 2).sum(axis=(0, 1))

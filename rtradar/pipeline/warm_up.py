@@ -14,7 +14,7 @@ import numpy as np
 
 from rtradar.clouds import spatial_points
 from rtradar.echoes import Echoes
-from rtradar.kernels.expected_echoes import Looks, fields_in_bins, follow_echoes
+from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
 from rtradar.kernels.jit import is_on_disk
 from rtradar.kernels.tone_sum import add_tones
 from rtradar.pipeline.capture import chirps_of
@@ -56,7 +56,7 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
 
 def _warm_up_sources() -> None:
     """Compile or load what tells who returned a cell."""
-    looks = Looks(np.arange(2), 1.0, *np.ones((3, 2, 1)))
+    looks = EchoesAtInstants(np.arange(2), 1.0, *np.ones((3, 2, 1)))
     steps, fields = np.empty((1, 1), dtype=np.int32), np.empty((1, 1), dtype=np.complex64)
     follow_echoes(0, 1, 0, looks, 1.0, 1.0, steps, fields)
     none = np.zeros(1, dtype=np.int64)

@@ -18,7 +18,7 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.anchored_tones import (
     ANCHORS,
     Anchors,
-    Between,
+    BetweenAnchors,
     Sweep,
     add_anchored_tones,
     fill_anchors,
@@ -106,7 +106,7 @@ class GhostIf:
         first = self._first_anchor(cycle)
         weight = _cubic_weights(self.cycles[first[:, None] + np.arange(ANCHORS)], cycle)
         carrier = radar.sampled_start_hz + radar.tx_offset_hz[tx]
-        between = Between(first - self._first, weight, tx, carrier.astype(np.float64))
+        between = BetweenAnchors(first - self._first, weight, tx, carrier.astype(np.float64))
         sweep = Sweep(float(radar.slope_hz_per_s), float(radar.sample_rate_hz))
         add_anchored_tones(self._held, between, sweep, samples)
 

@@ -19,7 +19,7 @@ from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.world import build_world
+from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scene import Furniture, Object, Scene, Wall, material
 from rtradar.scene.moving import RigidMotion
 from rtradar.signal import synthesize
@@ -191,7 +191,7 @@ def test_a_turned_radar_sees_people_and_objects_of_a_world_that_is_turned_as_wel
 ) -> None:
     upright, other = (
         samples(
-            build_world(
+            build_model_of_all(
                 fidelity,
                 dataclasses.replace(radar, polarization=polarization),
                 body,
@@ -252,7 +252,7 @@ def test_so_it_does_of_objects() -> None:
     against = SeenMotion(turning, np.array(place) - CENTRE, moving.poses_at)
     metal, empty = material("metal"), SeenBody(walker(), moving.poses_at)
     here, there = (
-        build_world(
+        build_model_of_all(
             "specular",
             radar,
             body,

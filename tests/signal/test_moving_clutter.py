@@ -15,7 +15,7 @@ from rtradar.process import range_doppler
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.world import build_world
+from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scene import Furniture, Object, Scene, Wall, material
 from rtradar.signal.moving_clutter import MovingRoomIf, keyframe_times
 from rtradar.signal.static_clutter import RoomIf
@@ -150,4 +150,4 @@ def test_what_is_not_simulated_is_refused_in_one_line() -> None:
         build_model("physical-optics", radar, body, scene=ROOM, variant="scalar")
     fan = Object("fan", "fan", "metal", position_m=(1, 1, 1))
     with pytest.raises(InputError, match="leave out 'fan', the walls and furniture, or path_times"):
-        build_world("analytic", radar, body, scene=dataclasses.replace(ROOM, objects=(fan,)))
+        build_model_of_all("analytic", radar, body, scene=dataclasses.replace(ROOM, objects=(fan,)))

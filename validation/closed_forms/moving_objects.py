@@ -24,7 +24,7 @@ import trimesh
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.scatter.world import build_world
+from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -47,7 +47,7 @@ def echoes_of(radar: rt.Radar, moving: rt.Object, chirps: NDArray[np.int64]) -> 
     """Echoes of an object alone."""
     scene = rt.Scene(objects=(moving,))
     body = replace(ASIDE, duration_s=float(chirps[-1] + 1) * radar.chirp_interval_s)
-    world = build_world("specular", radar, body, scene=scene)
+    world = build_model_of_all("specular", radar, body, scene=scene)
     return world.objects[0][0].echoes(chirps)
 
 

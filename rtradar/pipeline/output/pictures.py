@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.truth import truth_of
+from rtradar.pipeline.prepared_room import PreparedRoom
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
@@ -33,9 +33,9 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
     Returns the PNG files by their titles, in the order in which they are best looked at.
     """
     drawn, frame = draw_found(folder, clouds, capture.radar, capture.settings)
-    if capture.inside:
+    if capture.room:
         with read_maps(folder / "maps.h5") as maps:
-            drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
+            drawn |= _draw_room(folder, capture, capture.room, maps, frame)
     return drawn
 
 
@@ -70,7 +70,7 @@ def draw_found(
 
 
 def _draw_room(
-    folder: Path, capture: Capture, inside: Indoors, maps: Any, frame: int
+    folder: Path, capture: Capture, room: PreparedRoom, maps: Any, frame: int
 ) -> dict[str, Path]:
     """Draw the plan of a room, its walls over range and azimuth, and clutter before and after.
 
@@ -93,7 +93,7 @@ def _draw_room(
         panels[after] = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
     there = radar.at(time_s)
     found = [
-        ghost for ghost in ghosts(inside.model, radar, time_s) if ghost.range_m < radar.max_range_m
+        ghost for ghost in ghosts(room.model, radar, time_s) if ghost.range_m < radar.max_range_m
     ]
     # Out and back over the same walls is as long as the reverse: both have one number.
     key = dict(enumerate(dict.fromkeys(_walls(one.path) for one in sorted(found, key=_range)), 1))
@@ -124,7 +124,7 @@ def _draw_room(
         named = {"person": tracks[:, 0]}
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
     paths = {
-        number: inside.model.course(ghost.path, middle, there) for number, ghost in numbered.items()
+        number: room.model.course(ghost.path, middle, there) for number, ghost in numbered.items()
     }
     drawn["Plan of the room, with paths"] = folder / "plan.png"
     rooms.draw_room_plan(folder / "plan.png", scene, there, named, paths, key, heading)

@@ -22,7 +22,7 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
     list of path, range [m], velocity [m/s], azimuth [deg] and power [m^2]; and ``clutter``, to
     which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least.
     """
-    if capture.inside is None:
+    if capture.room is None:
         return {}
     times = np.asarray(maps["time"])
     if "range_doppler_received" in maps:
@@ -39,9 +39,9 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
             "azimuth_deg": math.degrees(ghost.azimuth_rad),
             "power_m2": ghost.power_m2,
         }
-        for ghost in ghosts(capture.inside.model, capture.radar, time_s)
+        for ghost in ghosts(capture.room.model, capture.radar, time_s)
     ]
-    clutter = dict(capture.inside.summary["clutter"])
+    clutter = dict(capture.room.summary["clutter"])
     before_db = clutter["signal_to_clutter_db"]
     if "range_doppler_received" in maps and before_db is not None:
         velocity = np.asarray(maps["velocity"])

@@ -16,9 +16,7 @@ from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
-from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scatter.world import World
 from rtradar.scene import Scene
 
 MAX_ECHOES = 400
@@ -45,10 +43,8 @@ def snapshots(table: EchoTable) -> Snapshots:
     """
     capture, window = table.capture, table.shown_frames
     radar, body, scene = capture.radar, capture.body, capture.scene
-    model = capture.model.person if isinstance(capture.model, World) else capture.model
     times = np.minimum(radar.window_times(capture.frame_starts[window]), body.duration_s)
-    direct = (WallPath((), ()),)
-    paths = model.paths if isinstance(model, RoomModel) else direct
+    paths = capture.model.paths
     keys, observed = _by_key(table.shown(), len(body.part_names))
     chosen = _strongest(keys, observed.power_m2)
     keys = [keys[number] for number in chosen]

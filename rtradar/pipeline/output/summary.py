@@ -52,7 +52,9 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
     """Return the summary of a run that started at ``started_s``, see `cost`."""
     settings, radar, budget = capture.settings, capture.radar, capture.link_budget
     # A model may trace nothing yet, and would if a part came near a line of sight.
-    traces = capture.model.variant is not None or getattr(capture.model, "traces", False)
+    traces = capture.model.variant is not None or getattr(
+        capture.model.people_alone, "traces", False
+    )
     summary = {
         "parameters": {
             "motion": capture.motion,
@@ -86,8 +88,8 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         summary["modelled"] = modelled
     if capture.receiver is not None:
         summary["receiver"] = [dataclasses.asdict(effect) for effect in capture.receiver.effects]
-    if capture.inside:
-        summary["room"] = capture.inside.summary
+    if capture.room:
+        summary["room"] = capture.room.summary
     return summary
 
 
@@ -187,7 +189,7 @@ _SINGLE_REFLECTIONS = {
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:
-    of_room = capture.inside.limits if capture.inside else ()
+    of_room = capture.room.limits if capture.room else ()
     limits = [dataclasses.asdict(limit) for limit in (*capture.link_budget.limits, *of_room)]
     if not capture.link_budget.visible:
         invisible = {"name": "nobody_visible", "share": 0.0}

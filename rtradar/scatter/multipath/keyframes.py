@@ -31,7 +31,7 @@ from rtradar.scatter.common.polarization import (
     unit,
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
-from rtradar.scatter.multipath.path_echoes import AT_ONCE, EchoColumns, Met
+from rtradar.scatter.multipath.path_echoes import NO_DELAYS, DelayingPassages, EchoColumns
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.system.threads import in_threads, thread_map
@@ -130,7 +130,9 @@ def path_keyframes(
 
 
 def _in_columns(
-    columns: EchoColumns, factors: Sequence[tuple[NDArray[np.int64], Met, Field]], strength: Array
+    columns: EchoColumns,
+    factors: Sequence[tuple[NDArray[np.int64], DelayingPassages, Field]],
+    strength: Array,
 ) -> Field:
     """Factors (node, keyframe, line, 2, rx_end, column), without terms that are faint anywhere."""
     owners = []
@@ -239,17 +241,17 @@ def _carry(
 
 def _pairs(
     paths: Sequence[WallPath], path: NDArray[np.int64], legs: Sequence[_Carried]
-) -> Iterator[tuple[NDArray[np.int64], Met, tuple[Field, Field]]]:
+) -> Iterator[tuple[NDArray[np.int64], DelayingPassages, tuple[Field, Field]]]:
     """Echoes, what they met, and the fields (node, keyframe, line, end, echo, 3) of both legs."""
     out, back = legs
-    yield np.arange(len(path)), AT_ONCE, (out.field, back.field)
+    yield np.arange(len(path)), NO_DELAYS, (out.field, back.field)
     for number in np.unique(path):
         there, here = out.waves[paths[number].out], back.waves[paths[number].back]
         if len(there) == len(here) == 1:
             continue
         chosen = np.flatnonzero(path == number)
         for (met_out, sent), (met_back, received) in product(there.items(), here.items()):
-            if (met_out, met_back) != AT_ONCE:
+            if (met_out, met_back) != NO_DELAYS:
                 fields = sent[..., out.of_leg[chosen], :], received[..., back.of_leg[chosen], :]
                 yield chosen, (met_out, met_back), fields
 

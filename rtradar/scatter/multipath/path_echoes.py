@@ -27,10 +27,10 @@ Indices = NDArray[np.int64]
 ConductorEcho = Callable[[Geometry], tuple[Array, Array]]
 """Lengths and amplitudes (chirp, rx, part) of conductors before given antennas [m]."""
 
-Met = tuple[Passages, Passages]
+DelayingPassages = tuple[Passages, Passages]
 """Delaying passages through slabs on the way out, and on the way back seen from Rx."""
 
-AT_ONCE: Met = ((), ())
+NO_DELAYS: DelayingPassages = ((), ())
 """No delays."""
 
 
@@ -107,8 +107,8 @@ class EchoColumns:
         self.path: Indices = np.repeat(np.arange(len(paths)), n_parts)
         self.part: Indices = np.tile(np.arange(n_parts), len(paths))
         self.echo = list(range(len(self.path)))
-        self.met = [AT_ONCE] * len(self.path)
-        self._columns = {(echo, AT_ONCE): echo for echo in self.echo}
+        self.met = [NO_DELAYS] * len(self.path)
+        self._columns = {(echo, NO_DELAYS): echo for echo in self.echo}
         self._delays: SlabDelays | None = None
         self._settled = False
         self.direct = np.array([not paths[path].order for path in self.path.tolist()], dtype=bool)
@@ -119,9 +119,9 @@ class EchoColumns:
     @property
     def delayed(self) -> bool:
         """Whether slabs delay any of them."""
-        return any(met != AT_ONCE for met in self.met)
+        return any(met != NO_DELAYS for met in self.met)
 
-    def column(self, echo: int, met: Met) -> int:
+    def column(self, echo: int, met: DelayingPassages) -> int:
         """Return the column of an echo, a new one if it is the first; -1 if it was left out."""
         found = self._columns.get((echo, met), -1)
         if found < 0 and not self._settled:

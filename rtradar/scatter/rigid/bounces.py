@@ -25,7 +25,7 @@ from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
-from rtradar.scatter.rigid.knots import Knots
+from rtradar.scatter.rigid.polynomials import PolynomialsInTime
 from rtradar.trace.bounces import MeshSurfaces
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ class SheetBounces:
         Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``. All
         echoes are there if ``whole``, else those that are not 0.
         """
-        knots = Knots(times, self._knot_s)
+        knots = PolynomialsInTime(times, self._knot_s)
         field = np.stack(
             [self._knots.get(own, partial(self._knot, own)) for own in knots.numbers.tolist()]
         )

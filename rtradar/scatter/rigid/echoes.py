@@ -41,8 +41,8 @@ from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.rigid.bounces import SheetBounces
-from rtradar.scatter.rigid.knots import Knots
-from rtradar.scatter.rigid.legs import Past, RigidLegs
+from rtradar.scatter.rigid.legs import ObjectOccluders, RigidLegs
+from rtradar.scatter.rigid.polynomials import PolynomialsInTime
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map
@@ -99,7 +99,7 @@ class RigidEchoes:
         radar: Radar,
         moving: Object,
         duration_s: float,
-        past: Past | None,
+        past: ObjectOccluders | None,
         *,
         walls: Sequence[Wall] = (),
         path: WallPath = DIRECT,
@@ -223,7 +223,7 @@ class RigidEchoes:
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         apart = len(chirps) and chirps[-1] - chirps[0] >= 2 * len(chirps)
-        knots = Knots(times, self._knot_s)
+        knots = PolynomialsInTime(times, self._knot_s)
         count = len(knots.numbers)
         if count * radar.n_tx < len(chirps):
             field = self._at_knots(knots.numbers.tolist())

@@ -40,7 +40,7 @@ _TOGETHER = 1.0
 at half of it polynomials through three nodes err by 16 % of the wave that comes later."""
 
 
-class Past(NamedTuple):
+class ObjectOccluders(NamedTuple):
     """What may hide an object: Mitsuba, furniture and all objects, and people."""
 
     mi: Any
@@ -56,7 +56,7 @@ class RigidLegs:
     """
 
     def __init__(
-        self, radar: Radar, path: WallPath, walls: WallResponse, past: Past | None
+        self, radar: Radar, path: WallPath, walls: WallResponse, past: ObjectOccluders | None
     ) -> None:
         self.path, self._radar, self._walls, self._past = path, radar, walls, past
         self._sides: tuple[tuple[Leg, Antenna | None], ...] = (

@@ -8,7 +8,7 @@ import scipy.fft
 from references.cases import Pair, filled, kernel_case, samples
 from rtradar.kernels.angles import Steering, add_interpolated, beam_power, highest_maxima
 from rtradar.kernels.cfar import os_cfar_rows
-from rtradar.kernels.expected_echoes import Looks, fields_in_bins, follow_echoes
+from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
 from rtradar.kernels.prime_factor_dft import add_doppler_power, pick_cells, prime_factor_dft
 
 # -- expected echoes -------------------------------------------------------------------------------
@@ -35,7 +35,7 @@ def follow_echoes_reference(first, cycles, looks, turns_per_m, steps_per_m):
 def _follow() -> Pair:
     rng, shape = np.random.default_rng(0), (9, 63)
     power = rng.random(shape) * (rng.random(shape) > 0.2)  # some are not seen
-    looks = Looks(
+    looks = EchoesAtInstants(
         np.arange(9) * 17 + 3, 7.5e-4, 2 + rng.random(shape), rng.normal(size=shape), power
     )
     out = np.empty((136, 63), dtype=np.int32), np.empty((136, 63), dtype=np.complex64)

@@ -11,7 +11,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.anchored_tones import (
     ANCHORS,
     Anchors,
-    Between,
+    BetweenAnchors,
     Sweep,
     add_anchored_tones,
     fill_anchors,
@@ -89,7 +89,7 @@ def _anchored(chirps_a_run: int) -> Pair:
     anchors = Anchors(length, level, np.array(change)[..., :20].copy())
     fraction = rng.uniform(0, 1, (26, 1))
     weight = np.prod(fraction[:, None] + 1 - _OTHERS, axis=2) / [-6, 2, -2, 6]
-    between = Between(chirps % 3, weight, chirps % 2, np.full(26, 10e9))
+    between = BetweenAnchors(chirps % 3, weight, chirps % 2, np.full(26, 10e9))
     given, out = (anchors, between, Sweep(7e13, 4e6)), (np.empty((26, 2, 256), np.complex64),)
     found = filled(add_anchored_tones, *given, out=out, adds=True)
     return found, anchored_tones_reference(*given, 256)

@@ -20,6 +20,7 @@ from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.output import snapshots as module
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.scatter import build_model
+from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.settings import RunSettings
 
@@ -57,8 +58,9 @@ def look(
     body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None
 ) -> Any:
     chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
+    everything = PeopleAndObjects(model, len(body.part_names), ())
     capture: Any = SimpleNamespace(
-        model=model, radar=RADAR, body=body, scene=scene or Scene(),
+        model=everything, radar=RADAR, body=body, scene=scene or Scene(),
         frame_starts=chosen, n_chirps=N_CHIRPS,
     )  # fmt: skip
     return snapshots(EchoTable(capture))

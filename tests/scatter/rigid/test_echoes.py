@@ -15,9 +15,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
+from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scatter.rigid import bounces
 from rtradar.scatter.rigid.echoes import RigidEchoes
-from rtradar.scatter.world import World, build_world
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -133,7 +133,7 @@ def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
         motion=rt.FollowingPath(velocity_mps=(-1, 0, 0)),
     )
     body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.1))
-    world = build_world("specular", radar, body, scene=rt.Scene(objects=(cart,)))
+    world = build_model_of_all("specular", radar, body, scene=rt.Scene(objects=(cart,)))
     echoes = world.echoes(np.arange(4))
     own = echoes.part == len(body.part_names)
     assert set(echoes.bounces[own]) == {1, 2, 3}
@@ -161,8 +161,7 @@ def test_a_pass_may_need_more_knots_of_bounces_than_are_kept(
         "corner", "dihedral", "metal", position_m=(3, 0, 1), yaw_deg=180, motion=turning
     )
     body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0), duration_s=0.1))
-    world = build_world("specular", radar, body, scene=rt.Scene(objects=(corner,)))
-    assert isinstance(world, World)
+    world = build_model_of_all("specular", radar, body, scene=rt.Scene(objects=(corner,)))
     moving, chirps = world.objects[0][0], np.arange(0, 40, 5)
     found = field(moving.echoes(chirps))
     np.testing.assert_allclose(field(moving.echoes(chirps[-1:])), found[:, -1:], atol=1e-6)

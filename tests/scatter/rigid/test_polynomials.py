@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtradar.scatter.rigid.knots import Knots
+from rtradar.scatter.rigid.polynomials import PolynomialsInTime
 
 
 def test_polynomials_of_degree_seven_are_met() -> None:
     rng = np.random.default_rng(0)
     times, tx = rng.uniform(0.1, 0.2, 40), rng.integers(0, 3, 40)
-    knots = Knots(times, 0.01)
+    knots = PolynomialsInTime(times, 0.01)
     powers = np.arange(8)[:, None, None, None, None]
     terms = rng.normal(size=(8, 3, 2, 4, 5, 2)).view(np.complex128)[..., 0]
 

@@ -12,7 +12,7 @@ _COUNT = 8
 _OFFSETS = np.arange(_COUNT) - _COUNT // 2 + 1
 
 
-class Knots:
+class PolynomialsInTime:
     """The knots ``numbers (knot,)`` about times [s], at these numbers of ``apart`` seconds."""
 
     def __init__(self, times: NDArray[np.float64], apart: float) -> None:

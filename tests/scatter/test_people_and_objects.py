@@ -11,7 +11,7 @@ import trimesh
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.scatter.world import World, build_world
+from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scene import Wall, material
 
 RADAR = dataclasses.replace(
@@ -29,7 +29,7 @@ def test_people_and_objects_hide_each_other() -> None:
         y = 3.0 if name == "beside" else 0.0
         screen = rt.Object("screen", sheet, "metal", position_m=(x, y, 1.1))
         scene = rt.Scene(objects=(screen,))
-        model = build_world("specular", radar, body, scene=scene)
+        model = build_model_of_all("specular", radar, body, scene=scene)
         echoes = model.echoes(chirps)
         every = (np.abs(echoes.amplitude[1]) ** 2).sum(axis=(0, 1))
         own = echoes.part == len(body.part_names)
@@ -54,8 +54,7 @@ def test_ghosts_below_the_noise_or_far_below_their_object_are_left_out() -> None
         thickness_m=0.0125,
     )
     scene = rt.Scene(walls=(behind,), objects=(plate,))
-    world = build_world("specular", radar, body, scene=scene)
-    assert isinstance(world, World)
+    world = build_model_of_all("specular", radar, body, scene=scene)
     (found,) = world.prune(radar, 300, 0.0)
     # The wall behind it: over it the object is seen from its other side.
     names = [row["path"] for row in found["paths"]]

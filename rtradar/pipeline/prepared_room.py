@@ -13,6 +13,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.multipath.room_model import FIELD_ERROR, RoomModel
+from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scatter.validity import Limit, warn_of
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
@@ -21,29 +22,32 @@ from rtradar.signal.moving_clutter import MovingRoomIf
 from rtradar.signal.static_clutter import RoomIf
 
 _LEFT_OUT, _OF_GHOSTS = 0.04, 0.75
-"""Part of the tolerated power of errors that the weakest ghosts may take, which are left out, and
-that all ghosts may; the shadow in the clutter may take what they leave."""
+"""Budget of errors, as fractions of the tolerated power: 4 % for ghosts left out, 75 % for all
+ghosts, and the rest for the shadow in the clutter."""
 
 _LEADS = 0.5
 """Part of the clutter power from behind the antennas above which there is a warning."""
 
 
-class Indoors(NamedTuple):
-    """The person in the room: the echo model, and the IF of the room itself.
+class PreparedRoom(NamedTuple):
+    """People and objects in a room: what is summed chirp by chirp, and the IF of the room itself.
 
-    ``ghosts`` are the IF samples of ghosts where they are approximated. ``summary`` is what was
-    kept and dropped, for JSON; ``limits`` are those of the walls.
+    ``model`` is that of the people, and ``summed`` the echoes of all that is summed: all but ghosts
+    whose IF samples are approximated, ``ghosts``. ``clutter`` is the room itself. ``summary`` is
+    what was kept and dropped, for JSON; ``limits`` are those of the walls.
     """
 
     model: RoomModel
-    room: RoomIf
+    summed: PeopleAndObjects
+    clutter: RoomIf
     ghosts: GhostIf | None
     summary: dict[str, Any]
     limits: tuple[Limit, ...]
 
 
-def indoors(
+def prepare_room(
     model: RoomModel,
+    everything: PeopleAndObjects,
     radar: Radar,
     body: Body,
     scene: Scene,
@@ -51,12 +55,13 @@ def indoors(
     n_chirps: int,
     person_power_m2: float,
     noise_power_m2: float,
-) -> Indoors:
-    """Trace a room with a person in it, and leave out what stays below the noise.
+) -> PreparedRoom:
+    """Trace a room with people in it, and leave out what stays below the noise.
 
-    The settings give the backend, the order of the paths, and whether everything is kept. The
-    powers are those of the person's echoes without the room, and of noise, per IF sample [m^2].
-    What is not worth its cost is taken out of the model.
+    The ``model`` is that of the people in ``everything``. The settings give the backend, the order
+    of the paths, and whether everything is kept. The powers are those of the person's echoes
+    without the room, and of noise, per IF sample [m^2]. What is not worth its cost is taken out of
+    the model.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     allowed = 0.0
@@ -74,16 +79,16 @@ def indoors(
         ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed - error)
         error += said.pop("error_m2")
     if radar.is_moving:
-        room: RoomIf = MovingRoomIf(radar, radar.duration_of(n_chirps), trace)
+        static: RoomIf = MovingRoomIf(radar, radar.duration_of(n_chirps), trace)
     else:
         shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
-        room, error = RoomIf(radar, clutter.cycle(), shadow), error + shadow.error_m2
-    ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
+        static, error = RoomIf(radar, clutter.cycle(), shadow), error + shadow.error_m2
+    ratio = person_power_m2 / static.power_m2 if static.power_m2 > 0 else None
     summary: dict[str, Any] = {
         "paths": [asdict(path) for path in paths],
         "faces": [face._asdict() for face in model.faces],
         "clutter": {
-            "power_m2": room.power_m2,
+            "power_m2": static.power_m2,
             "signal_to_clutter_db": None if ratio is None else float(10 * np.log10(ratio)),
             "kept": [asdict(item) for item in clutter.kept],
             "dropped": [asdict(item) for item in clutter.dropped],
@@ -96,6 +101,9 @@ def indoors(
             "left_out": model.left_out,
             **said,
         }
+    if scene.objects:
+        summary["objects"] = everything.prune(radar, n_chirps, noise)
+    summed = everything if ghosts is None else everything.with_person(model.without_ghosts())
     limits = []
     if radar.is_moving:
         limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))
@@ -119,4 +127,4 @@ def indoors(
         )
         limits.append(Limit("wall_frequency_response", fraction, message))
         warn_of(limits[-1])
-    return Indoors(model, room, ghosts, summary, tuple(limits))
+    return PreparedRoom(model, summed, static, ghosts, summary, tuple(limits))

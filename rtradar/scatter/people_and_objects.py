@@ -23,7 +23,7 @@ from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.rigid.echoes import RigidEchoes
-from rtradar.scatter.rigid.legs import Past
+from rtradar.scatter.rigid.legs import ObjectOccluders
 from rtradar.scatter.rigid.people import OccludingPeople
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
@@ -41,7 +41,7 @@ LEAST_GHOST_DB = -25.0
 as long as these."""
 
 
-class World:
+class PeopleAndObjects:
     """The echoes of people, by the model ``person``, and those of moving objects.
 
     The ``objects (object, path)`` answer over several paths, the direct one first. The part of an
@@ -57,13 +57,33 @@ class World:
         limits: Sequence[Limit] = (),
     ) -> None:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
-        self._limits, self.variant = tuple(limits), person.variant
+        self._limits = tuple(limits)
+
+    @property
+    def variant(self) -> str | None:
+        """Backend that traces for the people."""
+        return self.person.variant
+
+    @property
+    def room(self) -> RoomModel | None:
+        """The model of the people in a room; None without one."""
+        return self.person if isinstance(self.person, RoomModel) else None
+
+    @property
+    def people_alone(self) -> EchoModel:
+        """The model of the people without objects and without a room."""
+        return self.person if self.room is None else self.room.person
+
+    @property
+    def paths(self) -> tuple[WallPath, ...]:
+        """Path of people's echoes, by the number that an echo has of it; without walls one."""
+        return (WallPath((), ()),) if self.room is None else self.room.paths
 
     @property
     def path_names(self) -> tuple[str, ...]:
         """Name of each path, by the number that an echo has of it: those of the people first."""
-        of_objects = (path.path.name for own in self.objects for path in own)
-        return tuple(dict.fromkeys((*path_names(self.person), *of_objects)))
+        every = [*self.paths, *(path.path for own in self.objects for path in own)]
+        return tuple(dict.fromkeys(path.name for path in every))
 
     @property
     def limits(self) -> tuple[Limit, ...]:
@@ -71,9 +91,9 @@ class World:
         of_paths = (limit for own in self.objects for path in own for limit in path.limits)
         return (*self._limits, *of_paths)
 
-    def with_person(self, person: EchoModel) -> World:
+    def with_person(self, person: EchoModel) -> PeopleAndObjects:
         """Return the same objects with another model of the people."""
-        return World(person, self._parts, self.objects, self._limits)
+        return PeopleAndObjects(person, self._parts, self.objects, self._limits)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
@@ -82,6 +102,8 @@ class World:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps, those of the people first."""
         chirps = np.asarray(chirps, dtype=np.int64)
+        if not self.objects:
+            return self.person.echoes(chirps)
         found, names = [self.person.echoes(chirps)], self.path_names
         for number, own in enumerate(self.objects, start=self._parts):
             for path in own:
@@ -137,7 +159,7 @@ def _powers(echoes: Echoes) -> NDArray[np.float64]:
     return np.asarray((np.abs(fields) ** 2).mean(axis=(0, 2)))
 
 
-def build_world(
+def build_model_of_all(
     fidelity: str,
     radar: Radar,
     body: Body,
@@ -147,42 +169,29 @@ def build_world(
     variant: str = "auto",
     spreading: bool = True,
     **options: Any,
-) -> EchoModel:
+) -> PeopleAndObjects:
     """Build the model of that name for the people, and that of the objects of the scene.
 
-    Without objects it is what `build_model` makes, whose parameters and errors these are. A level
-    that traces nothing lets nothing occlude an object either.
+    Parameters and errors are those of `build_model`. A level that traces nothing lets nothing
+    occlude an object either.
     """
     overlaps = objects_inside(scene, body.duration_s) if scene.objects else []
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
     model = build_model(fidelity, radar, body, spreading=spreading, **settled)
-    if not scene.objects:
-        return model
-    if radar.is_moving and (scene.walls or scene.furniture):
+    if scene.objects and radar.is_moving and (scene.walls or scene.furniture):
         raise InputError(
             f"scene '{scene.name}': objects that move, in a room before a radar that moves, are "
             f"not simulated; leave out '{scene.objects[0].name}', the walls and furniture, or "
             "path_times_s"
         )
     past = None
-    if model.variant is not None:
+    if scene.objects and model.variant is not None:
         mi = use(select(variant))
-        past = Past(mi, RoomTracer(mi, scene), OccludingPeople(mi, body))
+        past = ObjectOccluders(mi, RoomTracer(mi, scene), OccludingPeople(mi, body))
     rigid = partial(RigidEchoes, radar, past=past, walls=scene.walls, spreading=spreading)
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     objects = [
         [rigid(moving=moving, duration_s=body.duration_s, path=path) for path in paths]
         for moving in scene.objects
     ]
-    return World(model, len(body.part_names), objects, overlaps)
-
-
-def path_names(model: EchoModel) -> tuple[str, ...]:
-    """Return the name of each path of a model's echoes; without walls there is one."""
-    return model.path_names if isinstance(model, World | RoomModel) else (WallPath((), ()).name,)
-
-
-def model_of_people(model: EchoModel) -> EchoModel:
-    """Return the model of the people alone, without objects and without a room."""
-    person = model.person if isinstance(model, World) else model
-    return person.person if isinstance(person, RoomModel) else person
+    return PeopleAndObjects(model, len(body.part_names), objects, overlaps)
