@@ -104,7 +104,8 @@ class Radar(Powers):
     doppler_bands : int, optional
         Number D of Doppler bands of DDM, more than there are Tx; by default a third more than Tx.
     polarization : {"v", "h"}
-        Co-polar polarisation of Tx and Rx: v is along world z, h along world y.
+        Co-polar polarisation of Tx and Rx on the boresight: v is along the radar's own z axis, h
+        along its y axis.
     transmit_power_dbm : float, optional
         Power of one Tx at its antenna [dBm]. With it powers are known in watts.
     noise_figure_db : float, optional

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.poses import antennas_in_use
 from rtradar.signal.static_clutter import RoomIf
 from rtradar.signal.synthesis import synthesize
 
@@ -91,9 +92,7 @@ class MovingRoomIf(RoomIf):
         radar = self._radar
         found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
-        at_tx, at_rx = radar.antennas_at(times)
-        at_tx = at_tx[np.arange(len(tx)), tx]
-        at_rx = np.take_along_axis(at_rx, radar.rx_of_tx[tx][..., None], axis=1)
+        at_tx, at_rx = antennas_in_use(radar, times, tx)
         for own, rest in zip(found.objects, found.rest, strict=True):
             at_once = max(1, _MOST_TERMS // (radar.n_rx * own.n_echoes))
             for first in range(0, len(chirps), at_once):

@@ -140,11 +140,34 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
     -------
     ChirpPoses
     """
-    times = np.minimum(radar.centres_of(chirps), body.duration_s)
-    tx_index, number = radar.tx_of_chirp(chirps), np.arange(len(times))
-    tx, rx = radar.antennas_at(times)
-    ends = tx[number, tx_index], rx[number[:, None], radar.rx_of_tx[tx_index]]
-    return ChirpPoses(tx_index, *ends, *body.at(times), radar.poses_at(times)[0])
+    times, tx = np.minimum(radar.centres_of(chirps), body.duration_s), radar.tx_of_chirp(chirps)
+    ends = antennas_in_use(radar, times, tx)
+    return ChirpPoses(tx, *ends, *body.at(times), radar.poses_at(times)[0])
+
+
+def antennas_in_use(
+    radar: Radar, times: NDArray[np.float64], tx: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Give the places of one Tx at each time, and of the Rx that are kept with it.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar, which may move.
+    times : (time,) float64
+        Times since the start of the capture [s].
+    tx : (time,) int64
+        Which Tx is meant at each time.
+
+    Returns
+    -------
+    tx : (time, 3) float64
+        Places of the Tx, world [m].
+    rx : (time, rx, 3) float64
+        Places of the Rx, world [m].
+    """
+    number, (every_tx, every_rx) = np.arange(len(tx)), radar.antennas_at(times)
+    return every_tx[number, tx], every_rx[number[:, None], radar.rx_of_tx[tx]]
 
 
 def keyframe_time(radar: Radar, body: Body, chirp: int) -> float:

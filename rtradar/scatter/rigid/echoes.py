@@ -36,6 +36,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import flat_edge, small_facets
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.poses import antennas_in_use
 from rtradar.scatter.multipath.image_paths import WallPath, images
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
@@ -275,10 +276,8 @@ class RigidEchoes:
 
     def _images(self, times: Array, tx: Indices) -> tuple[Array, Array]:
         """Images of the Tx (task, 3) of tasks and of the Rx (task, rx, 3) kept with them [m]."""
-        every_tx, every_rx = self._radar.antennas_at(times)
-        number, kept = np.arange(len(tx)), self._radar.rx_of_tx[tx]
-        ends = every_tx[number, tx], every_rx[number[:, None], kept]
-        return images(self.path.out, ends[0]), images(self.path.back, ends[1])
+        from_tx, to_rx = antennas_in_use(self._radar, times, tx)
+        return images(self.path.out, from_tx), images(self.path.back, to_rx)
 
     def _field(self, times: Array, tx: Indices) -> NDArray[np.complex128]:
         """Amplitudes (task, rx, node, echo) at the times of tasks and for their Tx."""

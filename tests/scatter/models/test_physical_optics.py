@@ -17,12 +17,15 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.scatter.envelope import stretch
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
+from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
 from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.specular_point.solver import solve_specular_points
 
 Array = NDArray[np.float64]
 PLACES = 8
@@ -169,6 +172,31 @@ def test_physical_optics_is_close_to_the_reference_while_a_shadow_passes() -> No
     assert error(ours, reference) < 0.02
     assert error(fewer, reference) < 0.04
     assert error(Specular(radar, body).echoes(chirps), reference) > 0.05  # type: ignore[arg-type]
+
+
+def test_the_carrier_stays_where_polarisation_leaves_nothing() -> None:
+    """Over walls, whose images may stand far apart, the co-polar part changes its sign."""
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", duration_s=0.1))
+    surface = PhysicalOptics(rt.Radar.preset("paper-12ghz"), body)._surface
+    (centres,), frames, semi_axes = body.at([0.0])
+    head = body.part_names.index("head")
+    tx = centres[head] + np.array([-4.0, 0.0, 1.0])
+
+    def at(angle: float) -> Geometry:
+        rx = centres[head] + 4 * np.array([-np.cos(angle), 0.2, np.sin(angle)])
+        return Geometry(tx[None], rx[None, None], centres[None], frames, semi_axes)
+
+    angles = np.linspace(1.0, 2.0, 50)
+    v = Polarization("v")
+    copolar, carrier = (
+        np.array([found(at(angle))[0, 0, head] for angle in angles])
+        for found in (
+            lambda at: solve_specular_points(at, polarization=v)[1],
+            lambda at: surface.carriers(at)[1],
+        )
+    )
+    assert copolar.min() < 0 < copolar.max()
+    assert carrier.min() > 0.5 * carrier.max()
 
 
 def test_blocks_of_chirps_do_not_matter() -> None:
