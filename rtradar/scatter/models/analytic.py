@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Literal
 
 import numpy as np
@@ -69,34 +70,29 @@ def plane_wave_echo(
     return length, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
-class _Untraced(BuiltInModel):
-    """An echo model that is one formula for a conductor, without occlusion."""
+class FormulaModel(BuiltInModel, ABC):
+    """An echo model that is one formula for a conductor, `conductor_echo`, without occlusion.
+
+    Its echoes in free space follow from the formula, and in rooms the direct echoes and those over
+    walls.
+    """
 
     traces = False
+    fast_over_walls = True
     relative_cost = 1.0
+    tracer = None
 
-    def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        spreading: bool = True,
+    ) -> None:
         self._radar, self._body, self.spreading = radar, body, spreading
         self.variant: str | None = None
 
-
-class Analytic(_Untraced):
-    """`analytic`: closed-form cross-section at the specular range of each antenna."""
-
-    fast_over_walls = True
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target, alike in both polarisations."""
-        at = target_geometry(target, tx, rx)
-        return sum_of_echoes(*far_field_echo(at), at, frequency)
-
+    @abstractmethod
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
 
@@ -113,7 +109,6 @@ class Analytic(_Untraced):
         amplitude : (chirp, rx, part) float64
             Scattering length, over R1 R2 with ``spreading`` [m].
         """
-        return far_field_echo(at, spreading=self.spreading)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -122,8 +117,35 @@ class Analytic(_Untraced):
         return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
 
 
-class AnalyticPaper(_Untraced):
+class Analytic(FormulaModel):
+    """`analytic`: closed-form cross-section at the specular range of each antenna."""
+
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target, alike in both polarisations."""
+        at = target_geometry(target, tx, rx)
+        return sum_of_echoes(*far_field_echo(at), at, frequency)
+
+    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echoes in the far field."""
+        return far_field_echo(at, spreading=self.spreading)
+
+
+class AnalyticPaper(BuiltInModel):
     """`analytic-paper`: range of the centre and plane waves over the array, as in the paper."""
+
+    traces = False
+    relative_cost = 1.0
+
+    def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
+        self._radar, self._body, self.spreading = radar, body, spreading
+        self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
