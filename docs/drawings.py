@@ -168,7 +168,7 @@ def specular_point() -> Figure:
     return figure
 
 
-def fresnel_zones() -> Figure:
+def visible_fraction() -> Figure:
     """Fresnel zones under the edge of an occluder, and the visible fraction as the edge crosses."""
     figure = Figure((9, 3.4), layout="constrained")
     rings, curve = figure.subplots(1, 2, width_ratios=(1, 1.6))
@@ -243,7 +243,7 @@ DRAWINGS: dict[str, Callable[[], Figure]] = {
     "meshes.png": meshes,
     "chirps.png": chirps,
     "specular-point.png": specular_point,
-    "fresnel-zones.png": fresnel_zones,
+    "visible-fraction.png": visible_fraction,
     "image-path.png": image_path,
     "training-cells.png": training_cells,
 }

@@ -92,7 +92,8 @@ def options() -> str:
             for name in names:
                 if name not in GIVEN:
                     default = parameters[name].default
-                    shown = "none" if default is None else f"{default:g}"
+                    default = "none" if default is None else default
+                    shown = default if isinstance(default, str) else f"{default:g}"
                     rows.append([f"`{level}`", f"`{name}`", meaning, shown])
     return pipe_table(["level", "option", "meaning and what is allowed", "default"], rows)
 

@@ -34,8 +34,7 @@ judge = rt.scattering_length(pose, tx, rx, 14e9, "reference", facets=20480)
 models = {
     "analytic": ("analytic", {}),
     "specular": ("specular", {}),
-    "fresnel, 16 rays": ("fresnel", {"shadow_rays": 16}),
-    "fresnel, 400 rays": ("fresnel", {"shadow_rays": 400}),
+    "specular, gradual": ("specular", {"visibility": "gradual"}),
     "physical-optics, 1280 facets": ("physical-optics", {"facets": 1280}),
     "physical-optics, 5120 facets": ("physical-optics", {"facets": 5120}),
 }

@@ -1,7 +1,8 @@
 """The echo model `auto`: the cheapest level that keeps a tolerance, one for the whole run.
 
 Two numbers decide, which `validation/cost/auto.py` measured as rms errors of the received field
-against `reference`. What `specular` leaves is taken to be
+against `reference`. What `specular` leaves is taken to be, as :eq:`auto-estimate` of the theory
+page,
 
     hypot(0.4 lambda^(1/4), 1 / (2 k rho)),   lambda in metres,
 
@@ -105,7 +106,7 @@ class Auto(BuiltInModel):
 
     It is `specular`, `physical-optics` or `reference`, by what each is known to leave wrong.
 
-    Occlusion: as that level.
+    Occlusion: as that level. It asks as that level does alone.
 
     Parameters
     ----------
