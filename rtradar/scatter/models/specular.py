@@ -53,7 +53,7 @@ class Specular(TwoBounceModel):
     Parameters
     ----------
     visibility : {"sharp", "gradual"}
-        Whether the specular point decides alone, or what is left of the part's facets.
+        ``sharp``: the specular point decides alone; ``gradual``: what is left of the part's facets.
     bounces : int
         1, or 2 for reflections from part to part as well (`rtradar.scatter.double_reflections`); of
         these a path is visible or not.
