@@ -83,8 +83,7 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
     if model.room is not None:
         with processing.stages.time("room"):
             powers = budget.power, noise.power
-            given = radar, body, scene, settings, n_chirps
-            room = prepare_room(model.room, model, *given, *powers)
+            room = prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
             summed = room.summed
     # What else the receiver does to the samples, by the strongest that moves.
     movers = _movers(budget, model, first, n_chirps) if radar.receiver is not None else ()

@@ -46,7 +46,6 @@ class PreparedRoom(NamedTuple):
 
 
 def prepare_room(
-    model: RoomModel,
     everything: PeopleAndObjects,
     radar: Radar,
     body: Body,
@@ -58,11 +57,13 @@ def prepare_room(
 ) -> PreparedRoom:
     """Trace a room with people in it, and leave out what stays below the noise.
 
-    The ``model`` is that of the people in ``everything``. The settings give the backend, the order
-    of the paths, and whether everything is kept. The powers are those of the person's echoes
+    The model of ``everything`` has a room. The settings give the backend, the order of the paths,
+    and whether everything is kept. The powers are those of the person's echoes
     without the room, and of noise, per IF sample [m^2]. What is not worth its cost is taken out of
     the model.
     """
+    model = everything.room
+    assert model is not None
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     allowed = 0.0
     if settings.path_tolerance_db is not None:

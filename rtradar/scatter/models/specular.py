@@ -39,6 +39,39 @@ def check_visibility(visibility: str) -> None:
         )
 
 
+def _scattering_length(
+    target: Ellipsoids,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    polarization: Literal["v", "h"],
+    variant: str = "auto",
+    bounces: int = 1,
+    terms: int = 1,
+    visibility: Visibility = "sharp",
+) -> NDArray[np.complex128]:
+    """Scattering length of one target."""
+    check_bounces("specular", bounces)
+    check_terms(terms)
+    check_visibility(visibility)
+    at, sent = target_geometry(target, tx, rx), Polarization(polarization)
+    length, amplitude, points = solve_specular_points(at, polarization=sent, points=True)
+    tracer = BodyTracer(use(select(variant)), target.semi_axes)
+    tracer.pose(target.centres, target.frames)
+    if visibility == "gradual":
+        given = target, tx, rx, frequency, polarization, variant
+        left = visible_fractions(*given)[:, None]
+    else:
+        left = unobstructed(tracer, at.tx, at.rx, points).astype(np.complex128)
+    if terms == 2:
+        k = 2 * np.pi * frequency[:, None, None] / SPEED_OF_LIGHT_MPS
+        left *= with_second_term(at, points, sent, k)
+    field = sum_of_echoes(length, amplitude * left, at, frequency)
+    if bounces == 2:
+        field += double_scattering(target, tx, rx, frequency, polarization, tracer)
+    return field
+
+
 class Specular(TwoBounceModel):
     """`specular`: near-field geometric optics for each Tx and Rx.
 
@@ -69,39 +102,7 @@ class Specular(TwoBounceModel):
 
     fast_over_walls = True
     relative_cost = 1.5
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-        variant: str = "auto",
-        bounces: int = 1,
-        terms: int = 1,
-        visibility: Visibility = "sharp",
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target."""
-        check_bounces("specular", bounces)
-        check_terms(terms)
-        check_visibility(visibility)
-        at, sent = target_geometry(target, tx, rx), Polarization(polarization)
-        length, amplitude, points = solve_specular_points(at, polarization=sent, points=True)
-        tracer = BodyTracer(use(select(variant)), target.semi_axes)
-        tracer.pose(target.centres, target.frames)
-        if visibility == "gradual":
-            given = target, tx, rx, frequency, polarization, variant
-            left = visible_fractions(*given)[:, None]
-        else:
-            left = unobstructed(tracer, at.tx, at.rx, points).astype(np.complex128)
-        if terms == 2:
-            k = 2 * np.pi * frequency[:, None, None] / SPEED_OF_LIGHT_MPS
-            left *= with_second_term(at, points, sent, k)
-        field = sum_of_echoes(length, amplitude * left, at, frequency)
-        if bounces == 2:
-            field += double_scattering(target, tx, rx, frequency, polarization, tracer)
-        return field
+    scattering = staticmethod(_scattering_length)
 
     def __init__(
         self,
