@@ -5,7 +5,8 @@
 CHECKOUT is a folder with another version of the sources, such as `git worktree add` makes. Both
 versions use the packages of this Python. Their runs alternate, each in a process of its own, after
 one run of each that is not counted. The table has medians, and the median of the ratios of
-neighbouring runs, so that a slow minute of the machine falls on both.
+neighbouring runs, so that a slow minute of the machine falls on both. The CPU time is that of the
+whole process and of all that it starts, with its imports, which a loaded machine changes least.
 
 With `--first-use` every process begins with an empty cache of compiled code, and the columns are
 the seconds of the whole process and its peak memory.
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -34,12 +36,13 @@ CASES = {
     "auto": ("--fidelity", "auto"),
     "specular, mean removed": ("--fidelity", "specular", "--clutter-removal", "mean"),
     "specular, living-room": ("--fidelity", "specular", "--scene", "living-room"),
+    "specular, 77 GHz": ("--fidelity", "specular", "--radar", "paper-77ghz"),
 }
 RUN = """import sys
 sys.path.insert(0, sys.argv.pop(1))
 from rtradar.cli import main
 sys.exit(main())"""
-WARM = ("to the cloud [s]", "whole run [s]", "peak memory [MB]")
+WARM = ("to the cloud [s]", "whole run [s]", "CPU [s]", "peak memory [MB]")
 FIRST_USE = ("whole process [s]", "peak memory [MB]")
 
 
@@ -50,18 +53,24 @@ def measure(checkout: Path, words: list[str], folder: Path, first_use: bool) -> 
         command = [sys.executable, "-P", "-c", RUN, str(checkout), "run", *words]
         command += ["--out", out, "--json", str(summary_file)]
         environment = os.environ | ({"NUMBA_CACHE_DIR": cache} if first_use else {})
-        began = time.perf_counter()
+        began, used_s = time.perf_counter(), _children_s()
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, cwd=folder, env=environment
         )
-        whole_s = time.perf_counter() - began
+        whole_s, used_s = time.perf_counter() - began, _children_s() - used_s
     if done.returncode:
         raise SystemExit(f"{checkout}: {' '.join(words)}: {done.stderr.strip()}")
     summary = json.loads(summary_file.read_text())
     peak_mb = summary["peak_memory_mb"]
     if first_use:
         return whole_s, peak_mb
-    return to_cloud_s(summary["stages"], summary["wall_s"]), summary["wall_s"], peak_mb
+    return to_cloud_s(summary["stages"], summary["wall_s"]), summary["wall_s"], used_s, peak_mb
+
+
+def _children_s() -> float:
+    """CPU time of all processes that were started and have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main() -> int:
