@@ -30,13 +30,14 @@ from rtradar.scatter.common.polarization import (
     sent_field,
     unit,
 )
+from rtradar.scatter.multipath.furniture_faces import SolidFace
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.path_echoes import NO_DELAYS, DelayingPassages, EchoColumns
+from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.system.threads import in_threads, thread_map
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -68,14 +69,15 @@ class PathKeyframes(NamedTuple):
 class Surroundings(NamedTuple):
     """What a path meets: walls, occluders, antennas and the surfaces of the body.
 
-    The ``tracers`` are those of the body and of furniture, None for no occlusion. ``whole_level``
-    says that bare returns over walls are those of a model before images of the antennas: then they
-    hold the co-polar fraction of a conductor, and what the body occludes of the last section.
+    The ``occluders`` are the body, and furniture and objects, None for no occlusion.
+    ``whole_level`` says that bare returns over walls are those of a model before images of the
+    antennas: then they hold the co-polar fraction of a conductor, and what the body occludes of the
+    last section.
     """
 
     radar: Radar
     walls: WallResponse
-    tracers: tuple[BodyTracer, RoomTracer] | None
+    occluders: tuple[BodyTracer, SolidEdges] | None
     surfaces: Surfaces
     ends: ArrayEnds
     paths: Sequence[WallPath]
@@ -114,13 +116,17 @@ def path_keyframes(
         (chosen, met, _left(around, legs, known, columns.part[chosen], chosen, *fields))
         for chosen, met, fields in _pairs(around.paths, columns.path, legs)
     ]
+    if around.occluders is not None:
+        out, back = (_past_solids(around.occluders[1], leg, exists, times) for leg in legs)
+        for chosen, _, found in factors:
+            found *= out[:, :, :, None, chosen] * back[:, :, None, :, chosen]
     strength = np.zeros((*exists.shape[:2], 2, around.ends.rx.shape[1], len(columns.path)))
     for chosen, _, found in factors:
         strength[..., chosen] = np.maximum(strength[..., chosen], np.abs(found).max(axis=0))
     seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & (strength > 0)
     seen &= exists[:, :, None, None]
-    if around.tracers is not None:
-        seen &= _not_occluded(*around.tracers, legs, seen, poses, columns.part, known, times)
+    if around.occluders is not None:
+        seen &= _not_occluded(around.occluders[0], legs, seen, poses, columns.part, known)
     factor = _in_columns(columns, factors, strength)
     middle = factor[len(factor) // 2]
     change = np.abs(factor - middle) <= _FLAT * np.abs(middle)
@@ -194,7 +200,7 @@ class _Carried(NamedTuple):
     ``field (node, keyframe, line, end, echo, 3)`` arrives without delay in slabs; ``waves`` are all
     fields of the echoes of a leg, by what they met; ``of_leg (echo,)`` counts the echoes of each
     leg. ``arriving (keyframe, line, end, echo, 3)`` is the direction, ``valid (keyframe, line, end,
-    echo)``; ``sections`` are straight sections (echo index, origins, targets, whether the last).
+    echo)``.
     """
 
     field: Field
@@ -202,7 +208,20 @@ class _Carried(NamedTuple):
     of_leg: NDArray[np.int64]
     arriving: Array
     valid: NDArray[np.bool_]
-    sections: list[tuple[NDArray[np.int64], Array, Array, bool]]
+    sections: list[_Section]
+
+
+class _Section(NamedTuple):
+    """A straight section of the legs of some echoes, from origins to targets (..., 3) [m].
+
+    It may be the ``last`` one, and reflected ``at_solid``, a face of furniture.
+    """
+
+    echo: NDArray[np.int64]
+    origins: Array
+    targets: Array
+    last: bool
+    at_solid: bool
 
 
 def _carry(
@@ -232,7 +251,8 @@ def _carry(
         waves = around.walls.along(leg, along, ways, sent * extent[..., None])
         for step, (origins, targets) in enumerate(pairwise(along)):
             start, end = np.broadcast_arrays(origins, targets)
-            sections.append((chosen, start, end, step == len(leg)))
+            at_solid = any(isinstance(face.wall, SolidFace) for face in leg)
+            sections.append(_Section(chosen, start, end, step == len(leg), at_solid))
         all_waves[leg] = {wave.passages: wave.field for wave in waves}
         field[..., chosen, :] = all_waves[leg].setdefault((), field[..., chosen, :])
         arriving[..., chosen, :] = ways[-1]
@@ -290,30 +310,34 @@ def _left(
 # -- occlusion -------------------------------------------------------------------------------------
 
 
+def _past_solids(
+    solids: SolidEdges, leg: _Carried, exists: NDArray[np.bool_], times: Array | None
+) -> Field:
+    """What furniture and objects leave of the field on a leg, (keyframe, line, end, echo)."""
+    asked = leg.valid & exists[:, :, None]
+    left = asked.astype(np.complex128)
+    for echo, origins, targets, _, at_solid in leg.sections:
+        own = left[..., echo]
+        still, moments = own != 0, None
+        if times is not None:
+            moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
+        # What a face of furniture reflects has its edges already.
+        given = origins[still], targets[still], moments
+        own[still] *= solids.left(*given, bent=not at_solid)
+        left[..., echo] = own
+    return left
+
+
 def _not_occluded(
     body: BodyTracer,
-    room: RoomTracer,
     legs: Sequence[_Carried],
     seen: NDArray[np.bool_],
     poses: Poses,
     part: NDArray[np.int64],
     known: NDArray[np.int64],
-    times: Array | None,
 ) -> NDArray[np.bool_]:
-    """Whether furniture, objects and body leave both legs free.
-
-    Returned is (keyframe, line, 2, rx_end, echo).
-    """
-    clear, moments = [], None
-    for leg, axis in zip(legs, (3, 2), strict=True):
-        free = np.logical_or.reduce(seen, axis=axis)
-        for chosen, origins, targets, _ in leg.sections:
-            still = free[..., chosen]
-            if times is not None:
-                moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
-            still[still] = ~room.blocked(origins[still], targets[still], moments)
-            free[..., chosen] = still
-        clear.append(free)
+    """Whether the body leaves both legs free, (keyframe, line, 2, rx_end, echo)."""
+    clear = [np.logical_or.reduce(seen, axis=axis) for axis in (3, 2)]
     for leg, free in zip(legs, clear, strict=True):
         _clear_of_body(body, leg, free, poses, part, known)
     return np.asarray(clear[0][:, :, :, None] & clear[1][:, :, None])
@@ -333,7 +357,7 @@ def _clear_of_body(
     """
     keyframes, kinds = len(clear), len(poses.semi_axes) + 1
     rays = []
-    for chosen, origins, targets, last in leg.sections:
+    for chosen, origins, targets, last, _ in leg.sections:
         asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
         where = np.nonzero(clear[..., chosen] & asked)
         echo = chosen[where[-1]]

@@ -38,6 +38,7 @@ from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.room_keyframes import RoomKeyframes, nearby_points
 from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
+from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
@@ -131,12 +132,13 @@ class RoomModel:
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
-        tracers = None
+        room, occluders = None, None
         self.variant: str | None = None
         if variant is not None:
             backend = select(variant)
             self.variant, mi = backend.kind, use(backend)
-            tracers = BodyTracer(mi, body.semi_axes), RoomTracer(mi, scene)
+            room = RoomTracer(mi, scene)
+            occluders = BodyTracer(mi, body.semi_axes), SolidEdges(room, scene, radar)
         faces: tuple[Face, ...] = ()
         self.faces: tuple[FaceSummary, ...] = ()
         places = _places(radar)
@@ -146,7 +148,6 @@ class RoomModel:
                 "those of analytic or specular: take one of these as fidelity, or order = 0"
             )
         if order:
-            room = tracers and tracers[1]
             found = [reflecting_faces(scene, radar, own, body, room) for own in places]
             faces = tuple(dict.fromkeys(face for some, _ in found for face in some))
             self.faces = _summaries([summaries for _, summaries in found])
@@ -161,7 +162,7 @@ class RoomModel:
         self._around = Surroundings(
             radar,
             walls,
-            tracers,
+            occluders,
             Surfaces(materials or (CONDUCTOR,) * len(body.part_names), radar),
             ArrayEnds.of(radar),
             self.paths,

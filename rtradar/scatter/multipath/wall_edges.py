@@ -177,19 +177,23 @@ class WallEdges:
         return whole
 
     def _past_edge(self, depth: Array, detour: Array) -> Field:
-        """Field of a half plane over that of a whole one, by the depth of the leg within it [m].
-
-        Equation :eq:`wall-edge` of the theory page.
-        """
+        """Field of a half plane over that of a whole one, by the depth of the leg within it [m]."""
         out = (depth >= 0).astype(np.complex128)
         # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
         near = detour < self.resolution_m
         longer, lit = detour[near], out[near]
         number = np.copysign(2 * np.sqrt(longer / self.wavelength_m), depth[near])
-        sine, cosine = fresnel(number)
-        field = 0.5 + (1 + 1j) / 2 * (cosine - 1j * sine)
-        out[near] += (field - lit) * np.sinc(longer / self.resolution_m)
+        out[near] += (half_plane(number) - lit) * np.sinc(longer / self.resolution_m)
         return out
+
+
+def half_plane(number: Array) -> Field:
+    """Field of a half plane over that of a whole one, by the Fresnel number of its edge.
+
+    It is positive on the lit side. Equation :eq:`wall-edge` of the theory page.
+    """
+    sine, cosine = fresnel(number)
+    return np.asarray(0.5 + (1 + 1j) / 2 * (cosine - 1j * sine))
 
 
 def _detour(source: Array, target: Array, axis: int, end: float) -> Array:
@@ -234,15 +238,15 @@ def _free(wall: Wall, ends: Array, walls: Sequence[Wall]) -> Bools:
         held = np.zeros(len(points), dtype=bool)
         for other in walls:
             if other is not wall:
-                held |= _touches(other, points)
+                held |= touches(other, points)
         free[axis, side] = not held.all()
     return free
 
 
-def _touches(wall: Wall, points: Array) -> Bools:
-    """Whether points (point, 3) [m] lie on a wall or inside it."""
+def touches(wall: Wall, points: Array) -> Bools:
+    """Tell whether points (point, 3) [m] lie on a wall or inside it."""
     u, v, above = _on_face(wall, points, back=False)
-    touches = (above <= _TOUCHES_M) & (above >= -wall.thickness_m - _TOUCHES_M)
+    near = (above <= _TOUCHES_M) & (above >= -wall.thickness_m - _TOUCHES_M)
     for place, edge in ((u, wall.edge_u_m), (v, wall.edge_v_m)):
-        touches &= (place >= -_TOUCHES_M) & (place <= np.linalg.norm(edge) + _TOUCHES_M)
-    return np.asarray(touches)
+        near &= (place >= -_TOUCHES_M) & (place <= np.linalg.norm(edge) + _TOUCHES_M)
+    return np.asarray(near)

@@ -1,0 +1,312 @@
+"""Edges of furniture and of moving objects: what these solids leave of a wave that passes them.
+
+Seen along a leg a solid is an outline. What passes it is, by Kirchhoff's integral over what the
+solid leaves free, the straight wave where Mitsuba finds the leg free, and a wave from every piece
+of the outline (the boundary wave of Maggi and Rubinowicz). A straight piece that is long beside the
+Fresnel zone sends what the edge of a wall does, a Fresnel integral of the detour over it
+(`wall_edges`); of a shorter one a part is left, and at a right angle both pieces together are the
+product of two Fresnel integrals.
+
+A piece belongs to the outline of all solids together if a line just outside of it, parallel to the
+leg, is free. Where a solid stands on a wall its outline goes on in the image behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.radar import Radar
+from rtradar.scatter.multipath.wall_edges import half_plane, touches
+from rtradar.scene import Scene, Triangles, Wall
+from rtradar.trace.rays import ball_around
+from rtradar.trace.room_tracer import RoomTracer
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+
+_OUTSIDE_M = 1e-3
+"""How far outside of the outline a line is asked whether it is free [m]."""
+_ON_EDGE_M = 1e-4
+"""Distance from an edge up to which it is Mitsuba that says on which side a leg is [m]."""
+_FAR_RAD = 25.0
+"""Phase along an edge from which its far end counts by the first terms of a series [rad]."""
+_NODES, _WEIGHTS = (0.5 * own for own in np.polynomial.legendre.leggauss(20))
+_GROUP = 16
+"""Edges in a group."""
+_AT_ONCE = 1 << 18
+"""Pairs of a leg and an edge that are looked at at once."""
+
+
+class _Edges(NamedTuple):
+    """Edges of a mesh, and balls around all of them, around groups of neighbours, around each.
+
+    ``ends (edge, 2, 3)`` [m] are as the first of the two faces there has them, going round
+    anticlockwise; ``normals (edge, 2, 3)`` are those of both faces. Where there is one face the
+    second is its back. ``balls`` are three pairs of centres and radii [m].
+    """
+
+    ends: Array
+    normals: Array
+    balls: tuple[tuple[Array, Array], ...]
+
+    @classmethod
+    def of(cls, mesh: Triangles, walls: Sequence[Wall] = ()) -> _Edges:
+        """List the edges of a mesh; those that lie on a wall are none."""
+        ends, normals = _of_faces(mesh)
+        free = np.ones(len(ends), dtype=bool)
+        for wall in walls:
+            on_wall = touches(wall, ends.reshape(-1, 3)).reshape(-1, 2)
+            free &= ~on_wall.all(axis=1)
+            behind = on_wall & ~on_wall[:, ::-1]
+            ends = np.where(behind[..., None], 2 * ends - ends[:, ::-1], ends)
+        # The leaves of a tree are neighbours.
+        order = np.flatnonzero(free)
+        order = order[cKDTree(ends[order].mean(axis=1), leafsize=_GROUP).indices]
+        ends = ends[order]
+        starts = np.arange(0, len(ends), _GROUP)
+        groups = [ball_around(own.reshape(-1, 3)) for own in np.split(ends, starts[1:])]
+        each = ends.mean(axis=1), np.linalg.norm(np.ptp(ends, axis=1), axis=1) / 2
+        all_, grouped = (
+            (np.array([own[0] for own in some]), np.array([own[1] for own in some]))
+            for some in ([ball_around(ends.reshape(-1, 3))], groups)
+        )
+        return cls(ends, normals[order], (all_, grouped, each))
+
+    def near(self, legs: _Legs) -> tuple[Indices, Indices]:
+        """Find the edges over which the detour may be less than `_Legs.later_m`: legs, edges."""
+        whole, groups, each = self.balls
+        leg = np.flatnonzero(legs.pass_through(*whole))
+        number = np.zeros_like(leg)
+        for (centres, radii), count in ((groups, len(groups[1])), (each, _GROUP)):
+            leg = np.repeat(leg, count)
+            number = (number[:, None] * count + np.arange(count)).ravel()
+            inside = number < len(radii)
+            leg, number = leg[inside], number[inside]
+            passes = legs.take(leg).pass_through(centres[number], radii[number])
+            leg, number = leg[passes], number[passes]
+        return leg, number
+
+
+class _Legs(NamedTuple):
+    """Straight legs: ``origins`` and ``ways (leg, 3)``, vectors to their ends, and lengths [m].
+
+    ``wide (leg,)`` is how far from a leg a detour of ``later_m`` may lead [m].
+    """
+
+    origins: Array
+    ways: Array
+    length: Array
+    wide: Array
+
+    @classmethod
+    def between(cls, origins: Array, targets: Array, later_m: float) -> _Legs:
+        """Return those from origins to targets (leg, 3) [m]."""
+        ways = targets - origins
+        length = np.sqrt(np.einsum("ij,ij->i", ways, ways))
+        return cls(origins, ways, length, np.sqrt(later_m * (2 * length + later_m)) / 2)
+
+    def take(self, which: Indices | Bools) -> _Legs:
+        """Return some of them."""
+        return _Legs(*(own[which] for own in self))
+
+    def pass_through(self, centres: Array, radii: Array) -> Bools:
+        """Tell which come so near to balls, one for each or one for all."""
+        away = centres - self.origins
+        square = np.where(self.length > 0, self.length, 1.0) ** 2
+        place = np.clip(np.einsum("ij,ij->i", away, self.ways) / square, 0.0, 1.0)
+        away -= place[:, None] * self.ways
+        return np.asarray(np.einsum("ij,ij->i", away, away) < (radii + self.wide) ** 2)
+
+
+def _of_faces(mesh: Triangles) -> tuple[Array, Array]:
+    """Ends of the edges (edge, 2, 3), and the normals of both faces at each (edge, 2, 3)."""
+    corners, sides = np.asarray(mesh.faces, dtype=np.int64), mesh.corners
+    normals = np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0])
+    every = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    order = np.lexsort(np.sort(every, axis=1).T)
+    every, face = every[order], order // 3
+    key = np.sort(every, axis=1)
+    new = np.append(True, (key[1:] != key[:-1]).any(axis=1))
+    turn = np.arange(len(every)) - np.flatnonzero(new)[np.cumsum(new) - 1]
+    first = np.flatnonzero(turn % 2 == 0)
+    second = np.minimum(first + 1, len(every) - 1)
+    alone = np.append(new, True)[first + 1]
+    # A second face that goes along the edge as the first does is seen from behind.
+    flips = alone | (every[second, 0] == every[first, 0])
+    other = np.where(alone, face[first], face[second])
+    both = np.stack([normals[face[first]], np.where(flips, -1, 1)[:, None] * normals[other]], 1)
+    return mesh.vertices[every[first]], both
+
+
+class _Pieces(NamedTuple):
+    """Pieces of outlines near legs, each beside the ``leg (piece,)`` that it belongs to.
+
+    In the plane across the leg ``depth (piece,)`` is how far the line of the piece is from the leg,
+    negative where the leg runs outside of the solid [m], and ``along (piece, 2)`` are both ends on
+    it, from the point nearest to the leg [m]. ``detour`` is the least over the piece [m],
+    ``bend`` that over the square of its distance from the leg [1/m]; ``beside (piece, 3)`` goes
+    from the leg to just outside of the piece [m].
+    """
+
+    leg: Indices
+    depth: Array
+    along: Array
+    detour: Array
+    bend: Array
+    beside: Array
+
+    def take(self, which: Bools) -> _Pieces:
+        """Return some of them."""
+        return _Pieces(self.leg[which], *(own[which] for own in self[1:]))
+
+
+class SolidEdges:
+    """Furniture and moving objects of a scene with their edges, for the sweep of a radar.
+
+    ``room`` tells what is in the way. Edges count at the middle of the sweep, as those of walls do.
+    """
+
+    def __init__(self, room: RoomTracer, scene: Scene, radar: Radar) -> None:
+        self._room = room
+        self._number = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
+        self._resolution_m = SPEED_OF_LIGHT_MPS / radar.bandwidth_hz
+        self._still = [_Edges.of(piece.triangles(), scene.walls) for piece in scene.furniture]
+        self._moving = [(moving, _Edges.of(moving.shape)) for moving in scene.objects]
+
+    def left(
+        self, origins: Array, targets: Array, times: Array | None = None, *, bent: bool = True
+    ) -> Field:
+        """Compute what solids leave of straight waves from origins to targets (leg, 3) [m], (leg,).
+
+        Objects are where they are at the ``times (leg,)`` [s]; without times only what stands still
+        counts. Not ``bent``, waves go straight on or not at all.
+        """
+        lit = ~self._room.blocked(origins, targets, times)
+        field = lit.astype(np.complex128)
+        if not bent:
+            return field
+        for edges in self._still:
+            self._add(field, lit, edges, origins, targets, times)
+        if times is not None and self._moving:
+            moments, moment = np.unique(times, return_inverse=True)
+            for moving, edges in self._moving:
+                pose = tuple(own[moment] for own in moving.pose(moments))
+                self._add(field, lit, edges, origins, targets, times, pose)
+        return field
+
+    def _add(
+        self,
+        field: Field,
+        lit: Bools,
+        edges: _Edges,
+        origins: Array,
+        targets: Array,
+        times: Array | None,
+        pose: tuple[Array, ...] | None = None,
+    ) -> None:
+        """Add what the edges of one solid send; its ``pose`` has rotations and places by leg."""
+        starts, stops = origins, targets
+        if pose is not None:
+            turned, place = pose
+            starts, stops = (
+                np.einsum("ri,rij->rj", points - place, turned) for points in (origins, targets)
+            )
+        legs = _Legs.between(starts, stops, self._resolution_m)
+        near = edges.near(legs)
+        for first in range(0, len(near[0]), _AT_ONCE):
+            leg, edge = (own[first : first + _AT_ONCE] for own in near)
+            found = self._pieces(edges, legs, leg, edge)
+            leg, beside = found.leg, found.beside
+            if pose is not None:
+                beside = np.einsum("rij,rj->ri", pose[0][leg], beside)
+            moments = None if times is None else times[leg]
+            free = ~self._room.blocked(origins[leg] + beside, targets[leg] + beside, moments)
+            leg = leg[free]
+            np.add.at(field, leg, self._sent(found.take(free), lit[leg]))
+
+    def _pieces(self, edges: _Edges, legs: _Legs, leg: Indices, edge: Indices) -> _Pieces:
+        """Find those edges of the outline over which the detour is less than the resolution."""
+        way = legs.ways[leg]
+        along = np.einsum("pej,pj->pe", edges.normals[edge], way) > 0
+        outline = along[:, 0] != along[:, 1]
+        leg, edge, way, away = leg[outline], edge[outline], way[outline], along[outline, 0]
+        length = legs.length[leg]
+        way = way / length[:, None]
+        ends = edges.ends[edge] - legs.origins[leg, None]
+        # Only what lies between both ends of the leg.
+        heights = np.einsum("pej,pj->pe", ends, way)
+        rise = heights[:, 1] - heights[:, 0]
+        rise = np.where(rise == 0, 1e-300, rise)[:, None]
+        cuts = np.sort(-heights[:, :1] / rise + np.stack([0 * length, length], 1) / rise, axis=1)
+        cuts = np.clip(cuts, 0.0, 1.0)
+        ends = ends[:, :1] + cuts[..., None] * (ends[:, 1:] - ends[:, :1])
+        heights = np.einsum("pej,pj->pe", ends, way)
+        ends -= heights[..., None] * way[:, None]
+        sides = ends[:, 1] - ends[:, 0]
+        wide = np.linalg.norm(sides, axis=1)
+        sides /= np.where(wide > 0, wide, 1.0)[:, None]
+        out = np.cross(way, sides) * np.where(away, -1.0, 1.0)[:, None]
+        depth = np.einsum("pj,pj->p", ends[:, 0], out)
+        along = np.einsum("pej,pj->pe", ends, sides)
+        nearest = np.clip(0.0, along[:, 0], along[:, 1])
+        part = (nearest - along[:, 0]) / np.where(wide > 0, wide, 1.0)
+        first = heights[:, 0] + part * (heights[:, 1] - heights[:, 0])
+        square = depth**2 + nearest**2
+        bend = sum(
+            1 / np.maximum(np.sqrt(one**2 + square) + one, 1e-12)
+            for one in (first, np.maximum(length - first, 0.0))
+        )
+        inner = np.minimum(_OUTSIDE_M, wide / 2)
+        beside = (depth + _OUTSIDE_M)[:, None] * out
+        beside += np.clip(nearest, along[:, 0] + inner, along[:, 1] - inner)[:, None] * sides
+        found = _Pieces(leg, depth, along, square * bend, np.asarray(bend), beside)
+        return found.take((found.detour < self._resolution_m) & (wide > 0) & (first < length))
+
+    def _sent(self, pieces: _Pieces, lit: Bools) -> Field:
+        """Field that each piece sends over that of the straight wave, (piece,)."""
+        scale = np.sqrt(self._number * pieces.bend)
+        size = np.abs(pieces.depth) * scale
+        start, stop = (pieces.along * scale[:, None]).T
+        on_edge = (np.abs(pieces.depth) < _ON_EDGE_M) & (start <= 0) & (stop >= 0)
+        side = np.where(on_edge, np.where(lit, -1.0, 1.0), np.sign(pieces.depth))
+        # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
+        kept = np.sinc(pieces.detour / self._resolution_m)
+        return np.asarray(side * kept * (_wedge(size, stop) - _wedge(size, start)))
+
+
+def _wedge(depth: Array, along: Array) -> Field:
+    """Wave from part of a straight edge, from its point nearest to the leg to a place ``along`` it.
+
+    Squares of both lengths (piece,), which are those across the leg, are the phases of the detours.
+    Equation :eq:`solid-edge` of the theory page.
+    """
+    size = np.abs(along)
+    long, short = np.maximum(depth, size), np.minimum(depth, size)
+    field = _narrow_wedge(long, short)
+    whole = [half_plane(-np.sqrt(2 / np.pi) * own) for own in (depth, size)]
+    other = whole[0] / 2 + whole[1] / 2 - whole[0] * whole[1] - field
+    return np.asarray(np.sign(along) * np.where(size > depth, other, field))
+
+
+def _narrow_wedge(depth: Array, along: Array) -> Field:
+    """The same where the place is no further along the edge than the edge is from the leg."""
+    field = np.empty(len(depth), dtype=np.complex128)
+    slope = along / np.where(depth > 0, depth, 1.0)
+    close = along**2 < _FAR_RAD
+    x, a = depth[close, None], slope[close, None]
+    t = a * (_NODES + 0.5)
+    field[close] = (np.exp(-1j * x**2 * (1 + t**2)) / (1 + t**2) * a) @ _WEIGHTS
+    x, a = depth[~close], slope[~close]
+    phase = 2j * x**2 * a
+    more = 1 - (1 / a + 2 * a / (1 + a**2)) / phase
+    beyond = np.exp(-1j * x**2 * (1 + a**2)) / ((1 + a**2) * phase) * more
+    field[~close] = np.pi * half_plane(-np.sqrt(2 / np.pi) * x) - beyond
+    return field / (2 * np.pi)
