@@ -1,4 +1,4 @@
-"""Kernels of rooms: amplitudes and lengths of echoes over walls; the record of a shadow."""
+"""Kernels of rooms: amplitudes and lengths of echoes over walls; edges of solids beside legs."""
 
 from __future__ import annotations
 
@@ -185,3 +185,59 @@ def delayed_lengths(start, stop, antennas, tx_index, points, bodies, delays, len
                     antenna = antennas.rx[leg, transmitter, receiver]
                     whole += _delay(antenna, place, first, last, delays)
                 out[chirp, receiver, column] = whole
+
+
+class EdgeBalls(NamedTuple):
+    """Edges of a mesh: a ball around all, ``centre (3,)`` and ``radius``, and one around each [m].
+
+    ``middles (edge, 3)`` and ``radii (edge,)`` are those of each, and ``normals (edge, 2, 3)`` are
+    those of both faces that meet there.
+    """
+
+    centre: Array
+    radius: float
+    middles: Array
+    radii: Array
+    normals: Array
+
+
+@inlined()
+def _beside(origin, way, square, centre, reach):
+    """Whether a leg comes so near to a place."""
+    x, y, z = centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2]
+    place = min(max((x * way[0] + y * way[1] + z * way[2]) / square, 0.0), 1.0)
+    x, y, z = x - place * way[0], y - place * way[1], z - place * way[2]
+    return x * x + y * y + z * z < reach * reach
+
+
+@compiled()
+def outline_near(origins, ways, later_m, edges):
+    """Find edges of the outline that a mesh has along each leg, where the leg comes near to them.
+
+    Legs have ``origins`` and ``ways`` to their ends (leg, 3) [m], ``edges`` are `EdgeBalls`. Over
+    an edge that is near a leg may be longer by less than ``later_m``. Returned are the numbers of
+    legs and of edges (2, pair).
+    """
+    found, count = np.empty((2, 1024), dtype=np.int64), 0
+    for leg in range(len(origins)):
+        origin, way = origins[leg], ways[leg]
+        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+        if square == 0:
+            continue
+        wide = math.sqrt(later_m * (2 * math.sqrt(square) + later_m)) / 2
+        if not _beside(origin, way, square, edges.centre, edges.radius + wide):
+            continue
+        for edge in range(len(edges.radii)):
+            one, other = edges.normals[edge, 0], edges.normals[edge, 1]
+            along = one[0] * way[0] + one[1] * way[1] + one[2] * way[2] > 0
+            if along == (other[0] * way[0] + other[1] * way[1] + other[2] * way[2] > 0):
+                continue
+            if not _beside(origin, way, square, edges.middles[edge], edges.radii[edge] + wide):
+                continue
+            if count == found.shape[1]:
+                more = np.empty((2, 2 * count), dtype=np.int64)
+                more[:, :count] = found
+                found = more
+            found[0, count], found[1, count] = leg, edge
+            count += 1
+    return found[:, :count]

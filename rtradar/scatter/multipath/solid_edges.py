@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.rooms import EdgeBalls, outline_near
 from rtradar.radar import Radar
 from rtradar.scatter.multipath.wall_edges import half_plane, touches
 from rtradar.scene import Scene, Triangles, Wall
@@ -32,30 +32,26 @@ Field = NDArray[np.complex128]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
+_AT_ONCE = 1 << 16
+"""Pieces of outlines that are looked at at once."""
 _OUTSIDE_M = 1e-3
 """How far outside of the outline a line is asked whether it is free [m]."""
 _ON_EDGE_M = 1e-4
 """Distance from an edge up to which it is Mitsuba that says on which side a leg is [m]."""
-_FAR_RAD = 25.0
+_FAR_RAD = 10.0
 """Phase along an edge from which its far end counts by the first terms of a series [rad]."""
-_NODES, _WEIGHTS = (0.5 * own for own in np.polynomial.legendre.leggauss(20))
-_GROUP = 16
-"""Edges in a group."""
-_AT_ONCE = 1 << 18
-"""Pairs of a leg and an edge that are looked at at once."""
+_NODES, _WEIGHTS = (0.5 * own for own in np.polynomial.legendre.leggauss(10))
 
 
 class _Edges(NamedTuple):
-    """Edges of a mesh, and balls around all of them, around groups of neighbours, around each.
+    """Edges of a mesh, with balls around all of them and around each.
 
     ``ends (edge, 2, 3)`` [m] are as the first of the two faces there has them, going round
-    anticlockwise; ``normals (edge, 2, 3)`` are those of both faces. Where there is one face the
-    second is its back. ``balls`` are three pairs of centres and radii [m].
+    anticlockwise. Where there is one face the second is its back.
     """
 
     ends: Array
-    normals: Array
-    balls: tuple[tuple[Array, Array], ...]
+    balls: EdgeBalls
 
     @classmethod
     def of(cls, mesh: Triangles, walls: Sequence[Wall] = ()) -> _Edges:
@@ -67,63 +63,10 @@ class _Edges(NamedTuple):
             free &= ~on_wall.all(axis=1)
             behind = on_wall & ~on_wall[:, ::-1]
             ends = np.where(behind[..., None], 2 * ends - ends[:, ::-1], ends)
-        # The leaves of a tree are neighbours.
-        order = np.flatnonzero(free)
-        order = order[cKDTree(ends[order].mean(axis=1), leafsize=_GROUP).indices]
-        ends = ends[order]
-        starts = np.arange(0, len(ends), _GROUP)
-        groups = [ball_around(own.reshape(-1, 3)) for own in np.split(ends, starts[1:])]
-        each = ends.mean(axis=1), np.linalg.norm(np.ptp(ends, axis=1), axis=1) / 2
-        all_, grouped = (
-            (np.array([own[0] for own in some]), np.array([own[1] for own in some]))
-            for some in ([ball_around(ends.reshape(-1, 3))], groups)
-        )
-        return cls(ends, normals[order], (all_, grouped, each))
-
-    def near(self, legs: _Legs) -> tuple[Indices, Indices]:
-        """Find the edges over which the detour may be less than `_Legs.later_m`: legs, edges."""
-        whole, groups, each = self.balls
-        leg = np.flatnonzero(legs.pass_through(*whole))
-        number = np.zeros_like(leg)
-        for (centres, radii), count in ((groups, len(groups[1])), (each, _GROUP)):
-            leg = np.repeat(leg, count)
-            number = (number[:, None] * count + np.arange(count)).ravel()
-            inside = number < len(radii)
-            leg, number = leg[inside], number[inside]
-            passes = legs.take(leg).pass_through(centres[number], radii[number])
-            leg, number = leg[passes], number[passes]
-        return leg, number
-
-
-class _Legs(NamedTuple):
-    """Straight legs: ``origins`` and ``ways (leg, 3)``, vectors to their ends, and lengths [m].
-
-    ``wide (leg,)`` is how far from a leg a detour of ``later_m`` may lead [m].
-    """
-
-    origins: Array
-    ways: Array
-    length: Array
-    wide: Array
-
-    @classmethod
-    def between(cls, origins: Array, targets: Array, later_m: float) -> _Legs:
-        """Return those from origins to targets (leg, 3) [m]."""
-        ways = targets - origins
-        length = np.sqrt(np.einsum("ij,ij->i", ways, ways))
-        return cls(origins, ways, length, np.sqrt(later_m * (2 * length + later_m)) / 2)
-
-    def take(self, which: Indices | Bools) -> _Legs:
-        """Return some of them."""
-        return _Legs(*(own[which] for own in self))
-
-    def pass_through(self, centres: Array, radii: Array) -> Bools:
-        """Tell which come so near to balls, one for each or one for all."""
-        away = centres - self.origins
-        square = np.where(self.length > 0, self.length, 1.0) ** 2
-        place = np.clip(np.einsum("ij,ij->i", away, self.ways) / square, 0.0, 1.0)
-        away -= place[:, None] * self.ways
-        return np.asarray(np.einsum("ij,ij->i", away, away) < (radii + self.wide) ** 2)
+        ends, normals = ends[free], normals[free]
+        centre, radius = ball_around(mesh.vertices if not free.any() else ends.reshape(-1, 3))
+        radii = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
+        return cls(ends, EdgeBalls(centre, radius, ends.mean(axis=1), radii, normals))
 
 
 def _of_faces(mesh: Triangles) -> tuple[Array, Array]:
@@ -189,6 +132,8 @@ class SolidEdges:
         Objects are where they are at the ``times (leg,)`` [s]; without times only what stands still
         counts. Not ``bent``, waves go straight on or not at all.
         """
+        if len(origins) == 0:
+            return np.zeros(0, dtype=np.complex128)
         lit = ~self._room.blocked(origins, targets, times)
         field = lit.astype(np.complex128)
         if not bent:
@@ -219,11 +164,11 @@ class SolidEdges:
             starts, stops = (
                 np.einsum("ri,rij->rj", points - place, turned) for points in (origins, targets)
             )
-        legs = _Legs.between(starts, stops, self._resolution_m)
-        near = edges.near(legs)
-        for first in range(0, len(near[0]), _AT_ONCE):
-            leg, edge = (own[first : first + _AT_ONCE] for own in near)
-            found = self._pieces(edges, legs, leg, edge)
+        ways = stops - starts
+        near = outline_near(starts, ways, self._resolution_m, edges.balls)
+        for first in range(0, near.shape[1], _AT_ONCE):
+            leg, edge = near[:, first : first + _AT_ONCE]
+            found = self._pieces(edges, starts[leg], ways[leg], leg, edge)
             leg, beside = found.leg, found.beside
             if pose is not None:
                 beside = np.einsum("rij,rj->ri", pose[0][leg], beside)
@@ -232,15 +177,14 @@ class SolidEdges:
             leg = leg[free]
             np.add.at(field, leg, self._sent(found.take(free), lit[leg]))
 
-    def _pieces(self, edges: _Edges, legs: _Legs, leg: Indices, edge: Indices) -> _Pieces:
-        """Find those edges of the outline over which the detour is less than the resolution."""
-        way = legs.ways[leg]
-        along = np.einsum("pej,pj->pe", edges.normals[edge], way) > 0
-        outline = along[:, 0] != along[:, 1]
-        leg, edge, way, away = leg[outline], edge[outline], way[outline], along[outline, 0]
-        length = legs.length[leg]
+    def _pieces(
+        self, edges: _Edges, origins: Array, way: Array, leg: Indices, edge: Indices
+    ) -> _Pieces:
+        """Find the pieces over which the detour is less than the resolution, of outlines by leg."""
+        away = np.einsum("pj,pj->p", edges.balls.normals[edge, 0], way) > 0
+        length = np.linalg.norm(way, axis=1)
         way = way / length[:, None]
-        ends = edges.ends[edge] - legs.origins[leg, None]
+        ends = edges.ends[edge] - origins[:, None]
         # Only what lies between both ends of the leg.
         heights = np.einsum("pej,pj->pe", ends, way)
         rise = heights[:, 1] - heights[:, 0]

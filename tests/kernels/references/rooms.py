@@ -12,11 +12,13 @@ from rtradar.kernels.scatter.mirrors import SlabPass, received_from_conductors, 
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.rooms import (
     Blend,
+    EdgeBalls,
     LegAntennas,
     PartPoints,
     PathFactors,
     SlabDelays,
     delayed_lengths,
+    outline_near,
     path_amplitudes,
 )
 
@@ -158,6 +160,35 @@ def _delayed_lengths() -> Pair:
     given = antennas, tx, points, bodies, delays, 8 + rng.random((21, 3, 63))
     found = filled(delayed_lengths, 0, 21, *given, out=(np.empty((21, 3, 63)),))
     return found, delayed_lengths_reference(*given)
+
+
+# -- edges of solids -------------------------------------------------------------------------------
+
+
+def outline_near_reference(origins, ways, later_m, edges):
+    """Legs and edges (2, pair) of `outline_near`, in plain NumPy."""
+    square = (ways**2).sum(axis=1, keepdims=True)
+    wide = np.sqrt(later_m * (2 * np.sqrt(square) + later_m)) / 2
+
+    def beside(centres, radii):
+        away = centres - origins[:, None]
+        place = np.clip((away * ways[:, None]).sum(axis=2) / square, 0, 1)
+        return np.linalg.norm(away - place[..., None] * ways[:, None], axis=2) < radii + wide
+
+    near = beside(edges.centre[None], edges.radius) & beside(edges.middles, edges.radii)
+    one, other = (ways @ edges.normals[:, face].T > 0 for face in range(2))
+    return np.stack(np.nonzero(near & (one != other)))
+
+
+@kernel_case(outline_near)
+def _outline_near() -> Pair:
+    rng = np.random.default_rng(0)
+    middles, normals = rng.normal(size=(90, 3)), rng.normal(size=(90, 2, 3))
+    edges = EdgeBalls(np.zeros(3), 2.0, middles, rng.uniform(0, 0.3, 90), normals)
+    given = rng.normal(size=(900, 3)), 3 * rng.normal(size=(900, 3)), 0.075, edges
+    found = outline_near(*given)
+    assert 1024 < found.shape[1] < 900 * 90 / 4
+    return found, outline_near_reference(*given)
 
 
 # -- fields ----------------------------------------------------------------------------------------

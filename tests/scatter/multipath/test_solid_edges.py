@@ -54,7 +54,7 @@ def box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
 
 def left(scene: Scene, radar: Radar, origin: Array, targets: Array) -> Field:
     edges = SolidEdges(RoomTracer(use(select("auto")), scene), scene, radar)
-    origins = np.broadcast_to(origin, targets.shape)
+    origins = np.tile(origin, (len(targets), 1))
     return edges.left(origins, targets, np.zeros(len(targets)))
 
 
