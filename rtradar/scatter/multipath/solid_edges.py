@@ -212,7 +212,9 @@ class SolidEdges:
         beside = (depth + _OUTSIDE_M)[:, None] * out
         beside += np.clip(nearest, along[:, 0] + inner, along[:, 1] - inner)[:, None] * sides
         found = _Pieces(leg, depth, along, square * bend, np.asarray(bend), beside)
-        return found.take((found.detour < self._resolution_m) & (wide > 0) & (first < length))
+        # Beside an end of the leg rounding would say which pieces are between both ends.
+        between = (first > _OUTSIDE_M) & (first < length - _OUTSIDE_M)
+        return found.take(between & (found.detour < self._resolution_m) & (wide > 0))
 
     def _sent(self, pieces: _Pieces, lit: Bools) -> Field:
         """Field that each piece sends over that of the straight wave, (piece,)."""
