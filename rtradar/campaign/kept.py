@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
-from rtradar.pipeline.echo_table import EchoTable
+from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
@@ -56,7 +56,7 @@ def capture_of(
     capture = prepare(people, radar, scene, RunSettings(**options))
     sources = (*capture.body.names, *(one.name for one in capture.scene.objects))
     several = angles and len(sources) > 1
-    source_of = Sources(EchoTable(capture)).of_cells if several else None
+    source_of = Sources(EchoTable(capture, middles=False)).of_cells if several else None
     keeper = MapKeeper(capture.processing, keep, source_of, angles)
     capture.stream(keeper, progress=False)
     maps = keeper.maps()

@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 from rtradar.body import Person
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.labelled_echoes import compared_echoes
+from rtradar.pipeline.output.labelled_echoes import compared_echoes
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
@@ -169,21 +169,21 @@ def compare(
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     asked = settings = settings_of("compare", RunOptions, options)
+    there = Scene() if scene is None else scene
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
-        scene = Scene() if scene is None else scene
         results: dict[str, Result] = {}
         occluded: dict[str, _Occluded] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = run_into(folder / name, motion, radar, scene, own)
-            occluded[name] = _occluded(results[name], motion, radar, scene, own)
+            results[name] = run_into(folder / name, motion, radar, there, own)
+            occluded[name] = _occluded(results[name], motion, radar, there, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, occluded, radar, names[-1])
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
-            other = run_into(Path(again, "again"), motion, radar, scene, own, pictures=False)
+            other = run_into(Path(again, "again"), motion, radar, there, own, pictures=False)
             summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]], radar)
         pictures, unit = _draw(results, occluded, folder, radar, names[-1])
         views = {name: load_run_view(folder / name) for name in names}
@@ -194,8 +194,7 @@ def compare(
 
     def captures() -> dict[str, Capture]:
         return {
-            name: prepare(motion, radar, scene or Scene(), replace(asked, fidelity=name))
-            for name in names
+            name: prepare(motion, radar, there, replace(asked, fidelity=name)) for name in names
         }
 
     return Comparison(summary, Path(out), _captures=captures)

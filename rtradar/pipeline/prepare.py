@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +76,8 @@ def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -
         budget, warned = _surveyed(model, radar, body, n_chirps, scene, settings)
     noise = _noise(radar, budget, settings)
     # The room: its clutter, and which echoes over its walls are worth their cost beside the noise.
-    room, summed = None, cast(EchoModel, model)
+    room: PreparedRoom | None = None
+    summed: EchoModel = model
     if radar.multiplexing == "bpm":
         summed = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
     if model.room is not None:
@@ -125,7 +125,10 @@ def _refuse_together(radar: Radar, scene: Scene, settings: RunSettings) -> None:
 
 
 def _first_echoes(model: PeopleAndObjects, radar: Radar, body: Body) -> Echoes:
-    """Compute some echoes, and specular points, which the report shows of every level."""
+    """Compute some echoes, so that what they need is compiled, and specular points.
+
+    Not every level has these, and the report shows them of all.
+    """
     chirps = np.arange(2 * radar.n_tx)
     # Which paths of a room need a model of their own is not yet known.
     room = model.room

@@ -58,9 +58,8 @@ def prepare_room(
     """Trace a room with people in it, and leave out what stays below the noise.
 
     The model of ``everything`` has a room. The settings give the backend, the order of the paths,
-    and whether everything is kept. The powers are those of the person's echoes
-    without the room, and of noise, per IF sample [m^2]. What is not worth its cost is taken out of
-    the model.
+    and whether everything is kept. The powers are those of people's echoes without the room, and of
+    noise, per IF sample [m^2]. What is not worth its cost is taken out of the model.
     """
     model = everything.room
     assert model is not None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.echo_table import EchoTable
+from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar

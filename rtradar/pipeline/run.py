@@ -9,8 +9,8 @@ from typing import Any, BinaryIO, Unpack
 
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.echo_table import EchoTable
 from rtradar.pipeline.memory import refuse_large_maps
+from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
 from rtradar.pipeline.output.pictures import draw_pictures
 from rtradar.pipeline.output.room_findings import room_findings

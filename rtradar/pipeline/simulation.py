@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.labelled_echoes import chirps_between, labelled_echoes
 from rtradar.pipeline.memory import refuse_large
+from rtradar.pipeline.output.labelled_echoes import chirps_between, labelled_echoes
 from rtradar.pipeline.prepare import Moving, prepare
 from rtradar.pipeline.processing import block_chirps
 from rtradar.radar import Radar

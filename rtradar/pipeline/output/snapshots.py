@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.pipeline.echo_table import EchoTable, Look
+from rtradar.pipeline.output.echo_table import EchoTable, Look
 from rtradar.pipeline.output.moving_meshes import moving_meshes, thinned_mesh
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.radar import Radar

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.echo_table import EchoTable
+from rtradar.pipeline.output.echo_table import EchoTable
 
 TRUTH = {
     "person_position": (("time", "person", "coordinate"), "m", "root of each person, world"),

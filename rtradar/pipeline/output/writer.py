@@ -14,7 +14,7 @@ from rtradar.body import Body
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.echo_table import EchoTable
+from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import MapStore
 from rtradar.pipeline.output.truth import parts_of, truth_of_parts
 from rtradar.pipeline.processing import (

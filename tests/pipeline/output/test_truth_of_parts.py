@@ -50,13 +50,19 @@ def test_ranges_and_rates_are_those_of_the_parts(alone: rt.Result) -> None:
         # The far-field specular point is up to a^2 / 2 R nearer or farther, 1 cm of the trunk.
         np.testing.assert_allclose(truth["range_m"][row], nearest_m(time_s), atol=0.012)
         rate = (nearest_m(time_s + step) - nearest_m(time_s - step)) / (2 * step)
-        np.testing.assert_allclose(truth["range_rate_mps"][row], rate, atol=0.15)
+        # That changes as a limb turns: by up to 0.03 m/s here, of some 2 m/s.
+        np.testing.assert_allclose(truth["range_rate_mps"][row], rate, atol=0.05)
 
 
-def test_the_power_is_that_of_the_link_budget(alone: rt.Result) -> None:
-    budget, power = alone.link_budget, alone.truth["power_m2"]
-    assert budget is not None
-    assert power.sum("part").mean() == pytest.approx(budget.power, rel=0.2)
+def test_the_power_is_that_of_the_echoes_then(alone: rt.Result) -> None:
+    capture = rt.simulate(WALK, RADAR, duration_s=0.2, fidelity="analytic", snr_db=60)
+    for time_s, power in zip(alone.truth["time"].values, alone.truth["power_m2"], strict=True):
+        # Of both Tx, which are as near to the middle of the array, the first one is looked at.
+        echoes = capture.echoes(time_s - 0.5e-3, 1e-3)
+        own = echoes["amplitude"].sel(chirp=echoes["tx"] == 0)
+        expected = (np.abs(own) ** 2).mean(("chirp", "rx"))
+        # Over a millisecond the power of a limb changes by a thousandth.
+        np.testing.assert_allclose(power, expected, rtol=2e-3)
     assert alone.truth["visible"].all()
 
 

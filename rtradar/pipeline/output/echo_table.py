@@ -50,10 +50,13 @@ class Look(NamedTuple):
 
 
 class EchoTable:
-    """The echoes of one capture at the instants of its frames, which are asked for in order."""
+    """The echoes of one capture at the instants of its frames, which are asked for in order.
 
-    def __init__(self, capture: Capture) -> None:
-        self.capture, radar = capture, capture.radar
+    Unless ``middles`` are asked for, echoes are not looked at in the middle of a frame.
+    """
+
+    def __init__(self, capture: Capture, *, middles: bool = True) -> None:
+        self.capture, self._middles, radar = capture, middles, capture.radar
         self._cycles = radar.cycles_per_frame
         self._every = max(1, self._cycles // _INSTANTS)
         self._middle_tx = int(
@@ -117,7 +120,9 @@ class EchoTable:
         starts, found = self.capture.frame_starts, set[int]()
         most = _LOOKS_AHEAD + _INSTANTS
         for start in starts[np.searchsorted(starts, start_cycle) :].tolist():
-            found |= {self._middle(start), *self._instants(start).tolist()}
+            found.update(self._instants(start).tolist())
+            if self._middles:
+                found.add(self._middle(start))
             if len(found) >= most:
                 break
         return found
