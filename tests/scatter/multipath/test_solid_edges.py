@@ -91,7 +91,8 @@ def test_a_sphere_behind_a_board_returns_over_its_edge(
         sine, cosine = fresnel(number)
         knife = abs(0.5 + (1 + 1j) / 2 * (cosine - 1j * sine)) ** 2
         off_db = 20 * np.log10(ratio / knife)
-        assert abs(off_db) < (1 if offset_m > -0.06 else 3), offset_m
+        # Over the sweep of 0.5 GHz what the edge sends is damped by a few thousandths.
+        assert abs(off_db) < 0.1, offset_m
 
 
 def test_a_sheet_of_any_shape_lets_past_what_it_leaves_of_kirchhoffs_sum(tmp_path: Path) -> None:
