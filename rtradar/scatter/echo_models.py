@@ -104,10 +104,12 @@ def build_model(
 def _kind_for(fidelity: str, body: Body, model_options: Iterable[str]) -> Callable[..., EchoModel]:
     """Return what makes the model of that name for such a body; refuse options it does not have."""
     kind: Callable[..., EchoModel] = MODELS.find(fidelity)
-    if has_mesh(body):
-        from rtradar.scatter.models.mesh_optics import mesh_model
-
-        kind = mesh_model(fidelity)
+    if has_mesh(body) and not getattr(kind, "accepts_meshes", False):
+        raise InputError(
+            f"fidelity '{fidelity}' takes people of ellipsoids, not body = 'mesh': it needs "
+            "curvature in closed form; allowed for a mesh: "
+            f"{', '.join(models_that('accepts_meshes'))}"
+        )
     with MODELS.guarded(fidelity):
         known = [name for name in inspect.signature(kind).parameters if name not in _COMMON]
         for option in model_options:

@@ -23,12 +23,10 @@ from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.rigid.echoes import RigidEchoes
-from rtradar.scatter.rigid.legs import ObjectOccluders
-from rtradar.scatter.rigid.people import OccludingPeople
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 _INSTANTS = 8
 """Chirps of a capture at which the power of an object over a wall is looked at."""
@@ -186,8 +184,7 @@ def build_model_of_all(
         )
     past = None
     if scene.objects and model.variant is not None:
-        mi = use(select(variant))
-        past = ObjectOccluders(mi, RoomTracer(mi, scene), OccludingPeople(mi, body))
+        past = Occluders(use(select(variant)), scene, body)
     rigid = partial(RigidEchoes, radar, past=past, walls=scene.walls, spreading=spreading)
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     objects = [

@@ -52,16 +52,11 @@ def any_met(mi: Any, scene: Any, rays: NDArray[np.float32]) -> NDArray[np.bool_]
 
 
 def first_met(
-    mi: Any,
-    scene: Any,
-    starts: NDArray[np.float64],
-    directions: NDArray[np.float64],
-    instances: NDArray[np.int64] | None = None,
+    mi: Any, scene: Any, starts: NDArray[np.float64], directions: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return what rays (ray, 3) meet first, -1 for nothing, and how far it is, else infinite.
+    """Number of the triangle that rays (ray, 3) meet first, and how far it is.
 
-    What is met is the number of a triangle; or with ``instances``, by number in Mitsuba's registry,
-    that of the instance.
+    It is -1 and infinite where nothing is met.
     """
     count = _count(len(starts))
     if count == 0:
@@ -73,20 +68,34 @@ def first_met(
                 mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
             )
             if found.is_valid():
-                # Instances are named by their numbers, see `build_body_scene`.
-                own = found.prim_index if instances is None else found.instance.id()[4:]
-                number[ray], distance[ray] = int(own), found.t
+                number[ray], distance[ray] = int(found.prim_index), found.t
         return number, distance
     import drjit as dr
 
     grow_for(mi, count)
     rays = rays_of(mi, np.concatenate([starts.T, directions.T]))
     found = scene.ray_intersect_preliminary(rays, coherent=False)
-    met = dr.reinterpret_array(mi.UInt32, found.prim_index if instances is None else found.instance)
-    dr.eval(found.t, met)
+    dr.eval(found.t, found.prim_index)
     distance = found.t.numpy().astype(np.float64)
-    number = met.numpy().astype(np.int64) if instances is None else instances[met.numpy()]
+    number = found.prim_index.numpy().astype(np.int64)
     return np.where(np.isfinite(distance), number, -1), distance
+
+
+def triangle_scene(mi: Any, corners: NDArray[np.float64]) -> Any:
+    """Make a scene of Mitsuba of triangles (face, 3, 3), of which only the hits of rays are used.
+
+    They should lie near the origin, because they are rounded to float32.
+    """
+    mesh = mi.Mesh(
+        *("triangles", corners.size // 3, len(corners)),
+        has_vertex_normals=False,
+        has_vertex_texcoords=False,
+    )
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.ravel(corners).astype(np.float32)
+    parameters["faces"] = np.arange(corners.size // 3, dtype=np.uint32)
+    parameters.update()
+    return mi.load_dict({"type": "scene", "triangles": mesh})
 
 
 def ball_around(

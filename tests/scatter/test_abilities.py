@@ -8,23 +8,12 @@ import pytest
 
 from rtradar.cli import captures
 from rtradar.cli.values import OneLineParser
-from rtradar.errors import InputError
 from rtradar.scatter import MODELS, takes_backend
 from rtradar.scatter.echo_models import affordable_models, models_that
-from rtradar.scatter.models.mesh_optics import mesh_model
 
 
 def test_a_model_traces_if_it_takes_a_backend() -> None:
     assert models_that("traces") == [name for name in MODELS.built_in if takes_backend(name)]
-
-
-def test_models_that_take_meshes_take_people_who_are_meshes() -> None:
-    for name in MODELS.built_in:
-        if name in models_that("accepts_meshes"):
-            assert callable(mesh_model(name))
-        else:
-            with pytest.raises(InputError, match="takes people of ellipsoids"):
-                mesh_model(name)
 
 
 def test_models_are_listed_cheapest_first() -> None:

@@ -9,13 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.body import Ellipsoids
 from rtradar.trace.backends.backend import Backend, use
-from rtradar.trace.bounces import BodySurfaces
+from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
 CHEST = np.array([0.0, 0.0, 1.0])
-# The triangles' middles lie 0.03 % of the radius inside a sphere and their corners 0.07 % outside;
-# alike for each semi-axis.
-SAGITTA = 8e-4
+# Nearer to an outline than this fraction of the radius, float32 decides.
+EDGE = 1e-6
 
 
 class Hits(NamedTuple):
@@ -26,16 +25,16 @@ class Hits(NamedTuple):
 
 
 def first_hits(backend: Backend, body: Ellipsoids, origins: ArrayLike, targets: ArrayLike) -> Hits:
-    surfaces = BodySurfaces(use(backend), body.semi_axes)
-    surfaces.pose(body.centres, body.frames)
-    return through(surfaces, np.asarray(origins, float), np.asarray(targets, float))
+    tracer = BodyTracer(use(backend), body.semi_axes)
+    tracer.pose(body.centres, body.frames)
+    return through(tracer, np.asarray(origins, float), np.asarray(targets, float))
 
 
-def through(surfaces: BodySurfaces, origins: Array, targets: Array) -> Hits:
+def through(tracer: BodyTracer, origins: Array, targets: Array) -> Hits:
     """What rays from origins through targets meet."""
     directions = targets - origins
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    return Hits(*surfaces.first_parts(origins, directions))
+    return Hits(*tracer.meets(origins, directions, directions, np.full(len(origins), -1)))
 
 
 def clearances(body: Ellipsoids, origins: Array, targets: Array) -> tuple[Array, Array]:
@@ -68,12 +67,8 @@ def test_the_first_part_is_that_of_the_smooth_ellipsoids(
     hits = first_hits(backend, crowd, origins, targets)
     distance, clearance = clearances(crowd, origins, targets)
     expected = np.where(np.isfinite(distance.min(axis=1)), distance.argmin(axis=1), -1)
-    # Near an outline, or where two parts cross, triangles may answer otherwise than ellipsoids.
-    first, second = np.sort(np.minimum(distance, 1e3), axis=1)[:, :2].T
-    sure = (np.abs(clearance).min(axis=1) > 2 * SAGITTA) & (
-        (second - first > 2e-3) | (expected < 0)
-    )
-    assert sure.mean() > 0.9
+    sure = np.abs(clearance).min(axis=1) > EDGE
+    assert sure.mean() > 0.99
     np.testing.assert_array_equal(hits.part[sure], expected[sure])
     assert 0.2 < (expected >= 0).mean() < 0.9
 
@@ -85,10 +80,8 @@ def test_the_distance_is_that_to_the_ellipsoid(backend: Backend, crowd: Ellipsoi
     hits = first_hits(backend, crowd, origins, targets)
     assert (hits.part >= 0).all()
     distance, _ = clearances(crowd, origins, targets)
-    # Off the triangle onto the ellipsoid along its radius: a sagitta of the largest semi-axis,
-    # times a grazing slope.
     exact = distance[np.arange(500), hits.part]
-    np.testing.assert_allclose(hits.distance, exact, atol=20 * SAGITTA * 0.25)
+    np.testing.assert_allclose(hits.distance, exact, rtol=1e-13)
 
 
 def test_nothing_met_is_told(backend: Backend, crowd: Ellipsoids) -> None:
@@ -105,19 +98,17 @@ def test_the_ray_goes_through_its_target_and_beyond(backend: Backend) -> None:
     body = Ellipsoids([[0.0, 0, 0]], [np.eye(3)], [[0.1, 0.1, 0.1]])
     hits = first_hits(backend, body, [[-4.0, 0, 0]], [[-3.9, 0, 0]])
     assert hits.part[0] == 0
-    assert hits.distance[0] == pytest.approx(
-        3.9, abs=0.1 * SAGITTA
-    )  # head-on: a corner or a middle of a triangle
+    assert hits.distance[0] == pytest.approx(3.9, rel=1e-14)
 
 
 def test_posed_again_it_is_as_posed_first(backend: Backend, crowd: Ellipsoids) -> None:
     rng = np.random.default_rng(3)
     origins, targets = np.tile([-4.0, 1.0, 1.0], (200, 1)), rng.uniform(-1, 1, (200, 3)) + CHEST
-    surfaces = BodySurfaces(use(backend), crowd.semi_axes)
-    surfaces.pose(crowd.centres + np.array([3.0, 1.0, 0.5]), crowd.frames[::-1])
-    elsewhere = through(surfaces, origins, targets)
-    surfaces.pose(crowd.centres, crowd.frames)
-    again, fresh = through(surfaces, origins, targets), first_hits(backend, crowd, origins, targets)
+    tracer = BodyTracer(use(backend), crowd.semi_axes)
+    tracer.pose(crowd.centres + np.array([3.0, 1.0, 0.5]), crowd.frames[::-1])
+    elsewhere = through(tracer, origins, targets)
+    tracer.pose(crowd.centres, crowd.frames)
+    again, fresh = through(tracer, origins, targets), first_hits(backend, crowd, origins, targets)
     np.testing.assert_array_equal(again.part, fresh.part)
     np.testing.assert_array_equal(again.distance, fresh.distance)
     assert (elsewhere.part != fresh.part).any()
@@ -125,12 +116,12 @@ def test_posed_again_it_is_as_posed_first(backend: Backend, crowd: Ellipsoids) -
 
 @pytest.mark.parametrize("distance", [0.3, 50.0, 1000.0])
 def test_far_away_rays_lose_nothing(backend: Backend, distance: float) -> None:
-    # 0.01 mm beside what the outline of the triangles can be at most.
+    # 0.01 mm beside the outline.
     body = Ellipsoids([[distance + 0.1, 0, 0]], [np.eye(3)], [[0.1, 0.1, 0.1]])
     angle = np.linspace(0, 2 * np.pi, 100)[:-1]
     outline = np.arcsin(0.1 / (distance + 0.1))
     for sign, expected in ((-1, 0), (1, -1)):
-        spread = np.tan(outline) * (1 + sign * (SAGITTA + 1e-4))
+        spread = np.tan(outline) * (1 + sign * 1e-4)
         targets = np.column_stack([np.ones(99), spread * np.cos(angle), spread * np.sin(angle)])
         hits = first_hits(backend, body, np.zeros((99, 3)), targets)
         np.testing.assert_array_equal(hits.part, expected)
@@ -145,7 +136,7 @@ def test_thin_needles_are_met(backend: Backend) -> None:
 
 
 def test_many_parts_keep_their_numbers(backend: Backend) -> None:
-    # The parts are in a row: rays must meet what they aim at, however the scene orders its shapes.
+    # The parts are in a row: rays must meet what they aim at.
     n = 130
     centres = np.column_stack([np.zeros(n), np.arange(n) * 0.3, np.ones(n)])
     body = Ellipsoids(centres, np.tile(np.eye(3), (n, 1, 1)), np.full((n, 3), 0.1))

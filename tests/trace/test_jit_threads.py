@@ -76,12 +76,11 @@ def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
     program = f"""
 import numpy as np
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.bounces import BodySurfaces
+from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.trace.backends.jit_threads import MANY_RAYS
 mi = use(select("{backend.kind}"))
 import drjit as dr
-surfaces = BodySurfaces(mi, np.ones((1, 3)))
-surfaces.pose(np.zeros((1, 3)), np.eye(3)[None])
+surfaces = MeshTracer(mi, np.array([[[1.0, -9.0, -9.0], [1.0, 9.0, -9.0], [1.0, 0.0, 9.0]]]))
 for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS, 1"}):
     antennas, points = np.full((rays, 3), (3.0, 0.0, 0.0)), np.full((rays, 3), (1.0, 0.0, 0.0))
     assert surfaces.sees(antennas, points, np.zeros(rays, dtype=np.int64)).all()

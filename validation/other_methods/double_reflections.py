@@ -52,7 +52,6 @@ from rtradar.scatter.models.rays import Rays
 from rtradar.settings import RunSettings
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.bounces import BodySurfaces
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 
@@ -129,12 +128,12 @@ class WithoutCreases(Rays):
         self._surfaces = PartsApart(use(select("auto")), body.semi_axes)
 
 
-class PartsApart(BodySurfaces):
+class PartsApart(BodyTracer):
     """Posed ellipsoids, of which rays go only from one to another that does not touch it."""
 
     def pose(self, centres: Array, frames: Array) -> None:
         super().pose(centres, frames)
-        pairs = pairs_apart(centres, frames, self._axes)
+        pairs = pairs_apart(centres, frames, self._semi_axes)
         self._apart = np.zeros((len(centres), len(centres)), dtype=bool)
         self._apart[pairs[:, 0], pairs[:, 1]] = True
 

@@ -93,8 +93,9 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``frames (pose, part, 3, 3)``, and
     ``semi_axes (part, 3)``.
 
-    Returned are rays (7, ray) float32 and the index of their line (ray,): the start, at most two
-    radii before the point nearest to the centre of the unit sphere; the unit direction; the length.
+    Returned are rays (7, ray) float32, and of each its line and that part (2, ray): the start, at
+    most two radii before the point nearest to the centre of the unit sphere; the unit direction;
+    the length.
     """
     parts = len(semi_axes)
     longest = longest_axes(semi_axes)
@@ -110,7 +111,8 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     for line in range(len(group)):
         most += near_count[group[line]]
     maps = unit_sphere_maps(frames, semi_axes)
-    rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
+    rays, whose = np.empty((7, most), dtype=np.float32), np.empty((2, most), dtype=np.int64)
+    count = 0
     for line in range(len(group)):
         g = group[line]
         a, b, c = origins[line, 0], origins[line, 1], origins[line, 2]
@@ -139,6 +141,7 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
             rays[0, count], rays[1, count] = x + ahead * u, y + ahead * v
             rays[2, count], rays[3, count] = z + ahead * w, u * scale
             rays[4, count], rays[5, count] = v * scale, w * scale
-            rays[6, count], whose[count] = (1 - ahead) * span * scale, line
+            rays[6, count] = (1 - ahead) * span * scale
+            whose[0, count], whose[1, count] = line, part
             count += 1
-    return rays[:, :count].copy(), whose[:count].copy()
+    return rays[:, :count].copy(), whose[:, :count].copy()

@@ -32,7 +32,8 @@ from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
 from rtradar.scene import Furniture, Material, Scene, reflection
-from rtradar.trace.bounces import MeshSurfaces, Surfaces
+from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.surfaces import Surfaces
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -64,7 +65,7 @@ class _Piece:
 
     flat = True
 
-    def __init__(self, surfaces: MeshSurfaces, first: int, last: int) -> None:
+    def __init__(self, surfaces: MeshTracer, first: int, last: int) -> None:
         self._all, self._first, self._last = surfaces, first, last
         self.sees, self.distance, self.normal = surfaces.sees, surfaces.distance, surfaces.normal
 
@@ -87,7 +88,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     if not pieces:
         return
     corners = np.concatenate([triangles.corners for _, triangles in pieces])
-    surfaces = MeshSurfaces(mi, corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    surfaces = MeshTracer(mi, corners)
     first = 0
     # A tenth of a second a piece, so a hall of chairs takes minutes.
     bar = tqdm(pieces, desc="furniture", unit="piece", disable=None, leave=False, delay=_PATIENCE_S)

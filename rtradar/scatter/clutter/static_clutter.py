@@ -28,7 +28,7 @@ from rtradar.scatter.clutter.wall_returns import rough_returns, specular_returns
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import Backend, select, use
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 MOST_ORDER = 3
 KEPT_ROOMS = 2
@@ -84,11 +84,11 @@ class _Room:
 def _returns(room: _Room, order: int) -> tuple[tuple[ClutterItem, RoomEchoes], ...]:
     """Trace walls as mirrors, furniture, and the diffuse returns of rough walls."""
     radar, scene, mi = room.radar, room.scene, use(room.backend)
-    tracer = RoomTracer(mi, scene)
+    occluders = Occluders(mi, scene)
     found = (
-        *specular_returns(radar, scene, tracer, order),
+        *specular_returns(radar, scene, occluders, order),
         *furniture_returns(mi, radar, scene),
-        *rough_returns(radar, scene, tracer),
+        *rough_returns(radar, scene, occluders),
     )
     return tuple((_item(echoes, radar), echoes) for echoes in found)
 

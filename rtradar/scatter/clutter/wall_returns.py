@@ -52,7 +52,7 @@ from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse, reflect
 from rtradar.scene import Scene
 from rtradar.system.seeds import stream
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 
@@ -68,11 +68,11 @@ MOST_POINTS = 40_000
 
 
 def specular_returns(
-    radar: Radar, scene: Scene, tracer: RoomTracer, order: int
+    radar: Radar, scene: Scene, occluders: Occluders, order: int
 ) -> Iterator[RoomEchoes]:
     """Yield the specular reflections of up to ``order`` walls that some channel sees.
 
-    There is one object for each sequence of walls. Furniture, which the tracer knows, occludes
+    There is one object for each sequence of walls. Furniture, which `Occluders` know, occludes
     legs.
     """
     faces = [Face(wall, back) for wall in scene.walls for back in (False, True)]
@@ -86,12 +86,12 @@ def specular_returns(
             choices = [[face for face in lit if face in received]]
         for leg in product(*choices):
             if all(first.wall is not second.wall for first, second in pairwise(leg)):
-                returns = _follow(radar, scene, tracer, leg)
+                returns = _follow(radar, scene, occluders, leg)
                 if returns is not None:
                     yield returns
 
 
-def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEchoes | None:
+def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomEchoes | None:
     """Echoes over these faces, in as few terms as polynomials over the sweep follow."""
     tx, rx = radar.tx[:, None], radar.rx[radar.rx_of_tx]
     # By the edge of a right-angled corner the path goes over both walls in either order, each of
@@ -105,7 +105,7 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
     ends = [stop.reshape(-1, 3)[which] for stop in stops]
     free = np.ones(len(which), dtype=bool)
     for start, end in pairwise(ends):
-        free &= ~tracer.blocked(start, end)
+        free &= occluders.clear(start, end)
     which, ends = which[free], [end[free] for end in ends]
     if not len(which):
         return None
@@ -159,17 +159,17 @@ def _image(leg: Leg) -> tuple[Array, Array]:
 # -- rough walls -----------------------------------------------------------------------------------
 
 
-def rough_returns(radar: Radar, scene: Scene, tracer: RoomTracer) -> Iterator[RoomEchoes]:
+def rough_returns(radar: Radar, scene: Scene, occluders: Occluders) -> Iterator[RoomEchoes]:
     """Yield the diffuse returns of every face of a rough wall that has antennas before it.
 
-    Furniture, which the tracer knows, occludes points. Positions and phases belong to the wall's
+    Furniture, which `Occluders` know, occludes points. Positions and phases belong to the wall's
     number and face, whatever the seed of a run: a room is the same for all who walk in it.
     """
     for (number, wall), back in product(enumerate(scene.walls), (False, True)):
         before = [(height(wall, places, back=back) > 0).any() for places in (radar.tx, radar.rx)]
         if wall.roughness_m > 0 and all(before):
             rng = np.random.default_rng(stream(0, number, int(back)))
-            echoes = _rough_face(Face(wall, back), rng, radar, scene, tracer)
+            echoes = _rough_face(Face(wall, back), rng, radar, scene, occluders)
             if echoes.n_echoes:
                 yield echoes
 
@@ -189,7 +189,7 @@ def _points(face: Face, cell_m: float, rng: np.random.Generator) -> tuple[Array,
 
 
 def _rough_face(
-    face: Face, rng: np.random.Generator, radar: Radar, scene: Scene, tracer: RoomTracer
+    face: Face, rng: np.random.Generator, radar: Radar, scene: Scene, occluders: Occluders
 ) -> RoomEchoes:
     wall, cell_m = face.wall, min(CELL_BINS * radar.range_bin_m, CELL_M)
     points, area, phase = _points(face, cell_m, rng)
@@ -205,7 +205,7 @@ def _rough_face(
         ways /= distance[..., None]
         sent = sent_field(element, ways, polarization, x_for_steep=True)
         field = reflect(smooth, sent.astype(np.complex128), ways, frequency)[0]
-        clear = ~tracer.blocked(antennas[:, None], points)
+        clear = occluders.clear(antennas[:, None], points)
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear
         return distance, np.maximum(-(ways @ normal), 0.0), strength
 

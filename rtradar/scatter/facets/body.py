@@ -128,7 +128,7 @@ class FacetBody:
         facets: int | None,
         nodes: int,
     ) -> None:
-        self._radar, self._spreading = radar, spreading
+        self._radar, self._body, self._spreading = radar, body, spreading
         count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
         self._facets = ellipsoid_facets(body.semi_axes, subdivisions_for(count))
         self.frequency = sweep_nodes(radar, nodes)
@@ -154,6 +154,38 @@ class FacetBody:
         return self._shadows.seen(
             centres, frames, antennas, parts, apart=apart if apart > NEAR else 0.0
         )
+
+    def at_chirps(
+        self, chirps: NDArray[np.int64], at: ChirpPoses, length: Array
+    ) -> NDArray[np.complex128]:
+        """Amplitude (node, chirp, rx, part) at every chirp, for paths (chirp, rx, part) [m].
+
+        What is seen is asked in the middle of each TDM cycle.
+        """
+        radar, parts = self._radar, np.arange(length.shape[2])
+        amplitude = np.empty((len(self.frequency), *length.shape), dtype=np.complex128)
+        pairs = np.stack([np.zeros(radar.n_rx, dtype=np.int64), 1 + np.arange(radar.n_rx)], axis=1)
+        cycles = chirps // radar.n_tx
+        for cycle in np.unique(cycles):
+            inside = np.flatnonzero(cycles == cycle)
+            # Tx and Rx of these chirps, each once.
+            rx_index = radar.rx_of_tx[at.tx_index[inside]] + radar.n_tx
+            named = np.concatenate([at.tx_index[inside, None], rx_index], axis=1)
+            views, index = np.unique(named, return_inverse=True)
+            time = min(float(radar.cycle_times(cycle + 0.5)), self._body.duration_s)
+            middle, there = self._body.at([time]), radar.at(time)
+            antennas = np.concatenate([there.tx, there.rx])[views]
+            amplitude[:, inside] = self.amplitude(
+                (at.centres[inside], at.frames[inside]),
+                np.concatenate([at.tx[inside, None], at.rx[inside]], axis=1),
+                pairs,
+                length[inside],
+                self.seen(middle.centres[0], middle.frames[0], antennas, parts),
+                index.reshape(named.shape),
+                parts,
+                at.axes[inside],
+            )
+        return amplitude
 
     def field(
         self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: NDArray[np.int64]

@@ -30,7 +30,7 @@ from rtradar.scatter.facets.surfaces import (
 from rtradar.scatter.ray_tubes.tubes import in_four
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.bounces import MeshSurfaces
+from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -64,8 +64,7 @@ def mesh_scattering(
     """
     _refuse_coarse(mesh, float(wavenumber.max()))
     corners = np.ascontiguousarray(mesh.corners)
-    triangles = corners.reshape(-1, 3), _own_faces(len(corners))
-    tracer = MeshSurfaces(use(select(variant)), *triangles, same=_SAME)
+    tracer = MeshTracer(use(select(variant)), corners, same=_SAME)
     solid = _Solid(tracer, smooth_bend(mesh.vertices, mesh.faces), mesh.closed)
     middle, one_pair = corners.mean(axis=(0, 1)), np.array([[0, 1]])
     field = np.empty(len(tx), dtype=np.complex128)
@@ -212,7 +211,7 @@ class _Some(NamedTuple):
 class _Solid(NamedTuple):
     """A mesh: its tracer, the ``bend (face,)`` of its triangles, and whether it is ``closed``."""
 
-    tracer: MeshSurfaces
+    tracer: MeshTracer
     bend: Array
     closed: bool
 

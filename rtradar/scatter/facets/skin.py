@@ -20,6 +20,7 @@ from rtradar.body import Body, unit_sphere
 from rtradar.body.body import Poses
 from rtradar.body.human.mesh import MOST_DIVISIONS, loop_subdivision
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
@@ -37,7 +38,7 @@ from rtradar.scatter.facets.surfaces import (
 from rtradar.scatter.ray_tubes.tubes import in_four
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.bounces import MeshSurfaces
+from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -68,6 +69,15 @@ class _Piece(NamedTuple):
     facets: slice
     vertices: Indices
     faces: NDArray[np.int32]
+
+
+def refuse_facets(level: str, facets: int | None) -> None:
+    """Raise an `InputError` if a number of facets is given for people with a mesh."""
+    if facets is not None:
+        raise InputError(
+            f"{level}: facets = {facets}; a mesh is divided by the wavelength: leave facets out, "
+            "or take body = 'ellipsoids'"
+        )
 
 
 def skin_of(person: Body, frequency_hz: float) -> Skin:
@@ -166,6 +176,18 @@ class SkinFacets:
         )
         return length, 1 / (to_tx * to_rx)
 
+    def at_chirps(self, chirps: Indices, at: ChirpPoses, length: Array) -> NDArray[np.complex128]:
+        """Amplitude (node, chirp, rx, part) at every chirp, for paths (chirp, rx, part) [m]."""
+        receivers, parts = np.arange(1, 1 + at.rx.shape[1]), np.arange(length.shape[2])
+        pairs = np.stack([np.zeros_like(receivers), receivers], axis=1)
+        antennas = np.concatenate([at.tx[:, None], at.rx], axis=1)
+        given = zip(self._radar.centres_of(chirps), at.centres, antennas, length, strict=True)
+        found = [
+            self.amplitude(float(time), centres, own, pairs, lengths, parts)
+            for time, centres, own, lengths in given
+        ]
+        return np.stack(found, axis=1)
+
     def field(
         self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
     ) -> NDArray[np.complex128]:
@@ -236,7 +258,7 @@ class SkinFacets:
         eyes = shadow_nodes(self._radar.at(time))[0]
         # Each in a scene about its own middle: float32 rounds alike whoever else is there.
         scenes = [
-            MeshSurfaces(self._mi, vertices, skin.coarse, same=_SAME)
+            MeshTracer(self._mi, vertices[skin.coarse], same=_SAME)
             for skin, vertices in zip(self._skins, posed, strict=True)
         ]
         ways = eyes[:, None] - np.array([vertices.mean(axis=0) for vertices in posed])
@@ -263,7 +285,7 @@ class SkinFacets:
 
 
 def _clear(
-    eye: Array, points: Array, whose: Indices, own: MeshSurfaces, scenes: Sequence[MeshSurfaces]
+    eye: Array, points: Array, whose: Indices, own: MeshTracer, scenes: Sequence[MeshTracer]
 ) -> NDArray[np.bool_]:
     """Whether nothing hides points (n, 3), on the faces (n,) of their own mesh, from the eye."""
     clear, start = np.ones(len(points), dtype=bool), np.broadcast_to(eye, points.shape)

@@ -22,7 +22,7 @@ from rtradar.scatter.double_reflections import (
 )
 from rtradar.scatter.facets.array_envelope import ArrayEnvelope
 from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.skin import SkinFacets
+from rtradar.scatter.facets.skin import SkinFacets, refuse_facets
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -133,14 +133,10 @@ class PhysicalOptics(TwoBounceModel):
         self._surface: FacetBody | SkinFacets
         if not has_mesh(body):
             self._surface = FacetBody(radar, body, facets=facets, **common)
-        elif facets is None:
+        else:
+            refuse_facets("physical-optics", facets)
             # An edge that crosses a limb fades over half an interval, not a whole one.
             self._surface = SkinFacets(radar, body, look_s=anchor_s / 2, **common)
-        else:
-            raise InputError(
-                f"physical-optics: facets = {facets}; a mesh is divided by the wavelength: leave "
-                "facets out, or take body = 'ellipsoids'"
-            )
         self.variant: str | None = self._surface.variant
         if bounces == 2:
             if has_mesh(body):

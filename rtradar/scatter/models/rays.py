@@ -1,10 +1,11 @@
-"""The echo model `rays`: shooting and bouncing rays by Mitsuba, on a moving body."""
+"""The echo model `rays`: shooting and bouncing rays by Mitsuba, on moving people."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +20,29 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, keyframe_time, owners_of
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, has_mesh, keyframe_time
+from rtradar.scatter.facets.skin import Skin, skin_of
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, PosedGrid
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.bounces import BodySurfaces
+from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.surfaces import Surfaces
 
-ANCHOR_S = 10e-3
+ANCHOR_S, _OF_MESHES_S = 10e-3, 5e-3
+"""Time between keyframes [s], and for people with a mesh, of which several places of one part send:
+10 ms would leave an error of -14 dB there (``validation/other_methods/human_mesh.py``)."""
+
+_SAME = 1e-5
+"""Fraction of the people's extent: what is met nearer to a face than that is the face."""
+
 _KEPT_SHOTS = 1024
 """Shots remembered: a second of 12 Tx and 10 ms; one with 13 nodes, 8 Rx, 42 echoes has 70 kB."""
 BOUNCES_OF_BODY = 1
-_NODES_PER_HZ = (1e-9, 2.5e-9)
+_NODES_PER_HZ = (1e-9, 3e-9)
 """Frequency nodes beyond three: for paths over one part, and for several bounces in one echo."""
 
 Array = NDArray[np.float64]
@@ -45,10 +55,10 @@ class Rays(BuiltInModel):
 
     Occlusion: at every bounce. Each ray is asked which part it meets, every 10 ms.
 
-    The path over the specular point of each part is exact at every chirp. Rays are shot at
-    keyframes, and the amplitude on that path, which varies slowly, is interpolated by cubics over
-    four of them. For several bounces the mean path is interpolated, too. Rays meet the triangle
-    meshes of the ellipsoids, from which this level scatters.
+    The path over the specular point of each part is exact at every chirp; for a mesh it is that of
+    its ellipsoids. Rays are shot at keyframes, and the amplitude on that path, which varies slowly,
+    is interpolated by cubics over four of them. For several bounces the mean path is interpolated,
+    too.
 
     Parameters
     ----------
@@ -58,8 +68,9 @@ class Rays(BuiltInModel):
         Largest number of reflections on the way, 1 to 10. Two bounces on a body of ellipsoids go
         partly over the creases where two of them touch, which no real body has, and add 0.9 dB to
         the power of a walker: one is the default.
-    anchor_s : float
-        Time between keyframes [s], below 1; 0 shoots at every chirp.
+    anchor_s : float, optional
+        Time between keyframes [s], below 1; 0 shoots at every chirp; None: 10 ms, and 5 ms where
+        somebody has a mesh.
 
     Raises
     ------
@@ -80,18 +91,21 @@ class Rays(BuiltInModel):
         spreading: bool = True,
         rays_per_wavelength: float = RAYS_PER_WAVELENGTH,
         bounces: int = BOUNCES_OF_BODY,
-        anchor_s: float = ANCHOR_S,
+        anchor_s: float | None = None,
     ) -> None:
         check_options(rays_per_wavelength, bounces)
+        if anchor_s is None:
+            anchor_s = _OF_MESHES_S if has_mesh(body) else ANCHOR_S
         if not 0 <= anchor_s < 1:
             raise InputError(f"rays: anchor_s = {anchor_s}; allowed are 0 (every chirp) to 1 s")
         self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces
+        self._stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
-        self._grid = EllipsoidGrid.cover(body.semi_axes, radar.wavelength_m / rays_per_wavelength)
-        backend = select(variant)
+        backend, edge = select(variant), radar.wavelength_m / rays_per_wavelength
         self.variant: str | None = backend.kind
-        self._surfaces = BodySurfaces(use(backend), body.semi_axes, owners_of(body))
-        self._posed: tuple[int, PosedGrid] | None = None
+        kind = _Skins if has_mesh(body) else _Ellipsoids
+        self._target = kind(use(backend), radar, body, edge)
+        self._posed: tuple[int, _Posed] | None = None
         self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -124,40 +138,38 @@ class Rays(BuiltInModel):
 
     def _shoot(self, chirp: int, tx: int) -> _Shot:
         time_s = keyframe_time(self._radar, self._body, chirp)
-        radar, axes = self._radar.at(time_s), self._body.semi_axes
+        radar, (centres, frames, axes) = self._radar.at(time_s), self._body.at([time_s])
         if self._posed is None or self._posed[0] != chirp:
-            (centres,), (frames,), _ = self._body.at([time_s])
-            self._posed = chirp, PosedGrid(self._grid, centres, frames, axes)
-            self._surfaces.pose(centres, frames)
+            self._posed = chirp, self._target.at(time_s)
+        surfaces, grid, part = self._posed[1]
         sent = Polarization(radar.polarization, radar.axes)
-        grid, stop_hz = self._posed[1], radar.start_frequency_hz + radar.bandwidth_hz
         shooter = Shooter(
-            surfaces=self._surfaces,
+            surfaces=surfaces,
             grid=grid,
             bounces=self._bounces,
-            wavenumber=2 * np.pi * stop_hz / SPEED_OF_LIGHT_MPS,
+            wavenumber=2 * np.pi * self._stop_hz / SPEED_OF_LIGHT_MPS,
             polarization=sent,
             spreading=self._spreading,
         )
         place, rx = radar.tx[tx], radar.rx[radar.rx_of_tx[tx]]
-        specular = solve_specular_points(
-            Geometry(place[None], rx[None], grid.centres[None], grid.frames[None], axes)
-        )[0][0]
+        antennas = place[None], rx[None]
+        specular = solve_specular_points(Geometry(*antennas, centres, frames, axes))[0][0]
         frequency = self._nodes(self._bounces > 1)
         lengths, amplitudes = [], []
         for order, footprints in enumerate(shooter.shoot(place)):
-            mean = footprints.mean_paths(footprints.surface, rx, specular) if order else specular
-            lengths.append(mean)
+            free = exits(surfaces, footprints, rx)
+            own = replace(footprints, surface=part[footprints.surface])
+            lengths.append(own.mean_paths(own.surface, rx, specular) if order else specular)
             nodes = self._nodes(order > 0)
             sums = radiate(
-                footprints,
-                exits(self._surfaces, footprints, rx),
+                own,
+                free,
                 rx,
                 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS,
                 lengths[-1],
                 polarization=sent,
                 spreading=self._spreading,
-                tapered=order > 0,
+                tapered=order > 0 and not surfaces.flat,
             )
             amplitudes.append(
                 sums
@@ -170,6 +182,52 @@ class Rays(BuiltInModel):
         """Frequencies (node,) at the zeros of a Chebyshev polynomial over the sweep [Hz]."""
         per_hz = _NODES_PER_HZ[several_bounces]
         return sweep_nodes(self._radar, 3 + min(17, math.ceil(per_hz * self._radar.bandwidth_hz)))
+
+
+class _Posed(NamedTuple):
+    """What rays meet at one time, where they are aimed, and the ``part (surface,)`` of surfaces."""
+
+    surfaces: Surfaces
+    grid: Grid
+    part: NDArray[np.int64]
+
+
+class _Ellipsoids:
+    """People of ellipsoids, with facets whose edges are ``edge`` long [m]."""
+
+    def __init__(self, mi: Any, _radar: Radar, body: Body, edge: float) -> None:
+        self._body, self._tracer = body, BodyTracer(mi, body.semi_axes)
+        self._grid = EllipsoidGrid.cover(body.semi_axes, edge)
+
+    def at(self, time_s: float) -> _Posed:
+        (centres,), (frames,), axes = self._body.at([time_s])
+        self._tracer.pose(centres, frames)
+        grid = PosedGrid(self._grid, centres, frames, axes)
+        return _Posed(self._tracer, grid, np.arange(len(axes)))
+
+
+class _Skins:
+    """People of whom some have a mesh: their skins, cut into facets as those of `_Ellipsoids`.
+
+    Of a skin the flat triangles scatter that `physical-optics` sums, however they are cut.
+    """
+
+    def __init__(self, mi: Any, radar: Radar, body: Body, edge: float) -> None:
+        self._mi, stop_hz = mi, radar.start_frequency_hz + radar.bandwidth_hz
+        self._skins: list[Skin] = [skin_of(person, stop_hz) for person in body.people]
+        counts = np.cumsum([0, *(len(person.semi_axes) for person in body.people)])
+        parts = zip(self._skins, counts[:-1], strict=True)
+        self._part = np.concatenate([np.repeat(own.part, 4) + first for own, first in parts])
+        # As at the start, so that each facet keeps its place in the material.
+        self._divisions = MeshGrid.divisions(self._corners(0.0), edge)
+
+    def at(self, time_s: float) -> _Posed:
+        corners = self._corners(time_s)
+        tracer = MeshTracer(self._mi, corners, same=_SAME)
+        return _Posed(tracer, MeshGrid.cut(corners, self._divisions), self._part)
+
+    def _corners(self, time_s: float) -> Array:
+        return np.concatenate([skin.posed(time_s)[1][skin.fine] for skin in self._skins])
 
 
 class _Shot(NamedTuple):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, has_mesh, one_echo_a_part
 from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.skin import SkinFacets, refuse_facets
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
@@ -30,7 +33,7 @@ class Reference(BuiltInModel):
     ----------
     facets : int, optional
         Least number per part, 20 to 1 310 720; None: by the wavelength, 5120 at 12 GHz and 20 480
-        at 77 GHz for a grown person.
+        at 77 GHz for a grown person. A mesh is always divided by the wavelength.
     """
 
     accepts_meshes = True
@@ -47,9 +50,13 @@ class Reference(BuiltInModel):
         facets: int | None = None,
     ) -> None:
         self._radar, self._body = radar, body
-        self._surface = FacetBody(
-            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=NODES
-        )
+        common: dict[str, Any] = {"variant": variant, "spreading": spreading, "nodes": NODES}
+        self._surface: FacetBody | SkinFacets
+        if not has_mesh(body):
+            self._surface = FacetBody(radar, body, facets=facets, **common)
+        else:
+            refuse_facets("reference", facets)
+            self._surface = SkinFacets(radar, body, look_s=radar.cycle_duration_s, **common)
         self.variant: str | None = self._surface.variant
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -57,31 +64,5 @@ class Reference(BuiltInModel):
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
         length, _, _ = solve_specular_points(at)
-        nodes, parts = len(self._surface.frequency), np.arange(length.shape[2])
-        amplitude = np.empty((nodes, *length.shape), dtype=np.complex128)
-        cycles = chirps // self._radar.n_tx
-        pairs = np.stack(
-            [np.zeros(self._radar.n_rx, dtype=np.int64), 1 + np.arange(self._radar.n_rx)], axis=1
-        )
-        for cycle in np.unique(cycles):
-            inside = np.flatnonzero(cycles == cycle)
-            # Tx and Rx of these chirps, each once.
-            rx_index = self._radar.rx_of_tx[at.tx_index[inside]] + self._radar.n_tx
-            named = np.concatenate([at.tx_index[inside, None], rx_index], axis=1)
-            views, index = np.unique(named, return_inverse=True)
-            middle_s = float(self._radar.cycle_times(cycle + 0.5))
-            time = min(middle_s, self._body.duration_s)
-            middle, radar = self._body.at([time]), self._radar.at(time)
-            antennas = np.concatenate([radar.tx, radar.rx])[views]
-            seen = self._surface.seen(middle.centres[0], middle.frames[0], antennas, parts)
-            amplitude[:, inside] = self._surface.amplitude(
-                (at.centres[inside], at.frames[inside]),
-                np.concatenate([at.tx[inside, None], at.rx[inside]], axis=1),
-                pairs,
-                length[inside],
-                seen,
-                index.reshape(named.shape),
-                parts,
-                at.axes[inside],
-            )
+        amplitude = self._surface.at_chirps(chirps, at, length)
         return one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)

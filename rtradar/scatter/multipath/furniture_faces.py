@@ -25,7 +25,7 @@ from rtradar.scatter.multipath.image_paths import Face, corners, height, inside
 from rtradar.scatter.multipath.slab_series import POLARIZATIONS
 from rtradar.scene import Furniture, Scene, Wall, reflection
 from rtradar.scene.objects import Opening
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class FaceSummary(NamedTuple):
 
 
 def reflecting_faces(
-    scene: Scene, radar: Radar, place: Array, body: Body, room: RoomTracer | None
+    scene: Scene, radar: Radar, place: Array, body: Body, room: Occluders | None
 ) -> tuple[tuple[Face, ...], tuple[FaceSummary, ...]]:
     """Find the faces of furniture over which the radar may see parts of a body at some time.
 
@@ -104,7 +104,7 @@ def reflecting_faces(
 
 
 def _expected(
-    face: Face, filled: float, place: Array, points: Array, radar: Radar, room: RoomTracer | None
+    face: Face, filled: float, place: Array, points: Array, radar: Radar, room: Occluders | None
 ) -> Array:
     """Power of a ghost at points that are seen over a face, over that of the direct echo there."""
     wall = face.wall
@@ -116,7 +116,7 @@ def _expected(
     zone = np.sqrt(radar.wavelength_m * first * last / (first + last))
     near = (zone <= narrow) & inside(wall, met, zone / cosine)
     if room is not None:
-        near[near] = ~(room.blocked(place, met[near]) | room.blocked(met[near], points[near]))
+        near[near] = room.clear(place, met[near]) & room.clear(met[near], points[near])
     eta = wall.material.eta(radar.centre_frequency_hz)
     reflected = [np.abs(reflection(eta, cosine, kind)) ** 2 for kind in POLARIZATIONS]
     lost = np.linalg.norm(points - place, axis=1) / (first + last) * near

@@ -47,7 +47,7 @@ from rtradar.system.checks import check_order
 from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ class RoomModel:
         if variant is not None:
             backend = select(variant)
             self.variant, mi = backend.kind, use(backend)
-            room = RoomTracer(mi, scene)
+            room = Occluders(mi, scene)
             occluders = BodyTracer(mi, body.semi_axes), SolidEdges(room, scene, radar)
         faces: tuple[Face, ...] = ()
         self.faces: tuple[FaceSummary, ...] = ()

@@ -24,8 +24,8 @@ from rtradar.kernels.scatter.rooms import EdgeBalls, outline_near
 from rtradar.radar import Radar
 from rtradar.scatter.multipath.wall_edges import half_plane, touches
 from rtradar.scene import Scene, Triangles, Wall
+from rtradar.trace.occluders import Occluders
 from rtradar.trace.rays import ball_around
-from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -117,7 +117,7 @@ class SolidEdges:
     ``room`` tells what is in the way. Edges count at the middle of the sweep, as those of walls do.
     """
 
-    def __init__(self, room: RoomTracer, scene: Scene, radar: Radar) -> None:
+    def __init__(self, room: Occluders, scene: Scene, radar: Radar) -> None:
         self._room = room
         self._number = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
         self._resolution_m = SPEED_OF_LIGHT_MPS / radar.bandwidth_hz
@@ -134,7 +134,7 @@ class SolidEdges:
         """
         if len(origins) == 0:
             return np.zeros(0, dtype=np.complex128)
-        lit = ~self._room.blocked(origins, targets, times)
+        lit = self._room.clear(origins, targets, times)
         field = lit.astype(np.complex128)
         if not bent:
             return field
@@ -173,7 +173,7 @@ class SolidEdges:
             if pose is not None:
                 beside = np.einsum("rij,rj->ri", pose[0][leg], beside)
             moments = None if times is None else times[leg]
-            free = ~self._room.blocked(origins[leg] + beside, targets[leg] + beside, moments)
+            free = self._room.clear(origins[leg] + beside, targets[leg] + beside, moments)
             leg = leg[free]
             np.add.at(field, leg, self._sent(found.take(free), lit[leg]))
 

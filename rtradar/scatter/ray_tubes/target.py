@@ -17,7 +17,9 @@ from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, Posed
 from rtradar.scatter.target import target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.bounces import BodySurfaces, MeshSurfaces, Surfaces
+from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.surfaces import Surfaces
 
 if TYPE_CHECKING:
     import trimesh
@@ -79,12 +81,12 @@ def rays_scattering(
 def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surfaces, Grid]:
     """What rays meet, and facets with edges of this length [m] at which they are aimed."""
     if isinstance(solid, Ellipsoids):
-        surfaces = BodySurfaces(mi, solid.semi_axes)
+        surfaces = BodyTracer(mi, solid.semi_axes)
         surfaces.pose(solid.centres, solid.frames)
         facets = EllipsoidGrid.cover(solid.semi_axes, edge)
         return surfaces, PosedGrid(facets, solid.centres, solid.frames, solid.semi_axes)
-    grid = MeshGrid.cover(solid.vertices, solid.faces, edge)
-    return MeshSurfaces(mi, solid.vertices, solid.faces), grid
+    grid = MeshGrid.cut(solid.corners, MeshGrid.divisions(solid.corners, edge))
+    return MeshTracer(mi, solid.corners), grid
 
 
 def check_options(rays_per_wavelength: float, bounces: int) -> None:

@@ -109,19 +109,22 @@ class MeshGrid:
     corners: Array
     face: NDArray[np.int64]
 
-    @classmethod
-    def cover(cls, vertices: Array, faces: NDArray[np.integer], edge: float) -> MeshGrid:
-        """Cut every face evenly until no facet has a side longer than ``edge`` [m].
+    @staticmethod
+    def divisions(triangles: Array, edge: float) -> NDArray[np.int64]:
+        """How often to cut triangles (face, 3, 3) until no side is longer than ``edge`` [m].
 
-        An `InputError` is raised if they would be more than `MOST_TUBES`.
+        An `InputError` is raised if the facets would be more than `MOST_TUBES`.
         """
-        triangles = np.asarray(vertices, dtype=np.float64)[faces]
-        longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
-        divisions = np.maximum(1, np.ceil(longest / edge * (1 - 1e-12)))
+        divisions = np.maximum(1, np.ceil(_longest(triangles) / edge * (1 - 1e-12)))
         _refuse_many(divisions**2)
-        flat = np.linalg.norm(_across(triangles), axis=1) <= 1e-12 * longest**2
+        return divisions.astype(np.int64)
+
+    @classmethod
+    def cut(cls, triangles: Array, divisions: NDArray[np.int64]) -> MeshGrid:
+        """Cut triangles (face, 3, 3) evenly, each so often; those without area are left out."""
+        flat = np.linalg.norm(_across(triangles), axis=1) <= 1e-12 * _longest(triangles) ** 2
         corners, face = [np.empty((0, 3, 3))], [np.empty(0, dtype=np.int64)]
-        for n in np.unique(divisions[~flat]).astype(int):
+        for n in np.unique(divisions[~flat]).tolist():
             own = np.flatnonzero((divisions == n) & ~flat)
             corners.append(np.einsum("fkc,tci->tfki", _cut(n), triangles[own]).reshape(-1, 3, 3))
             face.append(np.repeat(own, n * n))
@@ -146,6 +149,12 @@ Grid = PosedGrid | MeshGrid
 
 def _with_middle(corners: Array) -> Array:
     return np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+
+
+def _longest(triangles: Array) -> Array:
+    """Longest side of each triangle (face,) [m]."""
+    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1)
+    return np.asarray(sides.max(axis=1))
 
 
 def _across(triangles: Array) -> Array:

@@ -26,7 +26,7 @@ from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
 from rtradar.scatter.rigid.polynomials import PolynomialsInTime
-from rtradar.trace.bounces import MeshSurfaces
+from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -92,8 +92,7 @@ class SheetBounces:
         time_s = number * self._knot_s
         radar, ((rotation,), (at,)) = self._radar.at(time_s), self._pose(np.array([time_s]))
         polarization = Polarization(radar.polarization, radar.axes)
-        corners = (self._triangles @ rotation.T + at).reshape(-1, 3)
-        surfaces = MeshSurfaces(self._mi, corners, np.arange(len(corners)).reshape(-1, 3))
+        surfaces = MeshTracer(self._mi, self._triangles @ rotation.T + at)
         shooter = Shooter(
             surfaces=surfaces,
             grid=MeshGrid(self._grid.corners @ rotation.T + at, self._grid.face),

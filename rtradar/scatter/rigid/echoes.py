@@ -42,11 +42,12 @@ from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scatter.rigid.bounces import SheetBounces
-from rtradar.scatter.rigid.legs import ObjectOccluders, RigidLegs
+from rtradar.scatter.rigid.legs import RigidLegs
 from rtradar.scatter.rigid.polynomials import PolynomialsInTime
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -100,7 +101,7 @@ class RigidEchoes:
         radar: Radar,
         moving: Object,
         duration_s: float,
-        past: ObjectOccluders | None,
+        past: Occluders | None,
         *,
         walls: Sequence[Wall] = (),
         path: WallPath = DIRECT,

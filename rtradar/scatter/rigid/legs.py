@@ -9,7 +9,6 @@ receiver receives what it would send.
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +26,8 @@ from rtradar.scatter.common.polarization import (
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.rigid.people import OccludingPeople
 from rtradar.scene import Material, Object, reflection
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -40,14 +38,6 @@ _TOGETHER = 1.0
 at half of it polynomials through three nodes err by 16 % of the wave that comes later."""
 
 
-class ObjectOccluders(NamedTuple):
-    """What may hide an object: Mitsuba, furniture and all objects, and people."""
-
-    mi: Any
-    room: RoomTracer
-    people: OccludingPeople
-
-
 class RigidLegs:
     """The legs of one path of a radar at rest, with the walls as they answer at given frequencies.
 
@@ -56,7 +46,7 @@ class RigidLegs:
     """
 
     def __init__(
-        self, radar: Radar, path: WallPath, walls: WallResponse, past: ObjectOccluders | None
+        self, radar: Radar, path: WallPath, walls: WallResponse, past: Occluders | None
     ) -> None:
         self.path, self._radar, self._walls, self._past = path, radar, walls, past
         self._sides: tuple[tuple[Leg, Antenna | None], ...] = (
@@ -90,16 +80,11 @@ class RigidLegs:
             open_ = free[places] & (extent != 0)
             for origins, targets in pairwise(along):
                 start, end, _ = np.broadcast_arrays(origins, targets, open_[..., None])
-                open_[open_] = self._clear(time_s, start[open_], end[open_], but)
+                if self._past is not None:
+                    some = start[open_], end[open_]
+                    open_[open_] = self._past.clear(*some, time_s, but=but)
             free[places] = open_
         return free
-
-    def _clear(self, time_s: float, origins: Array, targets: Array, but: Object | None) -> Bools:
-        if self._past is None or len(origins) == 0:
-            return np.ones(len(origins), dtype=bool)
-        clear = ~self._past.room.blocked(origins, targets, time_s, but=but)
-        clear[clear] = self._past.people.clear(time_s, origins[clear], targets[clear])
-        return clear
 
     def longer_m(self, point: Array) -> float:
         """Length that slabs add to the strongest wave over both legs to a point (3,) [m].

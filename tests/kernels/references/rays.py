@@ -43,7 +43,7 @@ def _near_rays(poses: int, seed: int) -> Pair:
         posed = centres[number], frames[number], axes
         near = near_lines_reference(origins[ours], targets[ours], own[group[ours]], *posed)
         expected[ours] = near.sum(axis=1)
-    found = np.bincount(near_rays(*lines, centres, frames, axes)[1], minlength=len(origins))
+    found = np.bincount(near_rays(*lines, centres, frames, axes)[1][0], minlength=len(origins))
     return found, expected
 
 

@@ -12,7 +12,7 @@ from rtradar.scatter.clutter.wall_returns import rough_returns
 from rtradar.scatter.multipath.wall_interaction import reflect
 from rtradar.scene import Scene, Wall, material, slab
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=(-8, 0, 1), samples_per_chirp=1024)
 WAVENUMBER = 2 * np.pi * 14e9 / SPEED_OF_LIGHT_MPS
@@ -38,7 +38,7 @@ def rough(radar: Radar, *walls: Wall) -> list[RoomEchoes]:
     scene = Scene(
         walls=tuple(replace(each, name=f"wall {index}") for index, each in enumerate(walls))
     )
-    return list(rough_returns(radar, scene, RoomTracer(use(select("scalar")), scene)))
+    return list(rough_returns(radar, scene, Occluders(use(select("scalar")), scene)))
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 40.0, 70.0])

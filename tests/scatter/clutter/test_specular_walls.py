@@ -14,7 +14,7 @@ from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.wall_returns import specular_returns
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 SIZE, CORNER = (6.0, 4.5, 2.6), (-4.8, -2.0)
 METAL = Surface(material=material("perfect-conductor"), thickness_m=0.1)
@@ -34,7 +34,7 @@ def box(surface: Surface = METAL) -> Scene:
 
 
 def mirrors(radar: Radar, scene: Scene, order: int) -> list[RoomEchoes]:
-    return list(specular_returns(radar, scene, RoomTracer(use(select("scalar")), scene), order))
+    return list(specular_returns(radar, scene, Occluders(use(select("scalar")), scene), order))
 
 
 def gain(echoes: RoomEchoes) -> np.ndarray:

@@ -17,7 +17,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scene import Furniture, material
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.room_tracer import RoomTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -53,7 +53,7 @@ def box(low: tuple[float, ...], high: tuple[float, ...]) -> trimesh.Trimesh:
 
 
 def left(scene: Scene, radar: Radar, origin: Array, targets: Array) -> Field:
-    edges = SolidEdges(RoomTracer(use(select("auto")), scene), scene, radar)
+    edges = SolidEdges(Occluders(use(select("auto")), scene), scene, radar)
     origins = np.tile(origin, (len(targets), 1))
     return edges.left(origins, targets, np.zeros(len(targets)))
 

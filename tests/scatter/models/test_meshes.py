@@ -133,7 +133,7 @@ def test_levels_that_need_curvature_refuse_a_mesh(fidelity):
 
 
 @needs_anny
-@pytest.mark.parametrize("fidelity", ["physical-optics", "rays"])
+@pytest.mark.parametrize("fidelity", ["physical-optics", "reference"])
 def test_a_mesh_takes_no_number_of_facets(fidelity):
     with pytest.raises(rt.InputError, match="facets = 320; a mesh is divided by the wavelength"):
         build_model(fidelity, RADAR, person(), facets=320)
