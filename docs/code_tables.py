@@ -81,6 +81,7 @@ READ_AS = {
 """Keys that say what a recording means."""
 
 OF_RECORDINGS = {
+    "traits": "traits of a synthetic actor by name, such as `{tempo = 0.9}`",
     "motion": "recording beside the scene file or below, or `synthetic:` and an activity",
     "skeleton": "the `.asf` of an `.amc`",
     **READ_AS,

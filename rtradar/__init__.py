@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
     from rtradar.pipeline import (
         Comparison,
+        Experiment,
         Result,
         Simulation,
         compare,
@@ -47,8 +48,8 @@ _NAMES = {
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
     "motion": "Motion load_motion register_reader synthetic_motion",
-    "pipeline": "Comparison Result Simulation compare compare_recordings process_samples run "
-    "simulate",
+    "pipeline": "Comparison Experiment Result Simulation compare compare_recordings "
+    "process_samples run simulate",
     "process": "register_detector",
     "radar": "Radar register_radar",
     "receiver": "Interferer Receiver",
@@ -68,6 +69,7 @@ __all__ = [
     "Comparison",
     "Echoes",
     "Ellipsoids",
+    "Experiment",
     "ExtensionError",
     "FollowingPath",
     "HumanMesh",

@@ -21,6 +21,9 @@ inch."""
 UPWARD = ("x", "y", "z", "-x", "-y", "-z")
 """Axes of a file that may be up."""
 
+SYNTHETIC = "synthetic:"
+"""How the name of a synthetic motion begins."""
+
 SAID = ("up", "unit", "rate_hz")
 """Keys of what may be said, in TOML as in Python."""
 
@@ -31,6 +34,17 @@ class Finding(NamedTuple):
     name: str
     value: float | str
     text: str
+
+
+class Source(NamedTuple):
+    """What a motion was made from.
+
+    ``keys`` are those of a person in a run file that make it again, with absolute paths; ``files``
+    are the SHA-256 digests of the files that were read, by their paths.
+    """
+
+    keys: Mapping[str, Any]
+    files: Mapping[str, str]
 
 
 def rate_of(rate_hz: float) -> Finding:

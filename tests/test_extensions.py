@@ -125,7 +125,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
         ),
         ("--radar", "rough", "radhar, mars, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, ti-oob, threshold"),
-        (None, "walk.rough", ".amc, .bvh, .c3d, .npz, .csv, .trc, .angles"),
+        (None, "walk.rough", ".amc, .bvh, .c3d, .npz, .csv, .trc, .motion, .angles"),
     ],
 )
 def test_an_unknown_name_is_answered_with_all_that_there_are(

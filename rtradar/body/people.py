@@ -15,6 +15,7 @@ from rtradar.body.human import HumanMesh
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
+from rtradar.motion.placement import keep_place
 from rtradar.settings import Breathing, RunSettings, check_breathing
 from rtradar.system.checks import brief, check_number, check_text, check_vector
 
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 BODY_KINDS = ("ellipsoids", "mesh")
 """Bodies that a person may have."""
+
+PLACEMENTS = ("standard", "recorded")
+"""Where a person may be put: in the middle of their interval and towards -x, or as recorded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,10 @@ class Person:
     heading_deg : float
         Rotation about the vertical, anticlockwise seen from above [degree]. At 0 a walk goes along
         -x, and everything else faces -x (`rtradar.motion.place`).
+    placement : {"standard", "recorded"}
+        Whether ``position_m`` and ``heading_deg`` say where the person is, or move and turn the
+        recording about the origin of its own coordinates, so that people who were recorded together
+        keep their places.
     start_s : float
         Start of the person's interval in their recording [s]. All people of a capture begin theirs
         at the same time; one whose recording ends early rests in its last pose.
@@ -70,6 +78,7 @@ class Person:
     body: str = "ellipsoids"
     material: str | None = None
     breathing: Breathing | None = None
+    placement: str = "standard"
 
     def __post_init__(self) -> None:
         given: object = self.motion
@@ -85,10 +94,9 @@ class Person:
         object.__setattr__(self, "heading_deg", heading)
         start = check_number(where, "start_s", self.start_s, 0.0, self.motion.duration_s)
         object.__setattr__(self, "start_s", start)
-        if self.body not in BODY_KINDS:
-            raise InputError(
-                f"{where}: body = {brief(self.body)}; allowed: {', '.join(BODY_KINDS)}"
-            )
+        for key, allowed in (("body", BODY_KINDS), ("placement", PLACEMENTS)):
+            if (value := getattr(self, key)) not in allowed:
+                raise InputError(f"{where}: {key} = {brief(value)}; allowed: {', '.join(allowed)}")
         if self.material is not None:
             check_text(where, "material", self.material)
         check_breathing(f"{where}: ", self.breathing)
@@ -120,8 +128,35 @@ class Person:
         >>> person.trimesh(0.5).is_watertight  # doctest: +SKIP
         True
         """
-        placed = place(self.motion, start_s=self.start_s, heading_deg=self.heading_deg)
-        return HumanMesh(placed.shifted([*self.position_m, 0.0])).trimesh(time_s, divisions)
+        return HumanMesh(self.placed()).trimesh(time_s, divisions)
+
+    def placed(
+        self, start_s: float = 0.0, duration_s: float | None = None, heading_deg: float = 0.0
+    ) -> Motion:
+        """Put the person where they are.
+
+        Parameters
+        ----------
+        start_s : float
+            Start of the interval since ``start_s`` of their recording [s].
+        duration_s : float, optional
+            Its length [s]; to the end of the recording if left out.
+        heading_deg : float
+            Additional rotation [degree].
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        InputError
+            Where the interval is not inside the recording.
+        """
+        put = place if self.placement == "standard" else keep_place
+        interval = start_s + self.start_s, duration_s
+        placed = put(self.motion, *interval, heading_deg + self.heading_deg)
+        return placed.shifted([*self.position_m, 0.0])
 
 
 class Bodies(Body):
@@ -293,13 +328,9 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     for person, rest in zip(people, left, strict=True):
         # Who ends early rests, unless nobody lasts that long.
         rests = duration_s is not None and 0 <= rest < duration_s <= max(left)
-        placed = place(
-            person.motion,
-            start_s=settings.start_s + person.start_s,
-            duration_s=None if rests else duration_s,
-            heading_deg=settings.heading_deg + person.heading_deg,
+        placed = person.placed(
+            settings.start_s, None if rests else duration_s, settings.heading_deg
         )
-        placed = placed.shifted([*person.position_m, 0.0])
         material = settings.body_material if person.material is None else person.material
         breathing = settings.breathing if person.breathing is None else person.breathing
         body = Body.from_motion(placed, breathing, material)

@@ -7,7 +7,7 @@ import dataclasses
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from rtradar.cli.values import (
     add_pose,
     add_radar,
     add_reading,
+    assignment,
     breathing,
     decibels,
     decibels_below,
@@ -33,14 +34,15 @@ from rtradar.cli.values import (
     window,
 )
 from rtradar.errors import InputError
+from rtradar.recordings import SYNTHETIC
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.cli.values import OneLineParser, Subcommands
     from rtradar.motion import Motion
+    from rtradar.settings import RunSettings
 
-_SYNTHETIC = "synthetic:"
 _SYNTHETIC_S = 3.0
 
 _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
@@ -155,7 +157,8 @@ def _add_capture(command: OneLineParser) -> None:
         "motion",
         "MOTION",
         "an .amc, .bvh, .c3d, .npz or .csv file; or synthetic:walk, or another of "
-        "`list activities`; several for several people, none where the scene has its own",
+        "`list activities`; several for several people, none where the scene has its own; or a run "
+        "file, such as the run.toml of a folder",
         nargs="*",
     )
     command.intermixed = True
@@ -166,6 +169,14 @@ def _add_capture(command: OneLineParser) -> None:
         type=place_at,
         action="append",
         default=[],
+    )
+    command.option(
+        "--placement",
+        "PLACE",
+        "standard: the middle of the interval where the scene has its person, facing the radar; "
+        "recorded: where the recording has it, as people recorded together need (default: "
+        "standard)",
+        choices=("standard", "recorded"),
     )
     command.option(
         "--skeleton",
@@ -179,21 +190,29 @@ def _add_capture(command: OneLineParser) -> None:
     add_radar(
         command,
         f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK (default: "
-        "%(default)s)",
-        default="paper-12ghz",
+        "paper-12ghz)",
     )
     add_pose(command)
     command.option(
         "--scene",
         "NAME|TOML",
-        f"scene: {', '.join(scene_files())}, or a TOML file (default: %(default)s)",
-        default="free-space",
+        f"scene: {', '.join(scene_files())}, or a TOML file (default: free-space)",
     )
+    command.option(
+        "--set",
+        "KEY=VALUE",
+        "value of a key of the run file, such as radar.pitch_deg=-15; may be given again",
+        type=assignment,
+        action="append",
+        default=[],
+    )
+    command.flag("--changed", "go on where a file that the run file names is another one now")
     add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
     command.add_argument(
         "--no-spreading",
         dest="spreading",
         action="store_false",
+        default=argparse.SUPPRESS,
         help="leave out the loss with distance, as the paper does",
     )
     add_files(command, out="folder for the results", json="write the summary there too")
@@ -228,22 +247,23 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
                 dest=name,
                 type=setting,
                 action="append",
-                default=[],
+                default=argparse.SUPPRESS,
             )
             continue
-        default = getattr(defaults, name)
+        # What is not given is left to the run file.
+        default, left_out = getattr(defaults, name), {"default": argparse.SUPPRESS}
         flag, how = _FLAGS[name]
         kind, text = texts.get(name, ("", ""))  # Python may have left docstrings out
         if name in named:
             noun, registry = named[name]
             text = f"{noun}: {', '.join(registry)}"
-        options = {"default": default, **how}
+        options = {**left_out, **how}
         if default is False:
             options["action"] = "store_true"
         elif name == "duration_s":
             text += f" (default: to the end; synthetic: {_SYNTHETIC_S:g})"
         else:
-            text += " (default: %(default)s)"
+            text += f" (default: {default})"
         if kind.startswith("{"):
             options["choices"] = re.findall(r'"([^"]+)"', kind)
         command.add_argument(flag, dest=name, help=text, **options)
@@ -256,12 +276,13 @@ def _run(options: argparse.Namespace) -> int:
     from rtradar.pipeline import run
     from rtradar.pipeline.timing import lines_shown
 
-    model_options = dict(options.model_option)
+    model_options = dict(capture["model_options"]) | dict(options.model_option)
     for name in ("tolerance_db", "tolerance_complex"):
         if getattr(options, name) is not None:
             model_options[name] = getattr(options, name)
+    capture["model_options"] = model_options
     with lines_shown():
-        summary = run(**capture, model_options=model_options, pictures=options.pictures).summary
+        summary = run(**capture, pictures=options.pictures).summary
     tell(options, summary)
     return 0
 
@@ -273,7 +294,7 @@ def _choose_as_paper(options: argparse.Namespace) -> None:
 
     defaults = RunSettings()
     for name, value in AS_PAPER.items():
-        given, default = getattr(options, name), getattr(defaults, name)
+        given, default = getattr(options, name, None), getattr(defaults, name)
         if given and given not in (default, value):
             raise InputError(
                 f"--as-paper sets {name} = {value!r}, and {given!r} is given; leave one of both out"
@@ -369,31 +390,68 @@ def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, A
     settings = {name: given[name] for name in names}
     # What is wrong is refused before anything slow is imported.
     RunSettings(**settings)
-    radar_table(options.radar)
-    scene_table(options.scene)
-    skeletons = _checked_people(options, alone)
-    from rtradar.radar import Radar
-    from rtradar.scene import Scene
+    for source, look_up in ((options.radar, radar_table), (options.scene, scene_table)):
+        if source is not None:
+            look_up(source)
+    run_file = _run_file(options)
+    skeletons = {} if run_file else _checked_people(options, alone)
+    from rtradar.description import Parts, parts_of, read_run_file, with_value
 
-    radar = Radar.load(options.radar, board=options.board)
-    pose = {"position_m": options.radar_position} | {
-        f"{name}_deg": getattr(options, name) for name in ("yaw", "pitch", "roll")
-    }
-    given_pose = {f"radar_{key}": value for key, value in pose.items() if value is not None}
-    scene = dataclasses.replace(Scene.load(options.scene), **given_pose)
-    return settings | {
-        "motion": _people(options, skeletons),
-        "radar": radar,
-        "scene": scene,
+    table = read_run_file(run_file, changed=options.changed) if run_file else {}
+    for key, value in [*_described(options, settings), *options.set]:
+        table = with_value(table, key, value)
+    parts: Parts = parts_of(table, run_file.parent if run_file else Path())
+    people: list[Any] = [*parts.people] or _people(options, parts.settings, skeletons)
+    return vars(parts.settings) | {
+        "motion": people,
+        "radar": parts.radar,
+        "scene": parts.scene,
         "out": options.out,
         "overwrite": options.overwrite,
     }
 
 
+def _run_file(options: argparse.Namespace) -> Path | None:
+    """Return the run file that is given in place of a motion; InputError beside others."""
+    files = [Path(name) for name in options.motion if name.lower().endswith(".toml")]
+    for option in ("skeleton", "at", "up", "unit", "rate", "placement"):
+        if files and getattr(options, option):
+            raise InputError(
+                f"run file '{files[0]}' says who moves; leave --{option} out, or set people.0...."
+            )
+    if files and len(options.motion) > 1:
+        raise InputError(f"run file '{files[0]}': it says who moves; give it alone")
+    return files[0] if files else None
+
+
+def _described(
+    options: argparse.Namespace, settings: Mapping[str, Any]
+) -> Iterator[tuple[str, Any]]:
+    """Yield keys of a run file and the values that options give them."""
+    for name, value in settings.items():
+        if dataclasses.is_dataclass(value) and not isinstance(value, type):
+            value = dataclasses.asdict(value)
+        yield f"settings.{name}", value
+    for table in ("radar", "scene"):
+        if (source := getattr(options, table)) is not None:
+            # From here, not from the folder of a run file.
+            own = str(Path(source).absolute()) if Path(source).suffix else source
+            yield table, {"base": own}
+    pose = {f"{name}_deg": getattr(options, name) for name in ("yaw", "pitch", "roll")}
+    for key, value in {
+        "board": options.board,
+        "position_m": options.radar_position,
+        **pose,
+    }.items():
+        if value is not None:
+            yield f"radar.{key}", value
+
+
 def _checked_people(options: argparse.Namespace, alone: bool) -> dict[str, Path]:
     """Return the skeletons of recordings by name; InputError where there cannot be such people."""
     names, places = options.motion, options.at
-    if len(places) != len(names) and (places or len(names) > 1) and not alone:
+    apart = len(names) > 1 and options.placement != "recorded"
+    if len(places) != len(names) and (places or apart) and not alone:
         raise InputError(
             f"{len(names)} MOTION and {len(places)} --at; several people need places: give "
             "--at X,Y once for each MOTION, in the same order"
@@ -402,25 +460,27 @@ def _checked_people(options: argparse.Namespace, alone: bool) -> dict[str, Path]
 
     skeletons = _skeletons(names, options.skeleton) if names else {}
     for name in names:
-        if name.startswith(_SYNTHETIC):
-            check_activity(name.removeprefix(_SYNTHETIC))
+        if name.startswith(SYNTHETIC):
+            check_activity(name.removeprefix(SYNTHETIC))
         else:
             reader_of(name, skeletons.get(name))
     return skeletons
 
 
-def _people(options: argparse.Namespace, skeletons: Mapping[str, Path]) -> list[Motion | Person]:
+def _people(
+    options: argparse.Namespace, settings: RunSettings, skeletons: Mapping[str, Path]
+) -> list[Motion | Person]:
     """Return the motions of the command line, as people where places are given."""
     from rtradar.motion import load_motion, synthetic_motion
 
     motions: list[Motion] = []
     for person, name in enumerate(options.motion):
-        if name.startswith(_SYNTHETIC):
-            duration_s = _SYNTHETIC_S if options.duration_s is None else options.duration_s
+        if name.startswith(SYNTHETIC):
+            duration_s = _SYNTHETIC_S if settings.duration_s is None else settings.duration_s
             motion = synthetic_motion(
-                name.removeprefix(_SYNTHETIC),
-                seed=options.seed + person,
-                duration_s=options.start_s + duration_s,
+                name.removeprefix(SYNTHETIC),
+                seed=settings.seed + person,
+                duration_s=settings.start_s + duration_s,
             )
         else:
             motion = load_motion(
@@ -431,18 +491,21 @@ def _people(options: argparse.Namespace, skeletons: Mapping[str, Path]) -> list[
                 rate_hz=options.rate,
             )
         motions.append(motion)
-    if not options.at:
+    recorded = options.placement == "recorded"
+    if not (options.at or recorded):
         return [*motions]
     from rtradar.body import Person  # which takes long to import
 
-    return [Person(motion, **own) for motion, own in zip(motions, options.at, strict=True)]
+    places = options.at or [{}] * len(motions)
+    own = {"placement": options.placement} if recorded else {}
+    return [Person(motion, **own, **at) for motion, at in zip(motions, places, strict=True)]
 
 
 def _skeletons(names: Sequence[str], skeletons: Sequence[Path]) -> dict[str, Path]:
     """Return the skeleton of each recording: the only one, or one for each in order."""
     if not skeletons:
         return {}
-    recorded = [name for name in names if not name.startswith(_SYNTHETIC)]
+    recorded = [name for name in names if not name.startswith(SYNTHETIC)]
     needing = [name for name in recorded if name.lower().endswith(".amc")] or recorded
     if not needing:
         raise InputError(

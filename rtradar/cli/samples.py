@@ -160,7 +160,8 @@ def _process(options: argparse.Namespace) -> int:
     check_place(options.json)
     from rtradar.settings import ProcessingOptions, RunSettings
 
-    settings = {name: getattr(options, name) for name in ProcessingOptions.__annotations__}
+    given = vars(options)
+    settings = {name: given[name] for name in ProcessingOptions.__annotations__ if name in given}
     RunSettings(**settings)  # refuses what is wrong before anything slow is imported
     from rtradar.exchange import open_samples
 

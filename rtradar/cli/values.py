@@ -251,6 +251,19 @@ def setting(text: str) -> tuple[str, bool | int | float | str]:
     return name, value
 
 
+def assignment(text: str) -> tuple[str, Any]:
+    """Read a dotted key and its value, as TOML has it; what is none there is a word."""
+    import tomllib
+
+    key, equals, value = text.partition("=")
+    if not (key and equals and value):
+        raise argparse.ArgumentTypeError(f"{text!r} must be KEY=VALUE, such as radar.pitch_deg=-15")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
+
+
 def window(text: str) -> str | tuple[str, float]:
     """Read a window function: a name, or a name and its parameter."""
     name, colon, value = text.partition(":")

@@ -16,7 +16,7 @@ from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
 from rtradar.motion import display
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
-from rtradar.recordings import Finding
+from rtradar.recordings import Finding, Source
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
@@ -71,6 +71,8 @@ class Motion:
         Thickness of the subject relative to the nominal body.
     findings : tuple of Finding
         What was found of the recording, or assumed: unit, up, stature, rate, largest speed.
+    source : Source, optional
+        What it was made from, as a run file says it; None of a motion that was changed since.
 
     Raises
     ------
@@ -106,6 +108,7 @@ class Motion:
     length_s: float | None = None
     girth: float = 1.0
     findings: tuple[Finding, ...] = ()
+    source: Source | None = dataclasses.field(default=None, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes
@@ -298,6 +301,22 @@ class Motion:
         for joint, parent in enumerate(self.parents[1:], start=1):
             positions[:, joint] += positions[:, parent]
         return positions
+
+    def made_from(self, source: Source) -> Motion:
+        """Remember what the motion was made from, and return it.
+
+        Parameters
+        ----------
+        source : Source
+            Keys of a person in a run file, and the files that were read.
+
+        Returns
+        -------
+        Motion
+            The same object.
+        """
+        object.__setattr__(self, "source", source)
+        return self
 
     # -- the same motion elsewhere -----------------------------------------------------------------
 

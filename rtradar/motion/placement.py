@@ -56,12 +56,9 @@ def place(
     InputError
         Where the interval is not inside the recording.
     """
-    _check(motion, start_s, duration_s, heading_deg)
-    rest = motion.duration_s - start_s
-    length = rest if duration_s is None else min(duration_s, rest)
-    part = cut(motion, start_s, length)
+    part = _interval(motion, start_s, duration_s, heading_deg)
     nodes = to_nodes(part)
-    inside = (part.frame_times >= -1e-9) & (part.frame_times <= length + 1e-9)
+    inside = (part.frame_times >= -1e-9) & (part.frame_times <= part.duration_s + 1e-9)
     if not inside.any():  # an interval between two frames
         inside[:] = True
     roots = nodes.root_positions[inside]
@@ -72,6 +69,25 @@ def place(
     yaw = math.pi - math.atan2(along[1], along[0]) + math.radians(heading_deg)
     middle = roots.mean(axis=0)
     return part.shifted([-middle[0], -middle[1], 0.0]).turned(yaw)
+
+
+def keep_place(
+    motion: Motion, start_s: float = 0.0, duration_s: float | None = None, heading_deg: float = 0.0
+) -> Motion:
+    """Cut an interval out of a recording where it was recorded, turned about the origin there.
+
+    Parameters, returns and errors are those of `place`.
+    """
+    part = _interval(motion, start_s, duration_s, heading_deg)
+    return part.turned(math.radians(heading_deg)) if heading_deg else part
+
+
+def _interval(
+    motion: Motion, start_s: float, duration_s: float | None, heading_deg: float
+) -> Motion:
+    _check(motion, start_s, duration_s, heading_deg)
+    rest = motion.duration_s - start_s
+    return cut(motion, start_s, rest if duration_s is None else min(duration_s, rest))
 
 
 def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg: float) -> None:

@@ -1,6 +1,7 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
 from rtradar.pipeline.compare import Comparison, compare, compare_recordings
+from rtradar.pipeline.experiment import Experiment
 from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
@@ -10,6 +11,7 @@ from rtradar.pipeline.simulation import Simulation, simulate
 __all__ = [
     "MEMORY_LIMIT_BYTES",
     "Comparison",
+    "Experiment",
     "Result",
     "Simulation",
     "compare",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.body import Body, Person
+from rtradar.description import table_of
 from rtradar.echoes import Echoes
 from rtradar.pipeline.prepared_room import PreparedRoom
 from rtradar.pipeline.processing import Processing, block_chirps
@@ -92,6 +93,10 @@ class Capture:
         """Title of pictures and of the progress bar."""
         names = [self.motion, self.radar.name, self.settings.fidelity]
         return ", ".join(names + ([self.scene.name] if self.room else []))
+
+    def described(self) -> dict[str, Any]:
+        """Return the tables of the run, see `rtradar.description.table_of`."""
+        return table_of(self.people, self.radar, self.scene, self.settings)
 
     def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
         """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
+from rtradar.pipeline.experiment import Experiment
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
@@ -49,6 +50,8 @@ class Result:
         echoes are not known one by one.
     out : path, optional
         Folder of the files; None if everything is in memory.
+    experiment : Experiment, optional
+        What was simulated, to be changed and run again; None for IF samples.
 
     Examples
     --------
@@ -71,6 +74,7 @@ class Result:
     radar: Radar
     link_budget: LinkBudget | None = None
     out: Path | None = None
+    experiment: Experiment | None = None
     _in_memory: xr.Dataset | None = None
     _truth: xr.Dataset | None = None
     _table: EchoTable | None = None

@@ -7,8 +7,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
+from rtradar.description import write_run_file
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.experiment import Experiment
 from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
@@ -129,6 +131,7 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
         summary=finished(summary | cost_of(capture, started)),
         radar=capture.radar,
         link_budget=capture.link_budget,
+        experiment=Experiment(capture.described()),
         _in_memory=maps,
         _truth=truth,
         _table=table,
@@ -162,6 +165,8 @@ def run_into(
                 drawn = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
+        described = capture.described()
+        summary["run"] = write_run_file(folder, out, described)
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(table))
             with read_maps(folder / "maps.h5") as maps:
@@ -192,6 +197,7 @@ def run_into(
         radar=capture.radar,
         link_budget=capture.link_budget,
         out=out.absolute(),
+        experiment=Experiment(described),
     )
 
 

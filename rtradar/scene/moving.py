@@ -229,6 +229,11 @@ _KINDS: Mapping[str, tuple[type[RigidMotion], _Keys, _Keys]] = {
 """Motions by the ``kind`` that a scene file names, the keys that each needs, and the others."""
 
 
+def kind_of(motion: RigidMotion) -> str | None:
+    """Return the ``kind`` that a scene file names a motion by; None for one of somebody's own."""
+    return next((kind for kind, (own, *_) in _KINDS.items() if type(motion) is own), None)
+
+
 def motion_of(table: object) -> RigidMotion:
     """Make a motion of the ``motion`` table of a scene file."""
     kind = table.get("kind") if isinstance(table, dict) else None

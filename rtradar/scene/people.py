@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.errors import InputError
-from rtradar.recordings import SAID, said_of
+from rtradar.recordings import SAID, SYNTHETIC, said_of
 from rtradar.settings import Breathing
 from rtradar.system.checks import (
     Table,
@@ -15,7 +15,6 @@ from rtradar.system.checks import (
     check_keys,
     check_number,
     check_text,
-    inside,
     table_at,
     tables_at,
 )
@@ -24,14 +23,11 @@ if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.motion import Motion
 
-KEYS = "skeleton up unit rate_hz position_m heading_deg start_s body material breathing seed"
-KEYS += " duration_s"
+KEYS = "skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing"
+KEYS += " seed duration_s traits"
 """Keys that a person may have beside ``motion``."""
 
-SYNTHETIC = "synthetic:"
-"""How the name of a synthetic motion begins."""
-
-_OF_ACTORS = ("seed", "duration_s")
+_OF_ACTORS = ("seed", "duration_s", "traits")
 _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 """How long a synthetic actor moves by default, and at most [s]."""
 
@@ -48,7 +44,7 @@ def checked(where: str, people: Iterable[Person]) -> tuple[Person, ...]:
     return found
 
 
-def people_of(table: Table, folder: Path) -> tuple[Person, ...]:
+def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
     """Read the people of a scene.
 
     Parameters
@@ -56,8 +52,7 @@ def people_of(table: Table, folder: Path) -> tuple[Person, ...]:
     table : mapping
         Table of the scene file.
     folder : path
-        Folder of the file, in which recordings must lie, or below: a scene may come from a
-        stranger, and must not open files anywhere else.
+        Folder that relative paths start from.
 
     Returns
     -------
@@ -93,8 +88,10 @@ def people_of(table: Table, folder: Path) -> tuple[Person, ...]:
 
 
 def _motion(entry: Table, folder: Path) -> Motion:
-    from rtradar.motion import load_motion, synthetic_motion  # which takes long to import
+    from rtradar.motion import Motion, load_motion, synthetic_motion  # which takes long to import
 
+    if isinstance(entry["motion"], Motion):
+        return entry["motion"]
     name = check_text("person", "motion", entry["motion"])
     if name.startswith(SYNTHETIC):
         for key in ("skeleton", *SAID):
@@ -102,20 +99,19 @@ def _motion(entry: Table, folder: Path) -> Motion:
                 raise InputError(f"{name}: only a recording has it; leave {key} out")
         asked = entry.get("duration_s", _ACTOR_S)
         duration_s = check_number("person", "duration_s", asked, 0.0, _LONGEST_S)
-        activity = name.removeprefix(SYNTHETIC)
-        return synthetic_motion(activity, seed=entry.get("seed", 0), duration_s=duration_s)
+        activity, traits = name.removeprefix(SYNTHETIC), table_at("traits", entry)
+        given = {"seed": entry.get("seed", 0), "duration_s": duration_s, **traits}
+        try:
+            return synthetic_motion(activity, **given)
+        except TypeError:  # a trait that is none, or of another kind
+            raise InputError(f"traits = {brief(traits)}: no such traits of {name}") from None
     for key in _OF_ACTORS:
         if key in entry:
             raise InputError(f"{key} = {brief(entry[key])}: only a synthetic actor has it")
-    paths = {}
-    for key in ("motion", "skeleton"):
-        if key in entry:
-            text = check_text("people", key, entry[key])
-            if inside(folder, text) is None:
-                raise InputError(
-                    f"{key} = {brief(text)} leaves the folder of the scene file; put the "
-                    "recording beside it or below"
-                )
-            paths[key] = folder / text
+    paths = {
+        key: folder / check_text("people", key, entry[key])
+        for key in ("motion", "skeleton")
+        if key in entry
+    }
     said = said_of("people", entry)
     return load_motion(paths["motion"], skeleton=paths.get("skeleton"), **said)

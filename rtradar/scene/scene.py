@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -15,6 +16,7 @@ from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
+from rtradar.recordings import SYNTHETIC
 from rtradar.scene import display, people
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
@@ -100,6 +102,9 @@ class Scene:
         Mean position of the person, x and y [m].
     heading_deg : float
         Rotation of the person about the vertical there, anticlockwise seen from above [deg].
+    source : mapping, optional
+        Table of the file that it was read from, with absolute paths; None of a scene that was made
+        or changed in Python.
 
     Raises
     ------
@@ -126,6 +131,7 @@ class Scene:
     radar_roll_deg: float | None = None
     person_position_m: tuple[float, float] = (0.0, 0.0)
     heading_deg: float = 0.0
+    source: Table | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
         for key in ("name", "description"):
@@ -210,11 +216,32 @@ class Scene:
         """
         path, table = scene_table(source)
         try:
-            scene = cls(**_fields(table, path))
-            for piece in (*scene.furniture, *scene.objects):
-                piece.triangles()  # refuses a mesh that cannot be used
+            return cls.of_table({"name": printable(path.stem), **rooted(table, path.parent)})
         except InputError as error:
             raise InputError(f"scene file '{path}': {error}") from None
+
+    @classmethod
+    def of_table(cls, table: Table) -> Scene:
+        """Make the scene of a table as a TOML file has it, whose paths are absolute.
+
+        Parameters
+        ----------
+        table : mapping
+            Keys of a scene file.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        InputError
+            Where anything in it has no meaning.
+        """
+        scene = cls(**_fields(table))
+        for piece in (*scene.furniture, *scene.objects):
+            piece.triangles()  # refuses a mesh that cannot be used
+        object.__setattr__(scene, "source", table)
         return scene
 
     def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
@@ -353,8 +380,38 @@ class Scene:
 _ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 
 
-def _fields(table: Table, path: Path) -> dict[str, Any]:
-    """Turn the table of the file at ``path`` into the fields of a `Scene`."""
+def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield where a table of a scene names files, under which key, and the table of that key."""
+    for list_, keys in (("furniture", ("mesh",)), ("objects", ("mesh",)), ("people", _FILES)):
+        for where, entry in tables_at(list_, table):
+            for key in keys:
+                text = entry.get(key)
+                named = isinstance(text, str) and (key != "mesh" or Path(text).suffix)
+                if named and not str(text).startswith(SYNTHETIC) and isinstance(entry, dict):
+                    yield where, key, entry
+
+
+def rooted(table: Table, folder: Path) -> Table:
+    """Return the table of a scene file with absolute paths of files, which must be in its folder.
+
+    Or below: a scene may come from a stranger, and must not open files anywhere else.
+    """
+    table = copy.deepcopy(table)
+    for where, key, entry in files_of(table):
+        if inside(folder, entry[key]) is None:
+            raise InputError(
+                f"{where}{key} = {brief(entry[key])} leaves the folder of the scene file; put the "
+                f"{'mesh' if key == 'mesh' else 'recording'} beside it or below"
+            )
+        entry[key] = str((folder / entry[key]).absolute())
+    return table
+
+
+_FILES = ("motion", "skeleton")
+
+
+def _fields(table: Table) -> dict[str, Any]:
+    """Turn the table of a file into the fields of a `Scene`."""
     texts = KEYS["top"][1]
     tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects", "people")
     check_keys("", table, (), (*texts, *tables))
@@ -364,12 +421,11 @@ def _fields(table: Table, path: Path) -> dict[str, Any]:
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
     room = _room(table["room"], materials) if "room" in table else ()
     fields: dict[str, Any] = {
-        "name": printable(path.stem),
         **{key: table[key] for key in texts if key in table},
-        "walls": (*room, *_pieces("walls", Wall, table, materials, path.parent)),
-        "furniture": _pieces("furniture", Furniture, table, materials, path.parent),
-        "objects": _pieces("objects", Object, table, materials, path.parent),
-        "people": people.people_of(table, path.parent),
+        "walls": (*room, *_pieces("walls", Wall, table, materials)),
+        "furniture": _pieces("furniture", Furniture, table, materials),
+        "objects": _pieces("objects", Object, table, materials),
+        "people": people.people_of(table),
     }
     if "radar" in table:
         radar = table_at("radar", table)
@@ -415,14 +471,14 @@ def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
 
 
 def _pieces(
-    key: str, kind: type[Piece], table: Table, materials: Mapping[str, Material], folder: Path
+    key: str, kind: type[Piece], table: Table, materials: Mapping[str, Material]
 ) -> tuple[Piece, ...]:
     found = []
     for where, entry in tables_at(key, table):
         check_keys(where, entry, *KEYS[f"[[{key}]]"])
         own: dict[str, Any] = {}
         if kind is not Wall:
-            own["mesh"] = _shape(where, entry, folder)
+            own["mesh"] = _shape(where, entry)
             entry = {name: value for name, value in entry.items() if name != "box"}
         chosen = _material(where, entry["material"], materials)
         with _prefixed(where):
@@ -432,12 +488,12 @@ def _pieces(
     return tuple(found)
 
 
-def _shape(where: str, entry: Table, folder: Path) -> Any:
+def _shape(where: str, entry: Table) -> Any:
     """Return the mesh of an entry, or the lengths of its box."""
     if "box" not in entry:
         if "mesh" not in entry:
             raise InputError(f"{where}mesh is missing; give a mesh, or box = [x, y, z] in metres")
-        return _mesh(where, entry["mesh"], folder)
+        return _mesh(where, entry["mesh"])
     if "mesh" in entry:
         raise InputError(f"{where}mesh and box are given; leave one out")
     if not isinstance(entry["box"], list):
@@ -445,22 +501,15 @@ def _shape(where: str, entry: Table, folder: Path) -> Any:
     return entry["box"]
 
 
-def _mesh(where: str, value: object, folder: Path) -> str | Path:
-    """Check a mesh; a file must lie in the folder of the scene file or below.
-
-    A scene may come from a stranger, and must not open files anywhere else.
-    """
+def _mesh(where: str, value: object) -> str | Path:
+    """Check a mesh: a name, or the path of a file."""
     text = check_text(where.strip(), "mesh", value)
     if not Path(text).suffix:
         return text
     if Path(text).suffix.lower() not in MESH_ENDINGS:
-        raise InputError(f"{where}mesh = {brief(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
-    if inside(folder, text) is None:
-        raise InputError(
-            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put the mesh "
-            "beside it or below"
-        )
-    return folder / text
+        name = brief(Path(text).name)
+        raise InputError(f"{where}mesh = {name}; allowed endings: {', '.join(MESH_ENDINGS)}")
+    return Path(text)
 
 
 def _material(where: str, value: object, materials: Mapping[str, Material]) -> Material:

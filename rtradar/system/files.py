@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import errno
+import hashlib
 import io
 import json
 import math
@@ -411,6 +412,12 @@ def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
         ):
             raise ValueError(f"more than {most_bytes / 1e6:g} MB")
         return content
+
+
+def digest_of(path: str | os.PathLike[str]) -> str:
+    """Return the SHA-256 digest of a regular file that may be anybody's; errors of `read_bytes`."""
+    with open_regular(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -43,6 +43,7 @@ READERS = Registry(
         "npz": "rtradar.motion.formats.joints:load_npz",
         "csv": "rtradar.motion.formats.joints:load_csv",
         "trc": "rtradar.motion.formats.c3d:load_trc",
+        "motion": "rtradar.motion.formats.saved:load_saved",
     },
 )
 """Readers of motion files, by the ending of the file without the dot."""

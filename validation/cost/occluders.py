@@ -120,7 +120,16 @@ def rows_of(kind: Any, quick: bool) -> Iterator[Row]:
             if rays == count:
                 wrong = float(np.mean([a != b[:rays] for a, b in zip(found, right, strict=True)]))
                 if hits is spheres:
-                    yield judged(claim, "fraction of rays that are wrong", "", wrong, MOST_WRONG)
+                    yield judged(
+                        claim,
+                        "fraction of rays that are wrong",
+                        "",
+                        wrong,
+                        MOST_WRONG,
+                        says=f"rays past a walker on {kind}: fraction that meet otherwise than in "
+                        "float64",
+                        cases=count * len(times),
+                    )
                 else:
                     yield reported(claim, "fraction of rays that are wrong", "", wrong)
             ratio = seconds[name] / seconds["the sphere in each part's axes"]

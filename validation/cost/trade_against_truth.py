@@ -57,6 +57,9 @@ class Outcome(NamedTuple):
     pairs_s: float
 
 
+WORDS = {"bounces": "two bounces", "terms": "two terms", "visibility": "gradual visibility"}
+
+
 def cases_of_parts() -> list[Case]:
     at = antennas(ASPECTS_DEG)
     return [
@@ -102,7 +105,7 @@ def measure() -> list[Outcome]:
     truths = [[case("full-wave") for case in cases] for cases in sets]
     found = []
     for level, options in SETTINGS:
-        name = ", ".join([level, *(f"two {option}" for option in options)])
+        name = ", ".join([level, *(WORDS[option] for option in options)])
         of_sets = [
             measured(cases, truth, level, options)
             for cases, truth in zip(sets, truths, strict=True)
@@ -143,6 +146,7 @@ def draw(found: list[Outcome], path: Path) -> None:
             colour = LIGHT.cycle[levels.index(level)]
             marker = {"color": colour, "markersize": 9, "alpha": 0.85}
             shape = "os^D"[("two bounces" in more) + 2 * ("two terms" in more)]
+            shape = "P" if "gradual visibility" in more else shape
             axes.semilogx(spent / seconds[0], error, shape, label=one.name, **marker)
         axes.set(xlabel="CPU time over that of analytic", ylim=(-1, 35), xlim=(0.5, 2e4))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

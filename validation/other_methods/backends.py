@@ -326,6 +326,7 @@ def compared_on(
             "",
             float(np.mean(smooth)),
             *limit,
+            says=f"ellipsoids on {kind} against float64: fraction of rays that meet another part",
         )
 
 

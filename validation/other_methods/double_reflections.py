@@ -125,7 +125,7 @@ class WithoutCreases(Rays):
 
     def __init__(self, radar: rt.Radar, body: rt.Body, **options: Any) -> None:
         super().__init__(radar, body, **options)
-        self._surfaces = PartsApart(use(select("auto")), body.semi_axes)
+        self._target._tracer = PartsApart(use(select("auto")), body.semi_axes)
 
 
 class PartsApart(BodyTracer):

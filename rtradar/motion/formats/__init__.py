@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import os
 from pathlib import Path
+from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.recordings import check_rate, check_unit, check_up
+from rtradar.recordings import Source, check_rate, check_unit, check_up
+from rtradar.system.files import digest_of
 from rtradar.system.registries import READERS, reader_of
 
 register_reader = READERS.register
@@ -77,4 +80,10 @@ def load_motion(
         motion = read(file, **{option: value for option, value in given.items() if option in taken})
     if not isinstance(motion, Motion):
         raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")
-    return motion
+    keys: dict[str, Any] = {"motion": str(file.absolute())}
+    if skeleton is not None:
+        keys["skeleton"] = str(Path(skeleton).absolute())
+    files = {path: digest_of(Path(path)) for path in keys.values() if os.path.isfile(path)}
+    told = {"up": given["up"], "unit": given["unit_m"], "rate_hz": given["rate_hz"]}
+    keys |= {key: value for key, value in told.items() if value is not None}
+    return motion.made_from(Source(keys, files))

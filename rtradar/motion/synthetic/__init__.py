@@ -31,6 +31,7 @@ from rtradar.motion.synthetic.gait import walk, walk_in_place
 from rtradar.motion.synthetic.gait_styles import GAITS
 from rtradar.motion.synthetic.jacks import jump, jumping_jack
 from rtradar.motion.synthetic.stance import stand
+from rtradar.recordings import SYNTHETIC, Source
 from rtradar.system.checks import is_whole
 from rtradar.system.registries import check_activity
 from rtradar.system.row_files import FileBackedRows, in_blocks
@@ -44,6 +45,9 @@ def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subj
 
     return moving
 
+
+ACTORS = 3
+"""Version of the actors, raised whenever one of them moves otherwise than before."""
 
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
@@ -142,7 +146,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     InputError
         Where an activity is unknown or a value out of range.
     """
-    activity, chosen = _checked(activity, traits)
+    asked = activity
+    activity, chosen = _checked(asked, traits)
     subject, height_m = _subject(activity, seed, chosen), chosen["height_m"]
     duration_s, rate_hz = chosen["duration_s"], chosen["rate_hz"]
     # Poses are made twice: how far down all must come is not known before the last, and too many
@@ -168,7 +173,9 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         length_s=duration_s,
         girth=chosen["build"] * height_m / 1.75,
     )
-    return motion.turned(math.pi)
+    own = {name: value for name, value in traits.items() if name != "duration_s"}
+    keys = {"motion": f"{SYNTHETIC}{asked}", "seed": seed, "duration_s": duration_s}
+    return motion.turned(math.pi).made_from(Source(keys | ({"traits": own} if own else {}), {}))
 
 
 def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import platform
 import time
@@ -165,11 +166,20 @@ def finished(summary: dict[str, Any], folder: Path | None = None) -> dict[str, A
     """Return a summary as JSON has it; with a folder, list the files there, and write it beside."""
     if folder is not None:
         summary = summary | {"files": RUN_FILES.list_of(folder)}
-    text = json.dumps(summary, indent=2, allow_nan=False, default=_plain)
+    text = json.dumps(_finite(summary), indent=2, allow_nan=False, default=_plain)
     if folder is not None:
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     found: dict[str, Any] = json.loads(text)
     return found
+
+
+def _finite(value: Any) -> Any:
+    """The same without infinity, which JSON does not know: ``inf`` as text."""
+    if isinstance(value, dict):
+        return {key: _finite(own) for key, own in value.items()}
+    if isinstance(value, list):
+        return [_finite(own) for own in value]
+    return str(value) if isinstance(value, float) and math.isinf(value) else value
 
 
 def _plain(value: object) -> Any:

@@ -42,9 +42,9 @@ _FILES = (
     *("maps.h5", "cloud_rdt.npz", "cloud_rdt.ply", "cloud_rdt.png", "cloud_xyz.npz"),
     *("cloud_xyz.png", "clutter_removal.png", "plan.png", "range_angle.png"),
     *("range_azimuth_walls.png", "range_doppler.png", "range_time.png", "report.html"),
-    *("spectrogram.png", "summary.json", "view.npz"),
+    *("run.toml", "spectrogram.png", "summary.json", "view.npz"),
 )
-_RUN_FILES = rf"{one_of(_FILES)}|if\.zarr/(zarr\.json|c(/\d+)+)"
+_RUN_FILES = rf"{one_of(_FILES)}|person-\d+\.motion|if\.zarr/(zarr\.json|c(/\d+)+)"
 _RUN_FOLDERS = r"if\.zarr(/c(/\d+)*)?"
 
 RUN_FILES = OutputFiles("summary.json", _RUN_FILES, _RUN_FOLDERS)

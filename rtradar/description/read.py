@@ -1,0 +1,183 @@
+"""People, radar, scene and settings of the tables of a run file."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rtradar.body import Person
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.recordings import SYNTHETIC
+from rtradar.scene import Scene
+from rtradar.scene.people import people_of
+from rtradar.scene.scene import files_of, rooted
+from rtradar.settings import Breathing, RunSettings
+from rtradar.system.checks import Table, brief, check_keys, printable, table_at, tables_at
+from rtradar.system.registries import scene_table
+
+KEYS = ("people", "radar", "scene", "settings", "versions", "files", "missing")
+"""Tables and lists of a run file."""
+
+_POSE = ("position_m", "yaw_deg", "pitch_deg", "roll_deg")
+_RADAR, _SCENE = "paper-12ghz", "free-space"
+_UPRIGHT = ("near", "far", "right", "left")
+
+
+class Parts(NamedTuple):
+    """What `rtradar.run` takes: people, radar, scene and settings."""
+
+    people: tuple[Person, ...]
+    radar: Radar
+    scene: Scene
+    settings: RunSettings
+
+
+def parts_of(table: Table, folder: Path) -> Parts:
+    """Make people, radar, scene and settings of the tables of a run file.
+
+    Parameters
+    ----------
+    table : mapping
+        Tables, as `table_of` gives them or a person writes them.
+    folder : path
+        Folder that relative paths start from.
+
+    Returns
+    -------
+    Parts
+
+    Raises
+    ------
+    InputError
+        Where a key or a value has no meaning, a file cannot be read, or something is missing that
+        no file holds.
+    """
+    check_keys("", table, (), KEYS)
+    for what in table.get("missing", ()):
+        raise InputError(f"the run file lacks {what}: no file holds it; run it from Python again")
+    settings = settings_of_table(table_at("settings", table))
+    scene = _scene(table, folder)
+    radar = _radar(table_at("radar", table), folder)
+    return Parts(_people(table, folder, scene, settings), radar, scene, settings)
+
+
+def settings_of_table(table: Table) -> RunSettings:
+    """Make the settings of the table ``[settings]``."""
+    given = dict(table)
+    check_keys("[settings] ", given, (), tuple(RunSettings.__dataclass_fields__))
+    if "breathing" in given:
+        breath = table_at("breathing", given, "settings.")
+        check_keys("[settings] breathing: ", breath, ("amplitude_mm", "rate_hz"), ("phase_deg",))
+        given["breathing"] = Breathing(**breath)
+    for key in ("range_window", "doppler_window"):
+        if isinstance(given.get(key), list):
+            given[key] = tuple(given[key])
+    return RunSettings(**given)
+
+
+def _radar(table: Table, folder: Path) -> Radar:
+    # A table that has a name is whole.
+    given = dict(table) if "name" in table else {"base": _RADAR, **table}
+    base = given.get("base")
+    if isinstance(base, str) and Path(base).suffix in (".toml", ".cfg"):
+        given["base"] = str((folder / base).absolute())
+    return Radar.load(given)
+
+
+def _scene(table: Table, folder: Path) -> Scene:
+    own = copy.deepcopy(dict(table_at("scene", table)))
+    # The run file says where the radar is, whatever its own file or the scene says.
+    radar = table_at("radar", table)
+    if pose := {key: radar[key] for key in _POSE if key in radar}:
+        own["radar"] = {**table_at("radar", own, "scene."), **pose}
+    for _, key, entry in files_of(own):
+        entry[key] = str((folder / entry[key]).absolute())
+    base = own.pop("base", None if own.keys() - {"radar", "person"} else _SCENE)
+    if base is None:
+        return Scene.of_table(own)
+    if not isinstance(base, str):
+        raise InputError(f"[scene] base = {brief(base)}; it must be a name or a path")
+    path, below = scene_table(folder / base if Path(base).suffix else base)
+    below = {"name": printable(path.stem), **rooted(below, path.parent)}
+    return Scene.of_table(_merged(below, own))
+
+
+def _merged(below: Any, over: Any) -> Any:
+    """A table with the values of another over it, key by key."""
+    if not (isinstance(below, Mapping) and isinstance(over, Mapping)):
+        return over
+    found = dict(below)
+    for key, value in over.items():
+        # A wall of a room of which only one key is said has the others of all four.
+        under = found.get(key, found.get("walls") if key in _UPRIGHT else None)
+        found[key] = _merged(under, value)
+    return found
+
+
+def _people(table: Table, folder: Path, scene: Scene, settings: RunSettings) -> tuple[Person, ...]:
+    """People of the run file, those without a place where the scene has its person."""
+    where = {"position_m": list(scene.person_position_m), "heading_deg": scene.heading_deg}
+    found: list[Person] = []
+    for number, (_, entry) in enumerate(tables_at("people", table)):
+        placed = entry.get("placement", "standard") == "recorded" or "position_m" in entry
+        own = dict(entry) if placed else {**where, **entry}
+        actor = str(own.get("motion", "")).startswith(SYNTHETIC)
+        if actor and settings.duration_s is not None:
+            own.setdefault("duration_s", settings.start_s + settings.duration_s)
+        if actor:
+            own.setdefault("seed", settings.seed + number)
+        found += people_of({"people": [own]}, folder)
+    return tuple(found)
+
+
+def with_value(table: Table, key: str, value: object) -> dict[str, Any]:
+    """Return a table with another value under a dotted key, such as ``radar.pitch_deg``.
+
+    Parameters
+    ----------
+    table : mapping
+        Tables of a run file.
+    key : str
+        Names with dots between; of a list the number, from 0.
+    value : object
+        Value, as TOML has them.
+
+    Returns
+    -------
+    dict
+        A copy.
+
+    Raises
+    ------
+    InputError
+        Where the key leads through what is no table, or past the end of a list.
+    """
+    found: dict[str, Any] = copy.copy(dict(table))
+    check_keys("", {key.partition(".")[0]: 0}, (), KEYS[:4])
+    at: Any = found
+    *way, last = key.split(".")
+    for name in way:
+        below = copy.copy(_at(at, name, key))
+        at[int(name) if isinstance(at, list) else name] = below
+        at = below
+    if isinstance(at, list):
+        _at(at, last, key)
+        at[int(last)] = value
+    elif isinstance(at, dict):
+        at[last] = value
+    else:
+        raise InputError(f"{key}: there is no table '{'.'.join(way)}'")
+    return found
+
+
+def _at(table: Any, name: str, key: str) -> Any:
+    if isinstance(table, list):
+        if not (name.isdecimal() and int(name) < len(table)):
+            raise InputError(f"{key}: '{name}' is no number from 0 to {len(table) - 1}")
+        return table[int(name)]
+    if not isinstance(table, dict):
+        raise InputError(f"{key}: '{name}' lies in no table")
+    return table.get(name, {})

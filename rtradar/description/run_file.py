@@ -1,0 +1,146 @@
+"""The run file: what was simulated, from which files, by which version."""
+
+from __future__ import annotations
+
+import copy
+import os
+import platform
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from rtradar.errors import InputError
+from rtradar.motion import Motion
+from rtradar.motion.formats.saved import save_motion
+from rtradar.motion.synthetic import ACTORS
+from rtradar.scene.scene import files_of
+from rtradar.system.checks import Table, brief, check_keys, check_text, read_toml, tables_at
+from rtradar.system.files import digest_of
+
+PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "numba", "trimesh")
+"""Packages whose versions decide the last bits."""
+
+_HEAD = """\
+# What was simulated: `rtradar run run.toml --out DIR` gives it again. Paths start from this folder;
+# a file that has changed since is refused.
+
+"""
+
+
+def versions() -> dict[str, Any]:
+    """Return versions of rtradar, its actors and packages, and the commit where there is one."""
+    found: dict[str, Any] = {"rtradar": version("rtradar"), "actors": ACTORS}
+    if commit := _commit(Path(__file__).parents[2] / ".git"):
+        found["commit"] = commit
+    found["python"] = platform.python_version()
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _commit(git: Path) -> str:
+    """Commit that is checked out, read from the folder of Git; empty where there is none."""
+    try:
+        head = (git / "HEAD").read_text().strip()
+        name = head.removeprefix("ref: ")
+        if name == head:
+            return head
+        if (git / name).is_file():
+            return (git / name).read_text().strip()
+        lines = (git / "packed-refs").read_text().splitlines()
+    except OSError:
+        return ""
+    return next((line.split()[0] for line in lines if line.endswith(f" {name}")), "")
+
+
+def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
+    """Write ``run.toml`` into a folder, and what no other file holds beside it.
+
+    Parameters
+    ----------
+    folder : path
+        Folder, which may be another one until it is complete.
+    place : path
+        Where it will be, from which relative paths start.
+    table : mapping
+        What `table_of` returns.
+
+    Returns
+    -------
+    dict
+        Contents of the file.
+    """
+    import tomli_w  # only who writes needs it
+
+    found = copy.copy(dict(table))
+    found["people"] = [dict(entry) for entry in table["people"]]
+    digests: dict[str, str] = {}
+    for number, entry in enumerate(found["people"], start=1):
+        if isinstance(motion := entry["motion"], Motion):
+            entry["motion"] = f"person-{number}.motion"
+            save_motion(folder / entry["motion"], motion)
+            digests[entry["motion"]] = digest_of(folder / entry["motion"])
+    found["scene"] = copy.deepcopy(found["scene"])
+    for tables in (found, found["scene"]):
+        for _, key, entry in files_of(tables):
+            if os.path.isabs(entry[key]):
+                if os.path.isfile(entry[key]):
+                    digests[_from(place, entry[key])] = digest_of(entry[key])
+                entry[key] = _from(place, entry[key])
+    files = [{"path": path, "sha256": digest} for path, digest in sorted(digests.items())]
+    found |= {"versions": versions()} | ({"files": files} if files else {})
+    (folder / "run.toml").write_text(_HEAD + tomli_w.dumps(found), encoding="utf-8")
+    return found
+
+
+def _from(place: Path, path: str) -> str:
+    """A path from the folder of the run file on, where there is a way."""
+    try:
+        return Path(os.path.relpath(path, place.absolute())).as_posix()
+    except ValueError:  # another drive
+        return path
+
+
+def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:
+    """Read a run file, and compare the files that it names with their digests.
+
+    Parameters
+    ----------
+    path : path
+        Run file.
+    changed : bool
+        Whether files may have changed.
+
+    Returns
+    -------
+    dict
+        Its tables.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, or a file has changed.
+    """
+    table = read_toml(path, "run", "give a run file, such as the run.toml of a folder")
+    if not changed:
+        check_files(path, tables_at("files", table))
+    return dict(table)
+
+
+def check_files(path: Path, entries: Iterable[tuple[str, Table]]) -> None:
+    """Raise `InputError` where a file that a run file lists is another one now."""
+    for where, entry in entries:
+        check_keys(where, entry, ("path", "sha256"), ())
+        text = check_text(where.strip(), "path", entry["path"])
+        told = f"run file '{path}': {brief(text)}"
+        cure = "give the one that it was, or go on with this one (--changed)"
+        try:
+            digest = digest_of(path.parent / text)
+        except OSError as error:
+            raise InputError(f"{told}: {error.strerror}; {cure}") from None
+        if digest != entry["sha256"]:
+            raise InputError(f"{told} has changed since; {cure}")
