@@ -6,14 +6,16 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, TypeVar, get_type_hints
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, check_number, check_order, is_real, is_whole
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 MAX_SNR_DB = 200.0
 """The largest ratio of echo and noise power, either way [dB]: float32 samples hold no more."""
@@ -276,6 +278,41 @@ class RunSettings:
         return listed | {"snr_db": "inf" if self.snr_db == math.inf else self.snr_db}
 
 
+def takes_settings(function: _Function) -> _Function:
+    """Show the settings in the signature and the text of a function that takes ``**options``.
+
+    Those are the options that the annotation ``Unpack[...]`` names, with the defaults and the texts
+    of `RunSettings`.
+    """
+    written = inspect.signature(function)
+    *others, options = written.parameters.values()
+    name = str(options.annotation).removeprefix("Unpack[").removesuffix("]")
+    taken = function.__globals__[name]
+    kinds = get_type_hints(RunSettings)
+    usual = {one.name: one.default for one in dataclasses.fields(RunSettings)}
+    named = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=None if usual[name] is dataclasses.MISSING else usual[name],
+            annotation=kinds[name],
+        )
+        for name in kinds
+        if name in taken.__annotations__
+    ]
+    own: Any = function
+    own.__signature__ = written.replace(parameters=[*others, *named])
+    if function.__doc__:  # Python may have left them out
+        texts = "".join(
+            f"{', '.join(kept)} : {kind}\n{text}"
+            for names, kind, text in _documented()
+            if (kept := [name for name in names if name in taken.__annotations__])
+        )
+        before, _, after = inspect.cleandoc(function.__doc__).partition("**options\n")
+        own.__doc__ = before + texts + after[after.index("\n\n") + 1 :]
+    return function
+
+
 def settings_of(caller: str, taken: type, options: Mapping[str, Any]) -> RunSettings:
     """Return the settings that a function is given; InputError if one is none of those it takes.
 
@@ -320,9 +357,15 @@ def check_fidelities(names: Sequence[str]) -> None:
 
 def setting_texts() -> dict[str, tuple[str, str]]:
     """Return the type and the first sentence of each parameter that `RunSettings` documents."""
-    section = inspect.cleandoc(RunSettings.__doc__ or "").partition("----------\n")[2]
     found: dict[str, tuple[str, str]] = {}
-    for names, kind, text in re.findall(r"^(\w[\w, ]*) : (.+)\n((?:    .+\n)+)", section, re.M):
+    for names, kind, text in _documented():
         sentence = re.split(r"\.(?: |$)", " ".join(text.split()))[0].replace("`", "")
-        found |= dict.fromkeys(names.split(", "), (kind, sentence))
+        found |= dict.fromkeys(names, (kind, sentence))
     return found
+
+
+def _documented() -> list[tuple[list[str], str, str]]:
+    """Names, type and text of the parameters that `RunSettings` documents."""
+    section = inspect.cleandoc(RunSettings.__doc__ or "").partition("----------\n")[2]
+    found = re.findall(r"^(\w[\w, ]*) : (.+)\n((?:    .+\n)+)", section, re.M)
+    return [(names.split(", "), kind, text) for names, kind, text in found]

@@ -64,7 +64,7 @@ def run_into(small_file: Path) -> Runner:
     """Runs a small simulation into a folder, with more words, and gives the exit status."""
 
     def run_into(out: Path, *more: str) -> int:
-        words = ["synthetic:kick", "--duration", "0.2", "--fidelity", "analytic", "--no-pictures"]
+        words = ["synthetic:walk", "--duration", "0.2", "--fidelity", "analytic", "--no-pictures"]
         return main(["run", *words, *more, "--radar", str(small_file), "--out", str(out)])
 
     return run_into
@@ -189,7 +189,7 @@ def test_compare_and_its_runs_replace_their_own_and_refuse_the_users(
 ) -> None:
     words = [
         "compare",
-        "synthetic:kick",
+        "synthetic:walk",
         "--duration",
         "0.2",
         "--fidelities",

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
+from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
-from rtradar.pipeline.prepare import Moving, prepare
+from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
 from rtradar.process import (
@@ -42,7 +43,7 @@ class Capture(NamedTuple):
 
 
 def capture_of(
-    people: Moving,
+    people: Movers,
     radar: Radar,
     scene: Scene,
     keep: Sequence[str],

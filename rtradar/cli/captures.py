@@ -69,10 +69,8 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Option of each setting; `RunSettings` has the texts, choices and defaults."""
 
-_ONLY_RUN = (
-    "fidelity", "clutter_removal", "body_material", "detector", "detector_options", "order",
-    "keep_all", "path_tolerance_db", "save_if",
-)  # fmt: skip
+_ONLY_RUN = ("fidelity", "save_if")
+"""Settings that `compare` does not take."""
 
 
 def add(commands: Subcommands) -> None:
@@ -119,14 +117,6 @@ def _add_run(run: OneLineParser) -> None:
         "X",
         "largest rms error of the field, over its rms, that the level auto accepts",
         type=number,
-    )
-    run.add_argument(
-        "--model-option",
-        type=setting,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="option of the model, such as visibility=gradual of specular; may be given again",
     )
     run.add_argument(
         "--no-pictures",
@@ -207,7 +197,15 @@ def _add_capture(command: OneLineParser) -> None:
         default=[],
     )
     command.flag("--changed", "go on where a file that the run file names is another one now")
-    add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
+    add_settings(command, [*(name for name in _FLAGS if name not in _ONLY_RUN), "detector_options"])
+    command.add_argument(
+        "--model-option",
+        type=setting,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="option of the model, such as visibility=gradual of specular; may be given again",
+    )
     command.add_argument(
         "--no-spreading",
         dest="spreading",
@@ -276,11 +274,9 @@ def _run(options: argparse.Namespace) -> int:
     from rtradar.pipeline import run
     from rtradar.pipeline.timing import lines_shown
 
-    model_options = dict(capture["model_options"]) | dict(options.model_option)
     for name in ("tolerance_db", "tolerance_complex"):
         if getattr(options, name) is not None:
-            model_options[name] = getattr(options, name)
-    capture["model_options"] = model_options
+            capture["model_options"][name] = getattr(options, name)
     with lines_shown():
         summary = run(**capture, pictures=options.pictures).summary
     tell(options, summary)
@@ -346,6 +342,7 @@ def _compare(options: argparse.Namespace) -> int:
     from rtradar.pipeline import compare, compare_recordings
     from rtradar.pipeline.timing import lines_shown
 
+    capture.pop("fidelity")
     with lines_shown():
         if several:
             found = compare_recordings(capture.pop("motion"), **capture, fidelities=fidelities)
@@ -375,6 +372,8 @@ def _compare_folders(options: argparse.Namespace) -> int:
     if options.json is not None:
         write_json(options.json, found.summary)
     say(options, found.table())
+    for key, values in found.summary["differ"].items():
+        say(options, f"{key}: " + ", ".join(f"{own} ({name})" for name, own in values.items()))
     _show(options, "compare.html")
     return 0
 
@@ -402,7 +401,9 @@ def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, A
         table = with_value(table, key, value)
     parts: Parts = parts_of(table, run_file.parent if run_file else Path())
     people: list[Any] = [*parts.people] or _people(options, parts.settings, skeletons)
-    return vars(parts.settings) | {
+    settings = vars(parts.settings)
+    return settings | {
+        "model_options": dict(settings["model_options"]) | dict(options.model_option),
         "motion": people,
         "radar": parts.radar,
         "scene": parts.scene,

@@ -14,6 +14,7 @@ from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.motion.formats.saved import save_motion
 from rtradar.motion.synthetic import ACTORS
+from rtradar.recordings import SYNTHETIC
 from rtradar.scene.scene import files_of
 from rtradar.system.checks import Table, brief, check_keys, check_text, read_toml, tables_at
 from rtradar.system.files import digest_of
@@ -103,6 +104,52 @@ def _from(place: Path, path: str) -> str:
         return Path(os.path.relpath(path, place.absolute())).as_posix()
     except ValueError:  # another drive
         return path
+
+
+def in_words(table: Table) -> dict[str, Any]:
+    """Return the tables of a run, with words for motions that no file holds, and the versions."""
+    people = [
+        entry | {"motion": f"{motion.name}, in memory"}
+        if isinstance(motion := entry["motion"], Motion)
+        else entry
+        for entry in table["people"]
+    ]
+    return {**table, "people": people, "versions": versions()}
+
+
+def refuse_another(out: Path, table: Table) -> None:
+    """Raise `InputError` where a folder holds a run of somebody else, who is another recording.
+
+    Of a run of the same people with other settings only the results are replaced.
+    """
+    try:
+        there = read_toml(out / "run.toml", "run", "")
+    except InputError:
+        return
+    before, now = _who(there, out), _who(table, Path())
+    if before != now:
+        raise InputError(
+            f"'{out}' holds a run of {_names(before)}, and this is one of {_names(now)}; give "
+            "another folder, or replace it (--overwrite)"
+        )
+
+
+def _who(table: Table, folder: Path) -> list[tuple[str, object]]:
+    """What moves: the file or the actor of each person, with the seed."""
+    found: list[tuple[str, object]] = []
+    for _, entry in tables_at("people", table):
+        motion = entry.get("motion")
+        if not isinstance(motion, str):
+            found.append((f"{getattr(motion, 'name', motion)}", None))
+        elif motion.startswith(SYNTHETIC):
+            found.append((motion, entry.get("seed")))
+        else:
+            found.append((os.path.normpath(folder.absolute() / motion), None))
+    return found
+
+
+def _names(who: list[tuple[str, object]]) -> str:
+    return " and ".join(Path(name).name for name, _ in who) or "nobody"
 
 
 def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:

@@ -17,13 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from rtradar.body import Person
+from rtradar.description import Movers, Moving, given_parts
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.labelled_echoes import compared_echoes
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.pipeline.prepare import Moving, power_alone, prepare
+from rtradar.pipeline.prepare import power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.pipeline.view import load_run_view
@@ -36,7 +37,13 @@ from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings, check_fidelities, settings_of
+from rtradar.settings import (
+    RunOptions,
+    RunSettings,
+    check_fidelities,
+    settings_of,
+    takes_settings,
+)
 from rtradar.system.checks import check_path
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles, atomic_folder
@@ -122,10 +129,11 @@ class Comparison:
         )
 
 
+@takes_settings
 def compare(
     motion: Moving,
-    radar: Radar,
-    scene: Scene | None = None,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
     *,
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
@@ -169,23 +177,23 @@ def compare(
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     asked = settings = settings_of("compare", RunOptions, options)
-    there = Scene() if scene is None else scene
+    moving, before, there = given_parts(motion, radar, scene, settings)
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         occluded: dict[str, _Occluded] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = run_into(folder / name, motion, radar, there, own)
-            occluded[name] = _occluded(results[name], motion, radar, there, own)
+            results[name] = run_into(folder / name, moving, before, there, own)
+            occluded[name] = _occluded(results[name], moving, before, there, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
-        summary = _summary(results, occluded, radar, names[-1])
+        summary = _summary(results, occluded, before, names[-1])
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
-            other = run_into(Path(again, "again"), motion, radar, there, own, pictures=False)
-            summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]], radar)
-        pictures, unit = _draw(results, occluded, folder, radar, names[-1])
+            other = run_into(Path(again, "again"), moving, before, there, own, pictures=False)
+            summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]], before)
+        pictures, unit = _draw(results, occluded, folder, before, names[-1])
         views = {name: load_run_view(folder / name) for name in names}
         comparison.write_comparison(
             folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
@@ -194,16 +202,17 @@ def compare(
 
     def captures() -> dict[str, Capture]:
         return {
-            name: prepare(motion, radar, there, replace(asked, fidelity=name)) for name in names
+            name: prepare(moving, before, there, replace(asked, fidelity=name)) for name in names
         }
 
     return Comparison(summary, Path(out), _captures=captures)
 
 
+@takes_settings
 def compare_recordings(
     motions: Sequence[Moving],
-    radar: Radar,
-    scene: Scene | None = None,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
     *,
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
@@ -270,8 +279,12 @@ def compare_recordings(
 
 def _file_name(motion: Moving) -> str:
     """Return the name of a recording as one of a file."""
-    everyone = motion if isinstance(motion, Sequence) else [motion]
-    names = [one.motion.name if isinstance(one, Person) else one.name for one in everyone]
+    alone = isinstance(motion, str | Path) or not isinstance(motion, Sequence)
+    everyone: Any = [motion] if alone else motion
+    names = [
+        one.motion.name if isinstance(one, Person) else getattr(one, "name", str(one))
+        for one in everyone
+    ]
     return re.sub(r"[^\w.-]+", "-", "-".join(names))[:40]
 
 
@@ -351,7 +364,7 @@ class _Occluded(NamedTuple):
 
 
 def _occluded(
-    result: Result, motion: Moving, radar: Radar, scene: Scene, settings: RunSettings
+    result: Result, motion: Movers, radar: Radar, scene: Scene, settings: RunSettings
 ) -> _Occluded:
     """Compare the echo power of each part with that which the same level has of it alone."""
     seen = _budget(result).power_at

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -115,13 +115,37 @@ def compare_folders(
     for folder in read.values():
         _check_axes(folder, reference)
     found = {name: _figures(folder, reference) for name, folder in read.items()}
-    summary = {"reference": names[-1], "folders": found}
+    # What was measured has no run file.
+    runs = {name: own for name, folder in read.items() if (own := folder.summary.get("run"))}
+    summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
     with atomic_folder(Path(out), _FILES, overwrite=overwrite) as place:
         pictures = _draw(read, place)
         rows = comparison_rows(summary, _ROWS)
         comparison.write_folders(place / "compare.html", summary, rows, pictures)
         write_figures(place, summary, _FILES, _ROWS)
     return Comparison(summary, Path(out), _ROWS)
+
+
+def differing(runs: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the keys of run files whose values are not the same in all, with these by name."""
+    flat = {name: dict(_flat(run)) for name, run in runs.items()}
+    keys = dict.fromkeys(key for own in flat.values() for key in own)
+    found = {key: {name: own.get(key) for name, own in flat.items()} for key in keys}
+    return {
+        key: values
+        for key, values in found.items()
+        if any(value != next(iter(values.values())) for value in values.values())
+    }
+
+
+def _flat(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield each value of tables in tables with its dotted key; versions are no settings."""
+    entries = value.items() if isinstance(value, Mapping) else enumerate(value)
+    for name, own in entries:
+        if key or name not in ("versions", "files"):
+            where = f"{key}.{name}" if key else str(name)
+            tables = isinstance(own, list) and own and isinstance(own[0], dict)
+            yield from _flat(own, where) if isinstance(own, dict) or tables else [(where, own)]
 
 
 def _check_axes(folder: _Folder, reference: _Folder) -> None:

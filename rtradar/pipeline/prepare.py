@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,10 +12,10 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body, Person
 from rtradar.body.people import body_of_people
+from rtradar.description import Movers
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
 from rtradar.pipeline.processing import Processing
@@ -36,23 +35,18 @@ from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
 from rtradar.signal.phase_noise import mean_delays
 from rtradar.signal.receiver import Expected, Mover, ReceiverStage
-from rtradar.system.checks import brief
 from rtradar.system.threads import one_blas_thread
-
-Moving = Motion | Person | Sequence[Motion | Person | Object]
-"""Who and what moves: one or several, with a bare motion for a person where the scene puts them."""
 
 _CREST = 9.0
 """Power of people's samples at their peak over its mean: the echoes of parts add up by chance."""
 
 
 @one_blas_thread()
-def prepare(moving: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
+def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
     """Place people before a radar and settle everything that the first echo needs.
 
     Errors are those of `rtradar.run`.
     """
-    check_radar(radar)
     scene, everyone = people_in(scene, moving)
     _refuse_together(radar, scene, settings)
     reuse_freed_memory()
@@ -160,25 +154,11 @@ def _surveyed(
     return replace(budget, limits=(*budget.limits, *limits)), said
 
 
-def check_radar(radar: object) -> None:
-    """Raise InputError unless this is a radar."""
-    if not isinstance(radar, Radar):
-        raise InputError(
-            f"radar = {brief(radar)}; it must be a Radar, such as rt.Radar.preset('paper-12ghz')"
-        )
-
-
-def people_in(scene: Scene, given: Moving) -> tuple[Scene, tuple[Person, ...]]:
+def people_in(scene: Scene, several: Movers) -> tuple[Scene, tuple[Person, ...]]:
     """Return a scene with the objects that are given, and everyone in it: the scene's come last.
 
-    A bare motion is a person where the scene puts them. InputError if there is nobody, or the scene
-    is none.
+    A bare motion is a person where the scene puts them. InputError if there is nobody.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(
-            f"scene = {brief(scene)}; it must be a Scene, such as rt.Scene.load('living-room')"
-        )
-    several = given if isinstance(given, Sequence) else (given,)
     objects = tuple(one for one in several if isinstance(one, Object))
     if objects:
         scene = replace(scene, objects=objects + scene.objects)
@@ -223,7 +203,7 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
 
 
 def power_alone(
-    moving: Moving, radar: Radar, scene: Scene, settings: RunSettings
+    moving: Movers, radar: Radar, scene: Scene, settings: RunSettings
 ) -> NDArray[np.float64] | None:
     """Power (time, part) of each part, alone in free space, at the times of the `LinkBudget` [m^2].
 

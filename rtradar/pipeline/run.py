@@ -7,7 +7,14 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
 
-from rtradar.description import write_run_file
+from rtradar.description import (
+    Movers,
+    Moving,
+    given_parts,
+    in_words,
+    refuse_another,
+    write_run_file,
+)
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
@@ -19,7 +26,7 @@ from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
-from rtradar.pipeline.prepare import Moving, check_radar, people_in, prepare
+from rtradar.pipeline.prepare import people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
@@ -28,7 +35,7 @@ from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings, settings_of
+from rtradar.settings import RunOptions, RunSettings, settings_of, takes_settings
 from rtradar.system.checks import check_path
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
@@ -36,10 +43,11 @@ from rtradar.trace.rays import rays_traced
 _MOMENTS = 100, 20.0  # of the moving body on the page, and as many a second at most
 
 
+@takes_settings
 def run(
     motion: Moving,
-    radar: Radar,
-    scene: Scene | None = None,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
     *,
     out: str | Path | None = None,
     overwrite: bool = False,
@@ -50,13 +58,14 @@ def run(
 
     Parameters
     ----------
-    motion : Motion, Person, or sequence of them and of Object
+    motion : Motion, Person, str, path, or sequence of them and of Object
         Who moves: a recording, which the run places where the scene has its person, people with
-        places of their own, or several of these, and objects beside those of the scene.
-    radar : Radar
-        Radar, which the scene puts at its position.
-    scene : Scene, optional
-        Walls and furniture around the person; free space if left out.
+        places of their own, or several of these, and objects beside those of the scene. Text is
+        the path of a recording, or ``synthetic:`` and an activity.
+    radar : Radar, str or path
+        Radar, which the scene puts at its position, or what `Radar.load` takes.
+    scene : Scene, str or path, optional
+        Walls and furniture around the person, or what `Scene.load` takes; free space if left out.
     out : path, optional
         Folder for maps, clouds, pictures, report and summary, which is made if it does not exist.
         The files of an earlier run that its ``summary.json`` lists are replaced or removed; all
@@ -95,26 +104,18 @@ def run(
     (3, None)
     """
     settings = settings_of("run", RunOptions, options)
+    parts = given_parts(motion, radar, scene, settings)
     if out is None:
-        return _run_in_memory(motion, radar, Scene() if scene is None else scene, settings)
-    return run_into(
-        check_path("out", out),
-        motion,
-        radar,
-        Scene() if scene is None else scene,
-        settings,
-        overwrite,
-        pictures,
-    )
+        return _run_in_memory(*parts, settings)
+    return run_into(check_path("out", out), *parts, settings, overwrite, pictures)
 
 
-def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
+def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
     if settings.save_if:
         raise InputError(
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
-    check_radar(radar)
     refuse_large_maps(people_in(scene, motion)[1], radar, settings)
     started, rays_before = _start()
     capture = prepare(motion, radar, scene, settings)
@@ -125,13 +126,15 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
         maps.load()
         _add_room(summary, capture, maps)
         truth = read_truth(file)
+    described = capture.described()
+    summary["run"] = in_words(described)
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
         summary=finished(summary | cost_of(capture, started)),
         radar=capture.radar,
         link_budget=capture.link_budget,
-        experiment=Experiment(capture.described()),
+        experiment=Experiment(described),
         _in_memory=maps,
         _truth=truth,
         _table=table,
@@ -140,7 +143,7 @@ def _run_in_memory(motion: Moving, radar: Radar, scene: Scene, settings: RunSett
 
 def run_into(
     out: Path,
-    motion: Moving,
+    motion: Movers,
     radar: Radar,
     scene: Scene,
     settings: RunSettings,
@@ -151,6 +154,9 @@ def run_into(
     started, rays_before = _start()
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
+    described = capture.described()
+    if not overwrite:
+        refuse_another(out, described)
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
@@ -165,7 +171,6 @@ def run_into(
                 drawn = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
-        described = capture.described()
         summary["run"] = write_run_file(folder, out, described)
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(table))

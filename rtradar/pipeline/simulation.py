@@ -5,30 +5,33 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.description import Moving, given_parts
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.output.labelled_echoes import chirps_between, labelled_echoes
-from rtradar.pipeline.prepare import Moving, prepare
+from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import block_chirps
 from rtradar.radar import Radar
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import SimulationOptions, settings_of
+from rtradar.settings import SimulationOptions, settings_of, takes_settings
 from rtradar.signal.multiplexing import chirps_together
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+@takes_settings
 def simulate(
     motion: Moving,
-    radar: Radar,
-    scene: Scene | None = None,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
     **options: Unpack[SimulationOptions],
 ) -> Simulation:
     """Prepare the simulation of a recording, which gives IF samples when it is asked for them.
@@ -63,7 +66,7 @@ def simulate(
     2400
     """
     settings = settings_of("simulate", SimulationOptions, options)
-    return Simulation(prepare(motion, radar, Scene() if scene is None else scene, settings))
+    return Simulation(prepare(*given_parts(motion, radar, scene, settings), settings))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

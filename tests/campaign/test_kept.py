@@ -114,7 +114,7 @@ def test_clouds_are_those_of_a_run(folder: Path, options: dict[str, Any]) -> Non
     taken: Any = {"variant": "cpu", "fidelity": "analytic", "start_s": 0.1, "duration_s": 0.2}
     taken |= options
     result = rt.run(motion, radar, **taken)
-    clouds = capture_of(motion, radar, rt.Scene(), (), **taken).clouds
+    clouds = capture_of([motion], radar, rt.Scene(), (), **taken).clouds
     np.testing.assert_array_equal(clouds.rdt.points, result.points)
     np.testing.assert_array_equal(clouds.spatial.points, result.spatial.points)
     assert len(clouds.rdt.points)

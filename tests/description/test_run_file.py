@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
 import tomllib
 from pathlib import Path
@@ -263,3 +264,50 @@ def test_people_recorded_together_keep_their_places() -> None:
     np.testing.assert_allclose(turned.at([0.2])[0][0], np.stack([1 - y, x, z], 1), atol=1e-12)
     with pytest.raises(rt.InputError, match="placement = 'here'; allowed: standard, recorded"):
         rt.Person(walk, placement="here")
+
+
+# -- names, and other runs -------------------------------------------------------------------------
+
+
+def test_names_and_paths_are_taken_and_signatures_list_every_setting(recording: Path) -> None:
+    options: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.1}
+    named = rt.run(str(recording / "walk.npz"), "paper-12ghz", "free-space", **options)
+    made = rt.run(rt.load_motion(recording / "walk.npz"), rt.Radar.preset("paper-12ghz"), **options)
+    np.testing.assert_array_equal(named.points, made.points)
+    assert rt.simulate("synthetic:walk", "paper-12ghz", **options).duration_s > 0.09
+    for function in (rt.run, rt.compare):
+        parameters = inspect.signature(function).parameters
+        for field in dataclasses.fields(RunSettings):
+            assert parameters[field.name].kind is inspect.Parameter.KEYWORD_ONLY
+    assert inspect.signature(rt.run).parameters["snr_db"].default == 20.0
+    assert "pfa" not in inspect.signature(rt.simulate).parameters
+    for wrong in ((5, "paper-12ghz"), ("synthetic:walk", 5), ("synthetic:walk", "paper-12ghz", 5)):
+        with pytest.raises(rt.InputError):
+            rt.run(*wrong, **options)  # type: ignore[arg-type]
+
+
+def test_a_run_of_somebody_else_is_not_replaced_unasked(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["--duration", "0.1", "--fidelity", "analytic", "--no-pictures", "--quiet"]
+    assert main(["run", "synthetic:walk", *words, "--out", str(out)]) == 0
+    assert main(["run", "synthetic:walk", *words, "--snr-db", "3", "--out", str(out)]) == 0
+    before = (out / "maps.h5").read_bytes()
+    with pytest.raises(rt.InputError, match=r"holds a run of synthetic:walk.*--overwrite"):
+        rt.run("synthetic:kick", "paper-12ghz", out=out, **QUICK)
+    assert (out / "maps.h5").read_bytes() == before
+    rt.run("synthetic:kick", "paper-12ghz", out=out, overwrite=True, **QUICK)
+
+
+def test_folders_are_compared_setting_by_setting(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    walk = rt.synthetic_motion("walk", duration_s=0.3)
+    for name, pitch_deg in (("level", 0.0), ("tilted", -10.0)):
+        radar = dataclasses.replace(RADAR, pitch_deg=pitch_deg)
+        rt.run(walk, radar, out=tmp_path / name, **QUICK)
+    folders = [str(tmp_path / name) for name in ("level", "tilted")]
+    assert main(["compare", *folders, "--out", str(tmp_path / "both")]) == 0
+    said = capsys.readouterr().out
+    assert "radar.pitch_deg: 0.0 (level), -10.0 (tilted)" in said
+    assert said.count("(tilted)") == 1
+    assert "Settings that differ" in (tmp_path / "both" / "compare.html").read_text()

@@ -149,12 +149,16 @@ def test_bad_values_are_refused_and_leave_nothing(
 
 
 def test_what_is_no_radar_and_no_scene_is_refused(kick: rt.Motion, small: rt.Radar) -> None:
-    for wrong in ("paper-12ghz", None):
+    for wrong in (12, None):
         with pytest.raises(InputError, match=r"radar = .*rt.Radar.preset"):
             rt.run(kick, wrong)  # type: ignore[arg-type]
-    for other in ("living-room", ""):
-        with pytest.raises(InputError, match=r"scene = .*rt.Scene.load"):
-            rt.simulate(kick, small, other)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"scene = .*rt.Scene.load"):
+        rt.simulate(kick, small, 5)  # type: ignore[arg-type]
+    for wrong_name in ("paper", ""):
+        with pytest.raises(InputError, match="allowed"):
+            rt.run(kick, wrong_name)
+        with pytest.raises(InputError, match="allowed"):
+            rt.simulate(kick, small, wrong_name)
 
 
 def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(

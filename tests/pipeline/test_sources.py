@@ -61,7 +61,7 @@ def test_expected_power_is_that_of_the_map() -> None:
     """Of one person without noise: interference leaves decibels in a cell, and none in the sum."""
     result = rt.run(WALKER, RADAR, duration_s=0.15, snr_db=60)
     settings = RunSettings(duration_s=0.15, snr_db=60)
-    capture = prepare(WALKER, RADAR, rt.Scene(), settings)
+    capture = prepare([WALKER], RADAR, rt.Scene(), settings)
     start = int(capture.frame_starts[0])
     found = result.maps["range_doppler"].values[0]
     of_parts = Sources(EchoTable(capture)).expected(start, *np.nonzero(np.ones(found.shape)))

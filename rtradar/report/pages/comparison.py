@@ -207,11 +207,17 @@ def write_folders(
         + _wide(mapping_table({k: v for k, v in found["parameters"].items() if k != "radar"}))
         for name, found in folders.items()
     )
+    differ = [
+        (key, *(str(values.get(name, "")) for name in folders))
+        for key, values in summary["differ"].items()
+    ]
+    apart = _wide(table(differ, ("setting", *folders))) if differ else "<p>None differs.</p>"
     sections = {
         "measures": (
             "What differs",
             _wide(table(rows[1:], rows[0])) + _FOLDER_NOTE.format(reference),
         ),
+        "settings": ("Settings that differ", apart),
         "maps": ("Pictures", f'<div class="pictures">{drawn}</div>'),
         "parameters": ("Settings", settings),
     }
