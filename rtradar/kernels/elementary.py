@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 
 from rtradar.kernels.jit import compiled, inlined
 
@@ -36,40 +37,63 @@ def subtract(a, b, out):
 # -- phasors --
 
 
-@inlined(fastmath={"reassoc", "contract", "nsz", "arcp"})
-def fast_phasor(angle):
-    """Cosine and sine of an angle [rad], to 3e-11: Taylor's series of its half, without branches.
+def _series(first, terms, kind):
+    """Coefficients of sin(x) / x (``first`` 1) or cos(x) (0) in powers of x^2, |x| to pi / 2.
 
-    It has no quadrants to tell apart, and so fewer operations than `phasor`.
+    The first two are Taylor's, so that sines of small angles are exact. The rest is the polynomial
+    through the Chebyshev nodes, which needs fewer terms.
     """
-    turns = angle * (0.5 / math.pi)
-    half = math.pi * (turns - np.floor(turns + 0.5))
-    x = half * half
-    sine = -1 / 1307674368000 * x + 1 / 6227020800
-    sine = 1 / 362880 + x * (-1 / 39916800 + x * sine)
-    sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
-    cosine = 1 / 20922789888000 * x - 1 / 87178291200
-    cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * cosine))
-    cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
-    return 1 - 2 * sine * sine, 2 * sine * cosine
+    taylor = [(-1) ** n / math.factorial(2 * n + first) for n in range(16)]
+    rest = Chebyshev.interpolate(Polynomial(taylor[2:]), terms - 3, (0, math.pi**2 / 4))
+    return tuple(kind(value) for value in (*taylor[:2], *rest.convert(kind=Polynomial).coef))
+
+
+SINE, COSINE = _series(1, 9, np.float64), _series(0, 9, np.float64)
+SINE_32, COSINE_32 = _series(1, 6, np.float32), _series(0, 6, np.float32)
 
 
 @inlined(fastmath={"contract"})
+def horner(x, coefficients):
+    """A polynomial of x; the constant comes first."""
+    total = coefficients[-1]
+    for n in range(len(coefficients) - 2, -1, -1):
+        total = coefficients[n] + x * total
+    return total
+
+
+@inlined(fastmath={"contract"})
+def _turned(turns, pi, sines, cosines):
+    """Cosine and sine by those of half the angle: no quadrants, no branches."""
+    half = pi * (turns - np.rint(turns))
+    x = half * half
+    sine, cosine = half * horner(x, sines), horner(x, cosines)
+    return cosine * cosine - sine * sine, (sine + sine) * cosine
+
+
+@inlined()
 def phasor(turns):
-    """Cosine and sine of a phase [turns], to 2e-16: Taylor's series of an eighth, no branches."""
-    quarters = np.floor(4 * turns + 0.5)
-    angle = (turns - 0.25 * quarters) * (2 * math.pi)
-    x = angle * angle
-    sine = 1 / 362880 + x * (-1 / 39916800 + x * (1 / 6227020800 - x / 1307674368000))
-    sine = angle * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
-    cosine = 1 / 40320 + x * (
-        -1 / 3628800 + x * (1 / 479001600 + x * (-1 / 87178291200 + x / 20922789888000))
-    )
-    cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
-    quadrant = quarters - 4 * np.floor(0.25 * quarters)
-    odd = quadrant == 1 or quadrant == 3
-    across, up = (sine, cosine) if odd else (cosine, sine)
-    return -across if quadrant == 1 or quadrant == 2 else across, -up if quadrant >= 2 else up
+    """Cosine and sine of a phase [turns], to 1e-15."""
+    return _turned(turns, math.pi, SINE, COSINE)
+
+
+@inlined()
+def phasor_float32(turns):
+    """Cosine and sine of a phase [turns] in float32, to 1e-6."""
+    return _turned(turns, np.float32(math.pi), SINE_32, COSINE_32)
+
+
+@inlined()
+def fast_phasor(angle):
+    """Cosine and sine of an angle [rad], to 1e-15 and the rounding of its turns."""
+    return phasor(angle * (0.5 / math.pi))
+
+
+@inlined(fastmath={"contract"})
+def sine(angle):
+    """Sine of an angle [rad], within 1e-15 of itself where it is small."""
+    halves = np.rint(angle * (1 / math.pi))
+    rest = angle - halves * math.pi
+    return rest * horner(rest * rest, SINE) * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
 
 
 # -- blends of keyframes --

@@ -6,19 +6,14 @@ import math
 
 import numpy as np
 
+from rtradar.kernels.elementary import phasor_float32
 from rtradar.kernels.jit import compiled
 
 # Arithmetic stays in float32, and so in twice as many vector lanes, if every constant is float32.
 _ONE, _TWO, _HALF, _STEP = np.float32(1), np.float32(2), np.float32(0.5), np.float32(2.0**-31)
-_LN_2, _HALF_TURNS = np.float32(math.log(2)), np.float32(math.pi * 2.0**-32)
+_LN_2, _TURNS = np.float32(math.log(2)), np.float32(2.0**-32)
 _ROOT_HALF_BITS, _FRACTION_BITS, _FRACTION = np.int32(0x3F3504F3), 23, np.int32((1 << 23) - 1)
 _L3, _L5, _L7, _L9 = (np.float32(2 / odd) for odd in (3, 5, 7, 9))
-_S3, _S5, _S7, _S9, _S11 = (
-    np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (3, 5, 7, 9, 11)
-)
-_C2, _C4, _C6, _C8, _C10 = (
-    np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (2, 4, 6, 8, 10)
-)
 
 
 @compiled(fastmath={"contract"})
@@ -56,11 +51,5 @@ def add_noise(streams, rows, sigma, out):
                     log = z * (_TWO + x * (_L3 + x * (_L5 + x * (_L7 + x * _L9))))
                     log += np.float32(np.int32(shifted >> _FRACTION_BITS)) * _LN_2
                     radius = sigma * np.sqrt(max(-_TWO * log, np.float32(0)))
-                    # Half the angle, at most a right angle, by its Taylor series; then doubled.
-                    half = np.float32(for_angle[sample]) * _HALF_TURNS
-                    x = half * half
-                    sine = half * (_ONE + x * (_S3 + x * (_S5 + x * (_S7 + x * (_S9 + x * _S11)))))
-                    cosine = _ONE + x * (_C2 + x * (_C4 + x * (_C6 + x * (_C8 + x * _C10))))
-                    samples[sample] += complex(
-                        radius * (_ONE - _TWO * sine * sine), radius * _TWO * sine * cosine
-                    )
+                    across, up = phasor_float32(np.float32(for_angle[sample]) * _TURNS)
+                    samples[sample] += complex(radius * across, radius * up)

@@ -10,11 +10,9 @@ themselves, divided by the largest of the three.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from rtradar.kernels.elementary import fast_phasor
+from rtradar.kernels.elementary import fast_phasor, sine
 from rtradar.kernels.jit import inlined
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
@@ -46,19 +44,6 @@ def positive_fraction(a, b, c):
 
 
 @inlined(fastmath=FAST)
-def _sine(angle):
-    """Sine of an angle from 0 on, within 1e-12 of itself where it is small."""
-    halves = np.floor(angle * (1 / math.pi) + 0.5)
-    rest = angle - halves * math.pi
-    x = rest * rest
-    sine = 1 / 362880 + x * (
-        -1 / 39916800 + x * (1 / 6227020800 + x * (-1 / 1307674368000 + x / 355687428096000))
-    )
-    sine = rest * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
-    return sine * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
-
-
-@inlined(fastmath=FAST)
 def by_series(a, b):
     """Mean of exp(j phase), real and imaginary, for phases a, b and -a - b that differ little."""
     p = a * a + a * b + b * b
@@ -85,7 +70,7 @@ def _by_differences(turn, a, b, strength):
     middle = -low - high
     above, below = max(0.5 * (high - middle), 1e-30), max(0.5 * (middle - low), 1e-30)
     size = 2 * strength / (above * below * (high - low))
-    upper, lower = size * _sine(above) * below, size * _sine(below) * above
+    upper, lower = size * sine(above) * below, size * sine(below) * above
     upper_re, upper_im = fast_phasor(turn - 0.5 * low)
     lower_re, lower_im = fast_phasor(turn - 0.5 * high)
     return upper * upper_im - lower * lower_im, lower * lower_re - upper * upper_re

@@ -6,25 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rtradar.kernels.elementary import fast_phasor
 from rtradar.kernels.scatter.triangles import (
     SERIES,
-    _sine,
     mean_of_phasor,
     positive_fraction,
     sum_large,
     sum_small,
 )
-
-
-def test_series_of_sine_and_cosine_are_as_exact_as_they_say() -> None:
-    angle = np.linspace(-300.0, 300.0, 20_011)
-    cosine, sine = fast_phasor(angle)
-    np.testing.assert_allclose(cosine + 1j * sine, np.exp(1j * angle), rtol=0, atol=3e-11)
-    positive = np.concatenate([np.logspace(-9, 0, 50), np.linspace(1.0, 300.0, 10_007)])
-    np.testing.assert_allclose(_sine(positive), np.sin(positive), rtol=0, atol=1e-12)
-    small = positive[positive < 1.5]
-    np.testing.assert_allclose(_sine(small) / small, np.sin(small) / small, rtol=1e-12)
 
 
 def quadrature(mean: float, u: float, v: float, k: float) -> complex:
