@@ -1,222 +1,408 @@
 """The sum of many tones: each spread over a few cells of a grid of beat frequencies, and one FFT.
 
-A nonuniform FFT of type 1 (Dutt and Rokhlin, SIAM J. Sci. Comput. 14, 1993; Greengard and Lee, SIAM
-Review 46, 2004), with a Gaussian. Its work grows with echoes times taps, not with echoes times
-samples. An amplitude that is a parabola of frequency costs no further FFT: a power of the sample
-number is a derivative with respect to the beat, so the Gaussian of such an echo is multiplied by a
-parabola of the distance from it. Sums are float32, for samples that are kept as such; phases are
-float64.
+A nonuniform FFT of type 1 (Dutt and Rokhlin, SIAM J. Sci. Comput. 14, 1993), whose windows are
+fitted to what undoes Kaiser and Bessel's. Its work grows with tones times taps, not with tones
+times samples. An amplitude that changes over the sweep costs no further FFT: it is a sum of
+Legendre polynomials P_k(x) of the place in the sweep, x = 2 (n - n_samples // 2) / n_samples, and
+the product of each with a tone has a window of its own, real for even k and imaginary for odd.
+
+Tones are given chirp by chirp, which are summed to 1e-6, or at anchors, instants some cycles apart
+between which lengths and amplitudes are cubics in time, which are summed to -60 dB: enough for
+ghosts, which are weaker than what they are ghosts of. Sums are float32.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Legendre
 from numpy.typing import NDArray
 from scipy import fft
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.elementary import phasor
+from rtradar.kernels.elementary import phasor, phasor_float32
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.tone_sum import Tones
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
-_POWERS = 3
-"""Powers of the sample number that one grid takes, for an amplitude at three frequencies."""
+ANCHORS = 4
+"""Anchors around a chirp through which the cubic goes."""
 
-_CUBIC = (0.0, -6.0, 0.0, 32.0)
-"""Chebyshev's polynomial over the chirp, by which polynomials of more powers are divided: quotient
-and remainder hardly cancel, so that float32 holds both."""
+MOST_NODES, LEAST_SAMPLES = 6, 16
+"""Frequencies at which amplitudes may be given, and samples of a chirp, for sums to 1e-6: with more
+terms in fewer cells float32 rounds by more."""
 
-MOST_NODES = 6
-"""Frequencies at which amplitudes may be given: two grids."""
-
-_TAPS = 16
-"""Cells over which an echo is spread: with twice as many cells as samples what is cut off is 1e-8
-of the echo over a chirp (rms), and 6e-8 at its ends."""
-
-LEAST_SAMPLES = _TAPS
-"""Samples of a chirp; with fewer an echo would go round the grid more than once."""
-
-_BEFORE = _TAPS // 2 - 1
-"""Cells before that of the echo."""
+_FINE, _COARSE = (16, 2.0), (8, 1.25)
+"""Cells over which a tone is spread, and the least number of cells for each sample, for sums to
+1e-6 and to -60 dB. With fewer cells float32 would not do for 1e-6: weights would be up to 1600
+times as large at the ends of the chirp as in the middle."""
 
 _PLACES = 1024
-"""Places in a cell at which the Gaussian is tabulated; linear steps from there are off by 1e-7."""
+"""Places in a cell at which windows are tabulated. From the nearest a tone is off by up to 1.2e-3
+at the ends of the chirp, on the coarse grid; with a linear step from there by 3e-7 on the other."""
 
-_CHIRPS_AT_ONCE = 48
+_FITTED, _PLACES_AT_ONCE = 65, 16
+"""Most samples over which windows are fitted, and places for which they are at once."""
+
+_CHIRPS_AT_ONCE = 24
 """Chirps whose grids stay in the processor's cache between spreading and FFT."""
 
 
-class _Gaussian(NamedTuple):
-    """``values (place, tap)`` around an echo, their variance [cells^2], and ``weights (sample,)``.
+class Anchors(NamedTuple):
+    """Echoes at the anchors of each Tx, receivers side by side.
 
-    The weights undo the Gaussian after the FFT.
+    ``length (anchor, tx, rx, echo)`` float64 [m], ``level (2, anchor, tx, rx, echo)`` float32, real
+    and imaginary parts of mean amplitudes over the sweep [m]. Those of the last echoes change by
+    ``change[0] P_1(x) + change[1] P_2(x) (2, 2, anchor, tx, rx, changing)``.
     """
 
-    values: NDArray[np.float32]
-    variance: float
-    weights: NDArray[np.float32]
+    length: NDArray[np.float64]
+    level: NDArray[np.float32]
+    change: NDArray[np.float32]
+
+
+class BetweenAnchors(NamedTuple):
+    """Where chirps are between anchors, and their sweep.
+
+    Each chirp has the number of the ``first (chirp,)`` of its `ANCHORS` anchors and their ``weight
+    (chirp, 4)``, its ``tx``, and the ``carrier`` on which it starts [Hz]. All have a slope [Hz/s]
+    and a sample rate [Hz].
+    """
+
+    first: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    tx: NDArray[np.int64]
+    carrier: NDArray[np.float64]
+    slope: float
+    sample_rate: float
 
 
 def sum_by_nufft(tones: Tones, out: NDArray[np.complex64]) -> None:
     """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it [m].
 
-    The tones have at most `MOST_NODES` nodes, and powers of the sample number that count from the
-    first sample; each chirp has `LEAST_SAMPLES` or more.
+    The weights of the tones, for `MOST_NODES` nodes at most, are those of Legendre polynomials;
+    each chirp has `LEAST_SAMPLES` or more.
     """
-    chirps, receivers, samples = out.shape
-    cells, half = fft.next_fast_len(2 * samples), samples // 2
-    gaussian = _gaussian(samples, cells)
-    weights, fraction = gaussian.weights, (np.arange(samples) - half) / samples
-    cubic = np.polynomial.polynomial.polyval(fraction, _CUBIC).astype(np.float32)
-    parabolas = _parabolas(tones.powers, half / samples)
-    for first in range(0, chirps, _CHIRPS_AT_ONCE):
-        some = slice(first, min(first + _CHIRPS_AT_ONCE, chirps))
-        sums = out[some]
-        sums[:] = 0
-        # One type and layout, or Numba would compile for each that comes.
-        amplitude = np.ascontiguousarray(tones.amplitude[:, some], dtype=np.complex64)
-        for number, parabola in enumerate(parabolas):
-            own = tones._replace(length=tones.length[some], amplitude=amplitude, powers=parabola)
-            grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
-            in_threads(_spread_tones, len(grid), own, half, samples, gaussian, grid)
-            summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
-            if number > 0:
-                sums *= cubic
-            sums[..., :half] += summed[..., cells - half :] * weights[:half]
-            sums[..., half:] += summed[..., : samples - half] * weights[half:]
+    out[:] = 0
+    # One type and layout, or Numba would compile for each that comes.
+    amplitude = np.ascontiguousarray(tones.amplitude, dtype=np.complex64)
+    own = tones._replace(amplitude=amplitude, weights=tones.weights.astype(np.float32))
+    windows = _windows(out.shape[2], len(own.weights) + 1, *_FINE)
+    _add_sums(np.arange(len(out)), _spread_tones, (own,), windows, out)
 
 
-def _parabolas(powers: NDArray[np.float64], middle: float) -> list[NDArray[np.float64]]:
-    """The same polynomials about the middle of the chirp: one parabola (3, node), or two.
+def add_anchored_tones(
+    anchors: Anchors, between: BetweenAnchors, out: NDArray[np.complex64]
+) -> None:
+    """Add the sum of the tones to ``out (chirp, rx, sample)`` [m].
 
-    The first of two is to be multiplied by `_CUBIC` before the second is added.
+    Tones whose beat frequency lies outside [0, sample rate) add nothing.
     """
-    nodes = powers.shape[1]
-    shifted = np.zeros((2 * _POWERS, nodes))
-    for low in range(len(powers)):
-        for high in range(low, len(powers)):
-            shifted[low] += math.comb(high, low) * middle ** (high - low) * powers[high]
-    parts = np.zeros((2, _POWERS, nodes))
-    for node, column in enumerate(shifted.T):
-        for part, own in zip(parts, np.polynomial.polynomial.polydiv(column, _CUBIC), strict=True):
-            part[: np.size(own), node] = own
-    return list(parts) if len(powers) > _POWERS else [parts[1]]
+    windows = _windows(out.shape[2], 1 + len(anchors.change), *_COARSE)
+    # Chirps of one Tx and of the same anchors in turn, so that these stay in the cache.
+    order = np.lexsort((between.first, between.tx))
+    _add_sums(order, _spread_anchored, (anchors, between), windows, out)
+
+
+class _Windows(NamedTuple):
+    """``values (term, place, tap)`` of tones times P_k(x), less a factor j of odd terms.
+
+    They are for a grid of so many ``cells``. After the FFT, samples are to be multiplied by
+    ``weights (sample,)``.
+    """
+
+    cells: int
+    values: NDArray[np.float32]
+    weights: NDArray[np.float32]
 
 
 @lru_cache
-def _gaussian(samples: int, cells: int) -> _Gaussian:
-    # So wide that what is cut off weighs as much as what folds over.
-    ratio = cells / samples
-    variance = _TAPS * ratio / (4 * math.pi * (ratio - 0.5))
-    place = (np.arange(_PLACES) + 0.5) / _PLACES
-    distance = np.arange(_TAPS) - _BEFORE - place[:, None]
-    turn = 2 * np.pi * (np.arange(samples) - samples // 2) / cells
-    weights = np.exp(variance * turn**2 / 2) / math.sqrt(2 * math.pi * variance)
-    values = np.exp(-(distance**2) / (2 * variance))
-    return _Gaussian(values.astype(np.float32), variance, weights.astype(np.float32))
+def _windows(samples: int, terms: int, taps: int, ratio: float) -> _Windows:
+    half, cells = samples // 2, fft.next_fast_len(max(math.ceil(ratio * samples), taps))
+    shape = np.pi * taps * (1 - samples / (2 * cells))
+
+    def weights(sample: NDArray[np.floating]) -> NDArray[np.float64]:
+        """One over the Fourier transform of Kaiser and Bessel's window."""
+        root = np.sqrt(shape**2 - (np.pi * taps * sample / cells) ** 2)
+        return np.asarray(np.i0(shape) * root / (taps * np.sinh(root)))
+
+    # For each place and term the values with the least squared error over the samples. No product
+    # is so large that a library for matrices has its threads share it, and rounds by their number.
+    sample = np.linspace(-half, half, min(2 * half + 1, _FITTED))[:, None]
+    tap, place = np.arange(taps) - taps // 2 + 1, (np.arange(_PLACES) + 0.5) / _PLACES
+    fit = np.linalg.pinv(weights(sample) * np.exp(2j * np.pi / cells * sample * tap), rcond=1e-15)
+    tones = np.exp(2j * np.pi / cells * sample * place.reshape(-1, 1, _PLACES_AT_ONCE))
+    values = np.empty((terms, _PLACES, taps), dtype=np.float32)
+    for term in range(terms):
+        found = fit @ (Legendre.basis(term)(2 * sample / samples) * tones)
+        own = found.imag if term % 2 else found.real
+        values[term] = own.transpose(0, 2, 1).reshape(_PLACES, taps)
+    return _Windows(cells, values, weights(np.arange(samples) - float(half)).astype(np.float32))
 
 
-@inlined()
-def _tap_polynomial(start, c0, c1, c2, width, variance, off):
-    """Coefficients of the cubic of the tap's distance that multiplies the tabulated Gaussian.
+def _add_sums(
+    order: NDArray[np.int64],
+    spread: Callable[..., None],
+    tones: tuple[Any, ...],
+    windows: _Windows,
+    out: NDArray[np.complex64],
+) -> None:
+    """Add the sums of tones to ``out (chirp, rx, sample)``, chirps in an order (chirp,).
 
-    A power of the sample number is one of the distance from the echo: constant + slant x + bend
-    x^2. The polynomial is moved to the tabulated place, ``off`` before the echo, and multiplied by
-    the Gaussian's own change from there.
+    ``spread(chirps, *tones, samples, values, grid)`` fills a grid (chirp, rx, cell), with phases
+    about the middle sample.
     """
-    bend = start * c2 * (width * width / variance)
-    constant, slant = start * c0 + bend, start * c1 * complex(0.0, -width / variance)
-    bend = -bend / variance
-    slope = off / variance
-    twist = slope * bend
-    bend, slant, constant = (
-        bend + slope * slant,
-        slant + slope * constant - 2 * off * bend,
-        constant - off * slant,
-    )
-    return constant, slant, bend, twist
+    _, receivers, samples = out.shape
+
+    def fill(begin: int) -> None:
+        chirps = order[begin : begin + _CHIRPS_AT_ONCE]
+        grid = np.empty((len(chirps), receivers, windows.cells), dtype=np.complex64)
+        spread(chirps, *tones, samples, windows.values, grid)
+        summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True)
+        _add_rows(summed, windows.weights, samples // 2, chirps, out)
+
+    thread_map(fill, range(0, len(out), _CHIRPS_AT_ONCE))
 
 
-@inlined()
-def closed_grid(real, imaginary, before, out):
-    """Fill ``out (cell,)`` with sums whose first cell is number ``before``.
+@compiled()
+def _add_rows(summed, weights, half, rows, out):
+    """Add the samples of grids to rows of ``out`` after the FFT, weighted."""
+    cells, samples = summed.shape[2], out.shape[2]
+    for i in range(len(rows)):
+        for receiver in range(out.shape[1]):
+            source, target = summed[i, receiver], out[rows[i], receiver]
+            for sample in range(half):
+                target[sample] += source[cells - half + sample] * weights[sample]
+            for sample in range(half, samples):
+                target[sample] += source[sample - half] * weights[sample]
 
-    Cells beyond an end belong to the other end.
+
+@inlined(fastmath={"contract"})
+def _turned(real, imaginary, cosine, sine, odd):
+    """Real and imaginary part of an amplitude times a phasor, and times j for an odd term."""
+    across, up = real * cosine - imaginary * sine, real * sine + imaginary * cosine
+    return (-up, across) if odd else (across, up)
+
+
+@inlined(fastmath={"contract"})
+def _spread(flat, cell, place, terms, values, grid, out):
+    """Fill ``out (cell,)`` with the windows of tones, added up in ``grid (cell + tap,)``.
+
+    Each tone has a ``cell (tone,)``, a ``place`` in it and amplitudes ``terms (2, term, tone)``,
+    real and imaginary, times its phasor. The first ``flat`` tones have the first term alone.
     """
-    cells = len(out)
-    for cell in range(before):
-        real[cells + cell] += real[cell]
-        imaginary[cells + cell] += imaginary[cell]
-    for cell in range(before, len(real) - cells):
-        real[cell] += real[cells + cell]
-        imaginary[cell] += imaginary[cells + cell]
-    for cell in range(cells):
-        out[cell] = complex(real[before + cell], imaginary[before + cell])
+    cells, taps, last = len(out), values.shape[2], terms.shape[1] - 1
+    grid[:] = 0
+    # Indices are unsigned, because checks of them would cost more than the sums.
+    for i in range(flat):
+        at, window = np.uint64(cell[i]), values[0, np.uint64(place[i])]
+        _add_window(window, at, terms[0, 0, i], terms[1, 0, i], grid)
+    for i in range(flat, len(cell)):
+        at, which = np.uint64(cell[i]), np.uint64(place[i])
+        # Two terms at a time, so that sums are read and written, and rounded, half as often.
+        for term in range(0, last, 2):
+            one, other = values[term, which], values[term + 1, which]
+            a, b = terms[0, term, i], terms[1, term, i]
+            c, d = terms[0, term + 1, i], terms[1, term + 1, i]
+            for tap in range(np.uint64(taps)):
+                real, imaginary = a * one[tap] + c * other[tap], b * one[tap] + d * other[tap]
+                grid[at + tap] += complex(real, imaginary)
+        if last % 2 == 0:
+            _add_window(values[last, which], at, terms[0, last, i], terms[1, last, i], grid)
+    # Cells beyond an end belong to the other end.
+    before = taps // 2 - 1
+    for i in range(taps):
+        if i < before:
+            grid[cells + i] += grid[i]
+        else:
+            grid[i] += grid[cells + i]
+    for i in range(cells):
+        out[i] = grid[before + i]
+
+
+@inlined(fastmath={"contract"})
+def _add_window(window, cell, real, imaginary, grid):
+    # A number of taps that the compiler knew would be written out one by one, not in vectors.
+    for tap in range(np.uint64(len(window))):
+        grid[cell + tap] += complex(real * window[tap], imaginary * window[tap])
+
+
+# -- tones chirp by chirp --
 
 
 @compiled(fastmath={"contract"})
-def _spread_tones(start, stop, tones, half, samples, gaussian, grid):
-    """Fill ``grid (chirp, rx, cell)`` with Gaussians of the tones, phases about sample ``half``.
-
-    Chirps ``start`` to ``stop`` are filled.
-    """
-    _, receivers, cells = grid.shape
+def _spread_tones(chirps, tones, samples, values, grid):
+    """Fill ``grid (chirp, rx, cell)`` with the windows of the tones of some chirps."""
+    receivers, cells = grid.shape[1:]
     nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
-    powers, variance = tones.powers, gaussian.variance
-    width = cells / (2 * math.pi * samples)
-    for chirp in range(start, stop):
-        real = np.empty(cells + _TAPS, dtype=np.float32)
-        imaginary = np.empty(cells + _TAPS, dtype=np.float32)
-        position, across, up = np.empty(echoes), np.empty(echoes), np.empty(echoes)
+    cell, place = np.empty(echoes, dtype=np.int32), np.empty(echoes, dtype=np.int32)
+    cosine, sine = np.empty(echoes, dtype=np.float32), np.empty(echoes, dtype=np.float32)
+    step = np.empty(echoes, dtype=np.float32)
+    # Of one term before the first and two after the last there is nothing.
+    amplitude = np.zeros((2, nodes + 3, echoes), dtype=np.float32)
+    terms = np.empty((2, nodes + 1, echoes), dtype=np.float32)
+    summed = np.empty(cells + values.shape[2], dtype=np.complex64)
+    per_m = 1 / SPEED_OF_LIGHT_MPS
+    cells_per_m = tones.slope * per_m / tones.sample_rate * cells
+    middle = tones.start_frequency + tones.slope * (samples // 2) / tones.sample_rate
+    for i in range(len(chirps)):
         for receiver in range(receivers):
-            real[:] = 0
-            imaginary[:] = 0
-            # Positions on the grid and phases, in vector lanes over the echoes.
+            length = tones.length[chirps[i], receiver]
             for echo in range(echoes):
-                delay = tones.length[chirp, receiver, echo] / SPEED_OF_LIGHT_MPS
-                beat = tones.slope * delay
-                position[echo] = beat / tones.sample_rate * cells
-                across[echo], up[echo] = phasor(
-                    tones.start_frequency * delay
-                    - 0.5 * beat * delay
-                    + half * beat / tones.sample_rate
-                )
-            for echo in range(echoes):
-                if not (position[echo] >= 0 and position[echo] < cells):
-                    continue
-                c0, c1, c2 = 0j, 0j, 0j
+                position = length[echo] * cells_per_m
+                received = position >= 0 and position < cells
+                position = position if received else 0.0
+                cell[echo] = np.int32(position)
+                position = (position - np.floor(position)) * _PLACES
+                place[echo] = np.int32(position)
+                # The phase at the end of the chirp, from the place that is tabulated.
+                off = position - np.floor(position) - 0.5
+                step[echo] = np.float32(off * (math.pi * samples / (_PLACES * cells)))
+                turns = length[echo] * per_m * (middle - 0.5 * tones.slope * per_m * length[echo])
+                across, up = phasor(turns)
+                cosine[echo] = np.float32(across if received else 0.0)
+                sine[echo] = np.float32(up if received else 0.0)
+            for term in range(nodes):
+                real, imaginary = amplitude[0, term + 1], amplitude[1, term + 1]
+                real[:] = 0
+                imaginary[:] = 0
                 for node in range(nodes):
-                    own = tones.amplitude[node, chirp, receiver, echo]
-                    c0 += powers[0, node] * own
-                    c1 += powers[1, node] * own
-                    c2 += powers[2, node] * own
-                cell = int(position[echo])
-                place = int((position[echo] - cell) * _PLACES)
-                known = (place + 0.5) / _PLACES
-                c, s, b, t = _tap_polynomial(
-                    complex(across[echo], up[echo]),
-                    c0,
-                    c1,
-                    c2,
-                    width,
-                    variance,
-                    position[echo] - cell - known,
-                )
-                # Real and imaginary parts in float32, in vector lanes over the taps.
-                c_re, c_im = np.float32(c.real), np.float32(c.imag)
-                s_re, s_im = np.float32(s.real), np.float32(s.imag)
-                b_re, b_im = np.float32(b.real), np.float32(b.imag)
-                t_re, t_im = np.float32(t.real), np.float32(t.imag)
-                nearest = np.float32(-_BEFORE - known)
-                taps = gaussian.values[place]
-                re, im = real[cell : cell + _TAPS], imaginary[cell : cell + _TAPS]
-                for tap in range(_TAPS):
-                    x = np.float32(tap) + nearest
-                    re[tap] += taps[tap] * (c_re + x * (s_re + x * (b_re + x * t_re)))
-                    im[tap] += taps[tap] * (c_im + x * (s_im + x * (b_im + x * t_im)))
-            closed_grid(real, imaginary, _BEFORE, grid[chirp, receiver])
+                    weight = tones.weights[term, node]
+                    own = tones.amplitude[node, chirps[i], receiver]
+                    for echo in range(echoes):
+                        real[echo] += weight * own[echo].real
+                        imaginary[echo] += weight * own[echo].imag
+                odd = term % 2 == 1
+                for echo in range(echoes):
+                    a, b = real[echo], imaginary[echo]
+                    real[echo], imaginary[echo] = _turned(a, b, cosine[echo], sine[echo], odd)
+            _step(amplitude, step, terms)
+            _spread(0, cell, place, terms, values, summed, grid[i, receiver])
+
+
+@inlined(fastmath={"contract"})
+def _step(amplitude, step, out):
+    """Fill ``out (2, term, echo)`` with amplitudes times 1 + j step x.
+
+    Before and after the ``amplitude (2, 1 + term + 1, echo)`` of all terms is a row of zeros. A sum
+    of P_(k-1) and P_(k+1) is x P_k.
+    """
+    for term in range(out.shape[1]):
+        sign = -1 if term % 2 == 1 else 1
+        less = np.float32(sign * term / (2 * term - 1))
+        more = np.float32(sign * (term + 1) / (2 * term + 3))
+        for part in range(2):
+            a, b, c = amplitude[part, term], amplitude[part, term + 1], amplitude[part, term + 2]
+            target = out[part, term]
+            for i in range(len(step)):
+                target[i] = b[i] + step[i] * (less * a[i] + more * c[i])
+
+
+# -- tones at anchors --
+
+
+@compiled(fastmath={"contract"})
+def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors):
+    """Fill `Anchors` with some echoes, ``which (kept,)``, at chirps ``start`` to ``stop``.
+
+    Each of the ``chirps (anchor, tx)`` is one of ``length (chirp, rx, echo)`` and ``amplitude
+    (node, chirp, rx, echo)``. Amplitudes are summed over the nodes by ``weights (3, node)``
+    float32, for each of Legendre's polynomials.
+    """
+    nodes, _, receivers, _ = amplitude.shape
+    lengths, level, change = anchors
+    flat, transmitters = len(which) - change.shape[5], chirps.shape[1]
+    for item in range(start, stop):
+        anchor, tx = item // transmitters, item % transmitters
+        chirp = chirps[anchor, tx]
+        for receiver in range(receivers):
+            for kept in range(len(which)):
+                echo = which[kept]
+                lengths[anchor, tx, receiver, kept] = length[chirp, receiver, echo]
+                for term in range(1 if kept < flat else 3):
+                    total = np.complex64(0)
+                    for node in range(nodes):
+                        total += weights[term, node] * amplitude[node, chirp, receiver, echo]
+                    target = level if term == 0 else change[term - 1]
+                    i = kept if term == 0 else kept - flat
+                    target[0, anchor, tx, receiver, i] = total.real
+                    target[1, anchor, tx, receiver, i] = total.imag
+
+
+@inlined()
+def _course(length, carrier, slope, cells_per_m, place, turn, steps):
+    """Places and phases of tones at the first of their anchors, and the turns to the others.
+
+    Filled are ``place`` and ``turn (echo,)`` and ``steps (3, echo)`` float32, by lengths (4, echo).
+    """
+    turns_per_m = 1 / SPEED_OF_LIGHT_MPS
+    bend = 0.5 * slope * turns_per_m
+    for echo in range(length.shape[1]):
+        own = length[0, echo]
+        before = own * turns_per_m * (carrier - bend * own)
+        place[echo] = np.float32(own * cells_per_m)
+        turn[echo] = np.float32(before - np.floor(before))
+        for step in range(3):
+            own = length[step + 1, echo]
+            after = own * turns_per_m * (carrier - bend * own)
+            steps[step, echo] = np.float32(after - before)
+            before = after
+
+
+@compiled(fastmath={"contract"})
+def _spread_anchored(chirps, anchors, between, samples, values, grid):
+    """Fill ``grid (chirp, rx, cell)`` with the windows of the tones of some chirps.
+
+    What chirps one after another have in common, their anchors and their Tx, is computed once.
+    """
+    receivers, cells = grid.shape[1:]
+    echoes, changing = anchors.length.shape[3], anchors.change.shape[5]
+    flat = echoes - changing
+    cells_per_m = between.slope / SPEED_OF_LIGHT_MPS / between.sample_rate * cells
+    cell, place = np.empty((2, echoes), dtype=np.int32)
+    begin, turn, cosine, sine = np.empty((4, echoes), dtype=np.float32)
+    steps, terms = np.empty((3, echoes), np.float32), np.empty((2, 3, echoes), np.float32)
+    summed = np.empty(cells + values.shape[2], dtype=np.complex64)
+    pace, end = np.float32(0), np.float32(cells)
+    for receiver in range(receivers):
+        for i in range(len(chirps)):
+            chirp, before = chirps[i], chirps[max(i - 1, 0)]
+            first, tx, w = between.first[chirp], between.tx[chirp], between.weight[chirp]
+            if i == 0 or first != between.first[before] or tx != between.tx[before]:
+                middle = between.carrier[chirp]
+                middle += between.slope * (samples // 2) / between.sample_rate
+                own = anchors.length[first : first + ANCHORS, tx, receiver]
+                _course(own, middle, between.slope, cells_per_m, begin, turn, steps)
+                # A tone that turns on by one turn goes on by so many cells.
+                pace = np.float32(cells_per_m * SPEED_OF_LIGHT_MPS / middle)
+            v0, v1, v2, v3 = np.float32(w[0]), np.float32(w[1]), np.float32(w[2]), np.float32(w[3])
+            after0, after1 = np.float32(w[1] + w[2] + w[3]), np.float32(w[2] + w[3])
+            # Interpolate, in vector lanes over the echoes: places and phases, then amplitudes.
+            for echo in range(echoes):
+                moved = after0 * steps[0, echo] + after1 * steps[1, echo] + v3 * steps[2, echo]
+                at = begin[echo] + pace * moved
+                received = at >= 0 and at < end
+                at = at if received else np.float32(0)
+                cell[echo] = np.int32(at)
+                place[echo] = np.int32((at - np.floor(at)) * np.float32(_PLACES))
+                across, up = phasor_float32(turn[echo] + moved)
+                cosine[echo] = across if received else np.float32(0)
+                sine[echo] = up if received else np.float32(0)
+            for term in range(3 if changing else 1):
+                source = anchors.level if term == 0 else anchors.change[term - 1]
+                past = 0 if term == 0 else flat
+                c, s = cosine[past:], sine[past:]
+                a0, b0 = source[0, first, tx, receiver], source[1, first, tx, receiver]
+                a1, b1 = source[0, first + 1, tx, receiver], source[1, first + 1, tx, receiver]
+                a2, b2 = source[0, first + 2, tx, receiver], source[1, first + 2, tx, receiver]
+                a3, b3 = source[0, first + 3, tx, receiver], source[1, first + 3, tx, receiver]
+                re, im = terms[0, term, past:], terms[1, term, past:]
+                for n in range(len(c)):
+                    a = v0 * a0[n] + v1 * a1[n] + v2 * a2[n] + v3 * a3[n]
+                    b = v0 * b0[n] + v1 * b1[n] + v2 * b2[n] + v3 * b3[n]
+                    re[n], im[n] = _turned(a, b, c[n], s[n], term == 1)
+            _spread(flat, cell, place, terms, values, summed, grid[i, receiver])

@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.elementary import phasor
+from rtradar.kernels.elementary import COSINE, COSINE_32, SINE, SINE_32, horner, phasor
 from rtradar.kernels.jit import compiled, inlined, on_cache_lines
 
 LANES = 32
 """Samples that are computed side by side."""
-
-MIDDLE = 0.5
-"""Fraction of the sweep from which powers of the sample number count: they cancel least there."""
 
 _TOGETHER = 6
 """Tones added in one loop, so that sums are read and written a sixth as often."""
@@ -37,14 +34,16 @@ class Tones(NamedTuple):
     """Echoes of a block of chirps, and the sweep that makes tones of them.
 
     ``length (chirp, rx, echo)`` are path lengths [m]; echoes whose beat frequency lies outside [0,
-    sample rate) add nothing. ``amplitude (node, chirp, rx, echo)`` is that at some frequencies [m],
-    ``powers (power, node)`` the weights of these in the polynomial in the sample number over the
-    number of samples. The sweep has a start frequency [Hz], a slope [Hz/s] and a sample rate [Hz].
+    sample rate) add nothing. ``amplitude (node, chirp, rx, echo)`` is that at some frequencies [m].
+    ``weights (term, node)`` make of these the coefficients of polynomials in the place in the
+    sweep, x = 2 (n - n_samples // 2) / n_samples: of its powers for `add_tones`, of Legendre's
+    polynomials for `sum_by_nufft`. The sweep has a start frequency [Hz], a slope [Hz/s] and a
+    sample rate [Hz].
     """
 
     length: NDArray[np.float64]
     amplitude: NDArray[np.complexfloating]
-    powers: NDArray[np.float64]
+    weights: NDArray[np.floating]
     start_frequency: float
     slope: float
     sample_rate: float
@@ -70,11 +69,8 @@ def tone_tables(kind: type[np.floating]) -> ToneTables:
     middles = np.arange(LANES) + 0.5
     turns = np.outer(np.arange(_GRID + 1) / _GRID, middles)
     first = np.hstack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)]).astype(kind)
-    sines, cosines = (
-        tuple(kind((-1) ** n / math.factorial(2 * n + odd)) for n in range(_TERMS))
-        for odd in (1, 0)
-    )
-    return ToneTables(first, middles.astype(kind), sines, cosines)
+    sines, cosines = (SINE_32, COSINE_32) if kind == np.float32 else (SINE, COSINE)
+    return ToneTables(first, middles.astype(kind), sines[:_TERMS], cosines[:_TERMS])
 
 
 class _Store(NamedTuple):
@@ -107,12 +103,10 @@ class _Store(NamedTuple):
 @inlined(fastmath={"contract"})
 def _lanes(row, rest, tables, out):
     """Powers of a tone side by side: of the next step on the grid, rotated by the rest [rad]."""
-    sines, cosines = tables.sines, tables.cosines
     for lane in range(LANES):
         angle = rest * tables.middles[lane]
         x = angle * angle
-        sine = angle * (sines[0] + x * (sines[1] + x * (sines[2] + x * sines[3])))
-        cosine = cosines[0] + x * (cosines[1] + x * (cosines[2] + x * cosines[3]))
+        sine, cosine = angle * horner(x, tables.sines), horner(x, tables.cosines)
         out[lane] = row[lane] * cosine - row[lane + LANES] * sine
         out[lane + LANES] = row[lane] * sine + row[lane + LANES] * cosine
 
@@ -238,7 +232,7 @@ def add_tones(begin, end, tones, tables, out):
     received = np.empty(echoes, np.int64)
     fraction = np.empty(samples, dtype=like.dtype)
     for sample in range(samples):
-        fraction[sample] = sample / samples - MIDDLE
+        fraction[sample] = 2 * (sample - samples // 2) / samples
     # Whatever a chirp does not fill is left over from the one before, and silent.
     store.lanes[:] = 0.0
     for chirp in range(begin, end):
@@ -263,7 +257,7 @@ def add_tones(begin, end, tones, tables, out):
                 for sample in range(samples if power < nodes - 1 else 0):
                     store.sum_re[sample] *= fraction[sample]
                     store.sum_im[sample] *= fraction[sample]
-                if not _weigh(power, tones.powers, store):
+                if not _weigh(power, tones.weights, store):
                     continue
                 now_re, now_im = store.now[:size], store.now[size:]
                 for pair in range(pairs):

@@ -15,20 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
-from rtradar.kernels.anchored_tones import (
+from rtradar.kernels.nufft import (
     ANCHORS,
     Anchors,
     BetweenAnchors,
-    Sweep,
     add_anchored_tones,
     fill_anchors,
 )
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import weakest
 from rtradar.signal.synthesis import (
-    powers_of_sample_number,
     synthesize,
     warn_of_motion_in_chirp,
+    weights_of_nodes,
 )
 from rtradar.system.threads import in_threads
 
@@ -48,9 +47,6 @@ _STREAMS = 8
 
 MOST_NODES = 3
 """Frequencies at which amplitudes may be given: those of a parabola."""
-
-_MEAN_OF_POWERS = np.array([[1.0, 0.0, 1 / 12]])
-"""Means of the powers 0 to 2 of u, from -1/2 to 1/2."""
 
 _TESTS, _POWER_CHIRPS = 6, 48
 
@@ -106,9 +102,11 @@ class GhostIf:
         first = self._first_anchor(cycle)
         weight = _cubic_weights(self.cycles[first[:, None] + np.arange(ANCHORS)], cycle)
         carrier = radar.sampled_start_hz + radar.tx_offset_hz[tx]
-        between = BetweenAnchors(first - self._first, weight, tx, carrier.astype(np.float64))
-        sweep = Sweep(float(radar.slope_hz_per_s), float(radar.sample_rate_hz))
-        add_anchored_tones(self._held, between, sweep, samples)
+        carrier, slope = carrier.astype(np.float64), float(radar.slope_hz_per_s)
+        between = BetweenAnchors(
+            first - self._first, weight, tx, carrier, slope, float(radar.sample_rate_hz)
+        )
+        add_anchored_tones(self._held, between, samples)
 
     def compute(self, chirps: NDArray[np.int64], ahead: int = 0) -> None:
         """Compute the anchors around some chirps, and some ``ahead`` if any are missing."""
@@ -139,9 +137,7 @@ class GhostIf:
         echoes = self._model.ghosts(chirps)
         warn_of_motion_in_chirp(echoes, self._radar, self._radar.centres_of(chirps))
         order = len(each) * np.arange(len(cycles))[:, None] + np.argsort(echoes.tx[: len(each)])
-        # Flat echoes have their mean over the sweep, the others their amplitude in its middle.
-        powers = _powers_of_u(echoes, self._radar)
-        weights = np.concatenate([_MEAN_OF_POWERS @ powers, powers]).astype(np.float32)
+        weights = _legendre_weights(echoes, self._radar).astype(np.float32)
         found = _empty_anchors(
             (len(cycles), len(each), echoes.length.shape[1]), len(self._order), self._changing
         )
@@ -192,10 +188,10 @@ def ghosts_within(
         return None, exact
     tilt, curve = (
         (np.abs(own) ** 2).mean(axis=(0, 1))
-        for own in np.tensordot(_powers_of_u(some, radar)[1:], some.amplitude, axes=1)
+        for own in np.tensordot(_legendre_weights(some, radar)[1:], some.amplitude, axes=1)
     )
-    # Times the variances of u and of its square over the sweep.
-    changes = ~weakest(tilt / 12 + curve / 180, power_m2 * _OF_CHANGES)
+    # Times the mean squares of the polynomials over the sweep.
+    changes = ~weakest(tilt / 3 + curve / 5, power_m2 * _OF_CHANGES)
     length = some.length.mean(axis=(0, 1))
     groups = [np.flatnonzero(~changes), np.flatnonzero(changes)]
     order = np.concatenate([_apart(own, length) for own in groups])
@@ -228,13 +224,10 @@ def _error(found: GhostIf, model: GhostEchoes, radar: Radar) -> float:
     return float((np.abs(error) ** 2).mean())
 
 
-def _powers_of_u(echoes: Echoes, radar: Radar) -> NDArray[np.float64]:
-    """Weights (power, node) of amplitudes at the nodes of echoes in each power 0 to 2 of u.
-
-    The polynomial goes through the nodes; u goes from -1/2 to 1/2 over the sweep.
-    """
-    powers = powers_of_sample_number(echoes.frequency, radar, 0.5)
-    return np.concatenate([powers, np.zeros((MOST_NODES - len(powers), powers.shape[1]))])
+def _legendre_weights(echoes: Echoes, radar: Radar) -> NDArray[np.float64]:
+    """Weights (3, node) of amplitudes at the nodes of echoes in Legendre's polynomials."""
+    weights = weights_of_nodes(echoes.frequency, radar)
+    return np.concatenate([weights, np.zeros((MOST_NODES - len(weights), weights.shape[1]))])
 
 
 def _apart(echoes: NDArray[np.int64], length: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.polynomial.polynomial import polyvander
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.kernels.nufft import LEAST_SAMPLES, MOST_NODES, sum_by_nufft
-from rtradar.kernels.tone_sum import MIDDLE, Tones, add_tones, tone_tables
+from rtradar.kernels.tone_sum import Tones, add_tones, tone_tables
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
 from rtradar.system.threads import thread_count, thread_map
@@ -21,7 +24,7 @@ from rtradar.system.threads import thread_count, thread_map
 MAX_BINS_IN_CHIRP = 0.1
 """Range bins by which a length, which belongs to the centre of its chirp, may change inside one."""
 
-MANY_ECHOES, MANY_VARYING_ECHOES = 300, 84
+MANY_ECHOES, MANY_VARYING_ECHOES = 80, 36
 """Echoes from which on the NUFFT is faster, if float32 will do: with amplitudes that are one
 number, and with amplitudes at several frequencies (`validation/other_methods/if_sum.py` times both
 methods)."""
@@ -119,10 +122,10 @@ def synthesize(
     shape = (*echoes.length.shape[:2], radar.samples_per_chirp)
     out = array_to_fill("synthesize", out, shape, dtype)
     if _are_many(echoes, radar, out.dtype):
-        sum_by_nufft(_tones(echoes, echoes.amplitude, radar, 0.0), out)
+        sum_by_nufft(_tones(echoes, echoes.amplitude, radar, legvander), out)
         return out
     amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
-    tones = _tones(echoes, amplitude, radar, MIDDLE)
+    tones = _tones(echoes, amplitude, radar, polyvander)
     in_float32 = out.dtype == np.complex64 and len(echoes.frequency) <= _MOST_POWERS
     tables = tone_tables(np.float32 if in_float32 else np.float64)
     at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
@@ -143,12 +146,12 @@ def _are_many(echoes: Echoes, radar: Radar, dtype: np.dtype[Any]) -> bool:
 
 
 def _tones(
-    echoes: Echoes, amplitude: NDArray[np.complexfloating], radar: Radar, origin: float
+    echoes: Echoes, amplitude: NDArray[np.complexfloating], radar: Radar, basis: Callable[..., Any]
 ) -> Tones:
     length = np.ascontiguousarray(echoes.length)
-    powers = powers_of_sample_number(echoes.frequency, radar, origin)
+    weights = weights_of_nodes(echoes.frequency, radar, basis)
     sweep = float(radar.sampled_start_hz), radar.slope_hz_per_s, radar.sample_rate_hz
-    return Tones(length, amplitude, powers, *sweep)
+    return Tones(length, amplitude, weights, *sweep)
 
 
 def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
@@ -157,14 +160,16 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
     return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
 
-def powers_of_sample_number(
-    frequency: NDArray[np.float64], radar: Radar, origin: float
+def weights_of_nodes(
+    frequency: NDArray[np.float64], radar: Radar, basis: Callable[..., Any] = legvander
 ) -> NDArray[np.float64]:
-    """Weights (power, node) of values at nodes in the polynomial in n / samples less an origin."""
-    if len(frequency) == 1:
-        return np.ones((1, 1))
-    nodes = (frequency - radar.sampled_start_hz) / radar.sampled_bandwidth_hz - origin
-    return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
+    """Weights (term, node) that make coefficients of values at nodes, see `Tones`.
+
+    The basis gives its polynomials (node, term) at x (node,) up to a degree; Legendre's by default.
+    """
+    middle = radar.samples_per_chirp // 2 / radar.samples_per_chirp
+    x = 2 * ((frequency - radar.sampled_start_hz) / radar.sampled_bandwidth_hz - middle)
+    return np.asarray(np.linalg.inv(basis(x, len(x) - 1)), dtype=np.float64)
 
 
 def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.float64]) -> None:

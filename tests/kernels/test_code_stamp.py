@@ -326,7 +326,7 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         "prime_factor_dft.add_doppler_power",
         "prime_factor_dft.pick_cells",
         "nufft.sum_by_nufft",
-        "anchored_tones.add_anchored_tones",
+        "nufft.add_anchored_tones",
     }
     assert {f"rtradar.kernels.{name}" for name in CASES.keys() - plain} <= set(found)
     assert len({stamp_of(function) for function in found.values()}) == len(found)

@@ -12,7 +12,6 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.signal import synthesize
-from rtradar.signal.synthesis import MANY_ECHOES
 
 LOW = Radar.preset("paper-12ghz")
 FEW, TWO, ONE = (
@@ -20,9 +19,11 @@ FEW, TWO, ONE = (
 )
 ODD = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=45, frame_duration_s=3.75e-3)
 
+COUNT = 300
+
 
 def many_echoes(
-    radar: Radar, nodes: int, seed: int, *, count: int = MANY_ECHOES, chirps: int = 3
+    radar: Radar, nodes: int, seed: int, *, count: int = COUNT, chirps: int = 3
 ) -> Echoes:
     rng = np.random.default_rng(seed)
     shape = (chirps, radar.n_rx, count)
@@ -75,7 +76,7 @@ def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chi
     seed: int,
 ) -> None:
     echoes = many_echoes(ODD, 3, seed, chirps=60)
-    order = np.random.default_rng(seed).permutation(MANY_ECHOES)
+    order = np.random.default_rng(seed).permutation(COUNT)
     times = ODD.chirp_times(60)
     shuffled = replace(
         echoes, length=echoes.length[..., order], amplitude=echoes.amplitude[..., order]

@@ -34,7 +34,7 @@ PARTS = 21
 TOLERANCE = 1e-5
 CASES = ((1, 0), (3, 0), (3, 14), (5, 0))  # nodes, constant echoes
 MANY, MANY_CASES = 315, ((1, 0), (3, 0), (5, 0))  # a body and fourteen paths over walls
-CROSSINGS = ((1, (150, 300, 600)), (3, (42, 84, 168)))  # nodes, echoes
+CROSSINGS = ((1, (40, 80, 160)), (3, (18, 36, 72)))  # nodes, echoes
 COMPARED = slice(None, None, 16)
 REPEATS = 3
 
