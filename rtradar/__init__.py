@@ -22,11 +22,13 @@ if TYPE_CHECKING:
         Experiment,
         Result,
         Simulation,
+        Sweep,
         compare,
         compare_recordings,
         process_samples,
         run,
         simulate,
+        sweep,
     )
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
@@ -48,8 +50,8 @@ _NAMES = {
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
     "motion": "Motion load_motion register_reader synthetic_motion",
-    "pipeline": "Comparison Experiment Result Simulation compare compare_recordings "
-    "process_samples run simulate",
+    "pipeline": "Comparison Experiment Result Simulation Sweep compare "
+    "compare_recordings process_samples run simulate sweep",
     "process": "register_detector",
     "radar": "Radar register_radar",
     "receiver": "Interferer Receiver",
@@ -84,6 +86,7 @@ __all__ = [
     "RunSettings",
     "Scene",
     "Simulation",
+    "Sweep",
     "Swinging",
     "Turning",
     "ValidityWarning",
@@ -103,6 +106,7 @@ __all__ = [
     "scattering_length",
     "signal",
     "simulate",
+    "sweep",
     "synthetic_motion",
 ]
 

@@ -362,6 +362,17 @@ def imported(code: str) -> list[str]:
     return list(ast.literal_eval(done.stdout.splitlines()[-1]))
 
 
+def test_analytic_traces_nothing_and_loads_no_tracer() -> None:
+    code = (
+        "import rtradar as rt\n"
+        "rt.run('synthetic:walk', 'paper-12ghz', fidelity='analytic', duration_s=0.12)\n"
+        "import sys; print({'mitsuba', 'drjit'} & set(sys.modules))"
+    )
+    words = [sys.executable, "-W", "ignore", "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["set()"]
+
+
 def test_import_is_quick_and_light() -> None:
     assert not set(imported("import rtradar")) - {"numpy"}
 

@@ -7,6 +7,7 @@ import dataclasses
 import os
 import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
@@ -191,7 +192,8 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "--set",
         "KEY=VALUE",
-        "value of a key of the run file, such as radar.pitch_deg=-15; may be given again",
+        "value of a key of the run file, such as radar.pitch_deg=-15; several values of one key "
+        "are a run each, with a table of all",
         type=assignment,
         action="append",
         default=[],
@@ -270,6 +272,11 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.as_paper:
         _choose_as_paper(options)
+    values: dict[str, list[Any]] = {}
+    for key, value in options.set:
+        values.setdefault(key, []).append(value)
+    if any(len(own) > 1 for own in values.values()):
+        return _sweep(options, values)
     capture = _capture(options)
     from rtradar.pipeline import run
     from rtradar.pipeline.timing import lines_shown
@@ -380,6 +387,31 @@ def _compare_folders(options: argparse.Namespace) -> int:
 
 def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, Any]:
     """Return the arguments that `run` and `compare` share; of several recordings each is alone."""
+    table, folder, skeletons = _tables(options, alone)
+    from rtradar.description import Parts, parts_of, with_value
+
+    several = [key for key, count in Counter(key for key, _ in options.set).items() if count > 1]
+    if several:
+        raise InputError(f"--set {several[0]}=... has several values; give it once")
+    for key, value in options.set:
+        table = with_value(table, key, value)
+    parts: Parts = parts_of(table, folder)
+    people: list[Any] = [*parts.people] or _people(options, parts.settings, skeletons)
+    settings = vars(parts.settings)
+    return settings | {
+        "model_options": dict(settings["model_options"]) | dict(options.model_option),
+        "motion": people,
+        "radar": parts.radar,
+        "scene": parts.scene,
+        "out": options.out,
+        "overwrite": options.overwrite,
+    }
+
+
+def _tables(
+    options: argparse.Namespace, alone: bool = False
+) -> tuple[Mapping[str, Any], Path, Mapping[str, Path]]:
+    """Return the tables of the run file and the options, their folder, and skeletons by name."""
     check_place(options.json)
     from rtradar.settings import RunSettings
     from rtradar.system.registries import radar_table, scene_table
@@ -394,22 +426,42 @@ def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, A
             look_up(source)
     run_file = _run_file(options)
     skeletons = {} if run_file else _checked_people(options, alone)
-    from rtradar.description import Parts, parts_of, read_run_file, with_value
+    from rtradar.description import read_run_file, with_value
 
     table = read_run_file(run_file, changed=options.changed) if run_file else {}
-    for key, value in [*_described(options, settings), *options.set]:
+    for key, value in _described(options, settings):
         table = with_value(table, key, value)
-    parts: Parts = parts_of(table, run_file.parent if run_file else Path())
-    people: list[Any] = [*parts.people] or _people(options, parts.settings, skeletons)
-    settings = vars(parts.settings)
-    return settings | {
-        "model_options": dict(settings["model_options"]) | dict(options.model_option),
-        "motion": people,
-        "radar": parts.radar,
-        "scene": parts.scene,
-        "out": options.out,
-        "overwrite": options.overwrite,
-    }
+    return table, run_file.parent if run_file else Path(), skeletons
+
+
+def _sweep(options: argparse.Namespace, values: Mapping[str, list[Any]]) -> int:
+    """Run every combination of the values of keys that were given more than once."""
+    table, folder, skeletons = _tables(options)
+    from rtradar.description import parts_of, person_table, with_value
+    from rtradar.pipeline import Experiment, sweep
+    from rtradar.pipeline.timing import lines_shown
+
+    for key, (first, *others) in values.items():
+        if not others:
+            table = with_value(table, key, first)
+    if "people" not in table:
+        parts = parts_of(table, folder)
+        moving = _people(options, parts.settings, skeletons)
+        table = {**table, "people": [person_table(one) for one in moving]}
+    several = {key: own for key, own in values.items() if len(own) > 1}
+    with lines_shown():
+        found = sweep(
+            Experiment(table, folder),
+            several,
+            out=options.out,
+            overwrite=options.overwrite,
+            pictures=options.pictures,
+        )
+    if options.json is not None:
+        write_json(options.json, found.summary)
+    say(options, found.table())
+    say(options, f"the table is {options.out / 'sweep.csv'}, each run in its folder")
+    return 0
 
 
 def _run_file(options: argparse.Namespace) -> Path | None:

@@ -9,7 +9,7 @@ from rtradar.description.run_file import (
     refuse_another,
     write_run_file,
 )
-from rtradar.description.tables import table_of
+from rtradar.description.tables import person_table, table_of
 
 __all__ = [
     "Movers",
@@ -19,6 +19,7 @@ __all__ = [
     "given_parts",
     "in_words",
     "parts_of",
+    "person_table",
     "read_run_file",
     "refuse_another",
     "table_of",

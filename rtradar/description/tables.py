@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from rtradar.body import Person
+from rtradar.motion import Motion
 from rtradar.radar import Radar
 from rtradar.scene import MATERIALS, Material, Object, Scene
 from rtradar.scene.materials import PowerLaw
@@ -46,7 +47,7 @@ def table_of(people: Sequence[Person], radar: Radar, scene: Scene, settings: Run
     """
     missing: list[str] = []
     found = {
-        "people": [_person(person) for person in people],
+        "people": [person_table(person) for person in people],
         "radar": plain(radar),
         "scene": _scene(scene, missing),
         "settings": plain(settings),
@@ -69,9 +70,13 @@ def plain(value: Any) -> Any:
     return next((kind(value) for kind in (bool, int, float, str) if isinstance(value, kind)), value)
 
 
-def _person(person: Person) -> Plain:
-    source = person.motion.source
-    made = {"motion": person.motion} if source is None else copy.deepcopy(dict(source.keys))
+def person_table(person: Person | Motion) -> Plain:
+    """Return the table of a person; of a bare motion one without a place."""
+    motion = person if isinstance(person, Motion) else person.motion
+    source = motion.source
+    made = {"motion": motion} if source is None else copy.deepcopy(dict(source.keys))
+    if isinstance(person, Motion):
+        return made
     rest = (field for field in dataclasses.fields(person) if field.name != "motion")
     own = {field.name: plain(getattr(person, field.name)) for field in rest}
     return made | {name: value for name, value in own.items() if value is not None}

@@ -7,6 +7,7 @@ from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run
 from rtradar.pipeline.simulation import Simulation, simulate
+from rtradar.pipeline.sweep import Sweep, sweep
 
 __all__ = [
     "MEMORY_LIMIT_BYTES",
@@ -14,9 +15,11 @@ __all__ = [
     "Experiment",
     "Result",
     "Simulation",
+    "Sweep",
     "compare",
     "compare_recordings",
     "process_samples",
     "run",
     "simulate",
+    "sweep",
 ]

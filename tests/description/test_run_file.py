@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 import re
 import tomllib
 from pathlib import Path
@@ -311,3 +312,41 @@ def test_folders_are_compared_setting_by_setting(
     assert "radar.pitch_deg: 0.0 (level), -10.0 (tilted)" in said
     assert said.count("(tilted)") == 1
     assert "Settings that differ" in (tmp_path / "both" / "compare.html").read_text()
+
+
+# -- sweeps ----------------------------------------------------------------------------------------
+
+
+def test_several_values_of_a_key_are_a_run_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", "synthetic:walk", "--duration", "0.1", "--fidelity", "analytic"]
+    keys = ["settings.snr_db=0", "settings.snr_db=20", "settings.clutter_removal=mean"]
+    words += [word for key in keys for word in ("--set", key)]
+    out = tmp_path / "out"
+    assert main([*words, "--no-pictures", "--out", str(out)]) == 0
+    found = json.loads((out / "sweep.json").read_text())
+    assert found["keys"] == ["settings.snr_db"]
+    folders = [run["folder"] for run in found["runs"]]
+    assert folders == ["001-snr_db=0", "002-snr_db=20"]
+    for run in found["runs"]:
+        assert run["figures"]["snr_db"] == pytest.approx(run["values"][0], abs=0.1)
+        made = tomllib.loads((out / run["folder"] / "run.toml").read_text())
+        assert made["settings"]["clutter_removal"] == "mean"
+    assert found["runs"][0]["figures"]["cloud_bins"] == 0
+    assert found["runs"][1]["figures"]["cloud_bins"] > 0
+    assert (out / "sweep.png").is_file()
+    assert "settings.snr_db" in capsys.readouterr().out
+    assert len((out / "sweep.csv").read_text().splitlines()) == 3
+
+
+def test_a_sweep_is_refused_before_its_first_run(tmp_path: Path) -> None:
+    experiment = rt.Experiment({"people": [{"motion": "synthetic:walk"}]})
+    for values, why in (
+        ({"radar.pitch_deg": [0, "steep"]}, "pitch_deg"),
+        ({"nothing": [1, 2]}, "unknown key 'nothing'"),
+        ({}, "allowed are 1 to"),
+    ):
+        with pytest.raises(rt.InputError, match=why):
+            rt.sweep(experiment, values, out=tmp_path / "out")  # type: ignore[arg-type]
+    assert not (tmp_path / "out").exists()
