@@ -5,7 +5,6 @@ Everything named here loads on first use, so that ``import rtradar`` is quick.
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -38,10 +37,6 @@ if TYPE_CHECKING:
     from rtradar.settings import Breathing, RunSettings
 
 __version__ = "0.2.0"
-
-# Idle threads of OpenMP, which runs compiled loops, would spin and take cores from threads that
-# have work. The variable is read when OpenMP is loaded, with the first loop that runs in parallel.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _NAMES = {
     "antenna": "Antenna",

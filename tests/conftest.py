@@ -43,16 +43,15 @@ SLOW_LEVELS = {"auto", "rays", "reference"}
 """Levels by which ``make test`` makes whole runs alone, and ``make test-all`` all else, too."""
 
 
-def _place(item: pytest.Item) -> int:
-    return (item.path.parent.name == "doctor") - (item.path.name == "test_whole_runs.py")
+def _place(item: pytest.Item) -> bool:
+    return item.path.name != "test_whole_runs.py"
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` chooses by the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Order the tests, mark the slow ones, and give property tests the examples asked for.
 
-    Whole runs come first, for they compile what most others need, and the doctor comes last, for it
-    would compile the same at the same time.
+    Whole runs come first, for they compile what most others need.
 
     The fixtures' names say what a test is about: ``fidelity`` a level, ``backend`` a backend of
     Mitsuba. Of the backends `tests/trace` tries each. Every property test gets

@@ -30,7 +30,7 @@ KEPT = tuple(kind for kind in KINDS if kind not in ("clouds", "spatial"))
 
 
 class Capture(NamedTuple):
-    """Clouds of one sample, the arrays that it keeps by name, and the time of warming up [s].
+    """Clouds of one sample, and the arrays that it keeps by name.
 
     ``sources`` are the names of people and objects whom the spatial points may be of; there are
     none where one person is alone.
@@ -38,7 +38,6 @@ class Capture(NamedTuple):
 
     clouds: Clouds
     maps: dict[str, NDArray[Any]]
-    warmup_s: float
     sources: tuple[str, ...] = ()
 
 
@@ -63,7 +62,7 @@ def capture_of(
     maps = keeper.maps()
     if "joints" in keep:
         maps["joints"] = capture.body.motion.at(maps["time"])[0]
-    return Capture(keeper.finish(), maps, capture.warmup_s, sources if several else ())
+    return Capture(keeper.finish(), maps, sources if several else ())
 
 
 def sizes(radar: Radar) -> tuple[object, ...]:

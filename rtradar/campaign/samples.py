@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import time
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,6 +39,7 @@ from rtradar.radar import Radar
 from rtradar.radar.schedule import FollowingCount
 from rtradar.scene import Object, Scene
 from rtradar.settings import RunSettings
+from rtradar.system.clock import Moment
 from rtradar.system.files import open_regular
 from rtradar.system.seeds import stream
 
@@ -325,7 +325,7 @@ class Made(NamedTuple):
 
 def make_sample(plan: SamplePlan) -> Made:
     """Make the sample of a `packed` plan; InputError if the person cannot be where it says."""
-    began = time.perf_counter()
+    began = Moment.now().work_s
     motion, values = plan.motion, plan.parameters
     if motion is None:
         motion = _actor_motion(plan.label, values)
@@ -335,7 +335,7 @@ def make_sample(plan: SamplePlan) -> Made:
     people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
-        clouds, maps, warmup_s, sources = capture_of(
+        clouds, maps, sources = capture_of(
             people,
             plan.radar,
             plan.scene,
@@ -361,7 +361,7 @@ def make_sample(plan: SamplePlan) -> Made:
         found["source_names"] = list(sources)
         maps["spatial_source"] = clouds.spatial.source[kept]
     sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
-    return Made(sample, places[kept], time.perf_counter() - began - warmup_s, maps)
+    return Made(sample, places[kept], Moment.now().work_s - began, maps)
 
 
 def _actor_motion(label: str, values: Mapping[str, Any]) -> Motion:

@@ -17,7 +17,7 @@ def add(commands: Subcommands) -> None:
     add_command(
         commands,
         "doctor",
-        "say which ray-tracing backends work here and what to install; compile all levels",
+        "say which ray-tracing backends work here and what to install",
         _add_doctor,
         ("rtradar doctor", "rtradar doctor --json doctor.json"),
     )

@@ -1,4 +1,4 @@
-"""What works on this machine, what is missing, and all levels compiled before the first run."""
+"""What works on this machine, and what is missing."""
 
 from rtradar.doctor.examination import DoctorReport, examine, report, report_text
 

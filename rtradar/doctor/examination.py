@@ -11,7 +11,6 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from rtradar.doctor.compile_ahead import compile_ahead, left_to_compile
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
@@ -36,8 +35,7 @@ class DoctorReport:
     ``cores`` are those that this process may use. The memory of the machine [MiB] is None where
     the system does not report it, and a version where one of `PACKAGES` is not installed. ``llvm``
     has each libLLVM in the order of trial, ``backends`` says ``good`` or what is wrong with each,
-    ``compiled_code`` where compiled code was kept and loaded again, or why not, and how long it
-    took to compile all levels. ``chosen`` is
+    ``compiled_code`` where compiled code was kept and loaded again, or why not. ``chosen`` is
     Mitsuba's variant that ``--variant auto`` takes, None where nothing works; ``advice`` says what
     to do, most urgent first.
     """
@@ -61,7 +59,7 @@ class DoctorReport:
 
 
 def examine() -> DoctorReport:
-    """Examine this machine, which takes some seconds, and compile all levels if none has.
+    """Examine this machine, which takes some seconds.
 
     Every backend is probed anew, in a process of its own, and a function is compiled, kept and
     loaded again.
@@ -82,12 +80,6 @@ def examine() -> DoctorReport:
         compiled_code, what_to_do = try_cache()
     if what_to_do:
         advice.append(what_to_do)
-    elif chosen:
-        seconds = compile_ahead()
-        done = f"were compiled in {seconds:.0f} s" if seconds else "are compiled"
-        left = len(left_to_compile())
-        said = f"{left} functions are left to the first runs" if left else f"all levels {done}"
-        compiled_code += f"; {said}"
     total, available = _memory_mb()
     implementation = platform.python_implementation()
     return DoctorReport(

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
+import os
+import pickle
+import platform
+import shutil
+import time
 import warnings
+from collections import defaultdict
 from collections.abc import Callable
-from functools import cached_property
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit, types
-from numba.core.caching import CompileResultCacheImpl, IndexDataCacheFile, NullCache
+from numba import config, njit, types
+from numba.core.caching import CompileResultCacheImpl, NullCache
+from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
+from numba.core.serialize import dumps
 from numba.extending import register_jitable
 
-from rtradar.kernels.code_stamp import note_options, stamp_of
+from rtradar.system.clock import warming_up
+from rtradar.system.files import atomic_file
 
 _Function = Callable[..., Any]
 
@@ -23,38 +35,42 @@ class CacheWarning(UserWarning):
     """Compiled code cannot be kept on disk: results are right, but every process compiles again."""
 
 
-class _NeverFound(dict[Any, Any]):
-    """What Numba has compiled of its own functions, products of complex numbers for one.
+_tables: defaultdict[frozenset[str], dict[Any, Any]] = defaultdict(dict)
 
-    It looks there before it compiles one again, by name and types but not by ``fastmath``, which
-    would be that of whoever came first: how a function rounds would depend on what its process
-    compiled before. So that each has its own, nothing is found.
+
+class _Compiler(Compiler):
+    """Numba's compiler with tables of our own for what functions use of Numba's.
+
+    Products of complex numbers, for one, are functions. Numba looks for them by name and types but
+    not by ``fastmath``, in one table of the process: how ours round would depend on who came first,
+    and how others' do on ours. Here each ``fastmath`` has a table.
     """
 
-    def get(self, key: Any, default: Any = None) -> Any:
-        return default
-
-
-cpu_target.target_context.cached_internal_func = _NeverFound()
+    def __init__(
+        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
+    ) -> None:
+        own = target.subtarget(cached_internal_func=_tables[frozenset(flags.fastmath.flags)])
+        super().__init__(typing, own, library, args, result, flags, *more)  # type: ignore[no-untyped-call]
 
 
 def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
-    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code
-    is loaded again as long as all that went into it is the same, functions and constants of other
-    modules included. Where it cannot be kept, a `CacheWarning` says so once. ``fastmath`` are the
-    liberties that LLVM may take with floating point: all of them, or those named.
+    It lets other threads run and divides by zero as NumPy does. Code of rtradar's own functions is
+    kept on disk; where that cannot be, a `CacheWarning` says so once. The time of compiling and
+    loading is that of `warming_up`. ``fastmath`` are the liberties that LLVM may take with floating
+    point: all of them, or those named.
     """
     numba_decorator: Callable[[_Function], Any] = njit(
-        nogil=True, error_model="numpy", fastmath=fastmath
+        nogil=True, error_model="numpy", fastmath=fastmath, pipeline_class=_Compiler
     )
 
     def decorator(function: _Function) -> _Function:
         dispatcher = numba_decorator(function)
         if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
-            dispatcher._cache = _CodeOnDisk(dispatcher)
-            _functions[f"{function.__module__}.{function.__qualname__}"] = dispatcher
+            dispatcher.compile = warming_up()(dispatcher.compile)
+            if function.__module__.startswith(f"{__package__}."):
+                dispatcher._cache = _CodeOnDisk(dispatcher)
         return dispatcher
 
     return decorator
@@ -67,14 +83,10 @@ def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Func
     alike whether its caller was just compiled or comes from disk. ``fastmath`` is that of
     `compiled`, for what this function does.
     """
-    options = {"forceinline": True, "error_model": "numpy", "fastmath": fastmath}
-    numba_decorator: Callable[[_Function], _Function] = register_jitable(**options)
-
-    def decorator(function: _Function) -> _Function:
-        note_options(function, options)
-        return numba_decorator(function)
-
-    return decorator
+    numba_decorator: Callable[[_Function], _Function] = register_jitable(
+        forceinline=True, error_model="numpy", fastmath=fastmath, pipeline_class=_Compiler
+    )
+    return numba_decorator
 
 
 @inlined()
@@ -89,106 +101,102 @@ def on_cache_lines(count, like):
     return store[begin : begin + count]
 
 
+_SETTINGS = "OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE"
+"""Settings of Numba, by environment variables, that change its code."""
+
+_UNUSED_S = 30 * 86400.0  # after which code of other versions goes
+
+
+def _read_sources() -> bytes:
+    """Digest of the texts of all compiled functions and of the constants that they use."""
+    here = Path(__file__).parent
+    found = hashlib.sha256()
+    for file in sorted([*here.rglob("*.py"), here.parent / "conventions.py"]):
+        found.update(hashlib.sha256(file.read_bytes()).digest())
+    return found.digest()
+
+
+# Modules may be edited while a process runs. This is what it has imported.
+try:
+    _sources = _read_sources()
+except OSError:  # an archive has no files that could be read so, and nothing is kept
+    _sources = b""
+
+
+@lru_cache(maxsize=1)
+def _place(_named: str) -> tuple[Any, Path]:
+    """Format and folder of the code that is kept, by the folder named in NUMBA_CACHE_DIR.
+
+    Numba says where: in the folder that is named, beside the modules, or in the user's cache. The
+    name of the folder there is one hash of all that the code is made from. Code of other versions
+    goes when no process has used it for a month.
+    """
+    if not _sources:
+        raise OSError("the package is not in files")
+    code = CompileResultCacheImpl(_increment)  # type: ignore[no-untyped-call]
+    made_from = (
+        _sources,
+        platform.python_version(),
+        *(version(package) for package in ("numba", "llvmlite", "numpy")),
+        *(str(getattr(config, name, None)) for name in _SETTINGS),
+        cpu_target.target_context.codegen().magic_tuple(),
+    )
+    digest = hashlib.sha256(repr(made_from).encode()).hexdigest()[:16]
+    folder = Path(code.locator.get_cache_path()) / f"rtradar-{digest}"
+    folder.mkdir(parents=True, exist_ok=True)
+    os.utime(folder)
+    for other in folder.parent.glob("rtradar-" + "?" * len(digest)):
+        if time.time() - other.stat().st_mtime > _UNUSED_S:
+            shutil.rmtree(other, ignore_errors=True)
+    return code, folder
+
+
 class _CodeOnDisk(NullCache):
     """Machine code of one function on disk, which Numba loads from here and saves here.
 
     Numba's own cache checks only the file of a function, not what is inlined into it from others.
-    Here code is kept under the function's stamp (`code_stamp`), taken whenever code is needed, in
-    the folders and formats of Numba. Whatever goes wrong, be it a damaged file, a full disk or
-    another version of Numba, the function is compiled.
+    Whatever goes wrong, be it a damaged file, a full disk or another version of Numba, the function
+    is compiled.
     """
 
     def __init__(self, dispatcher: Any) -> None:
-        self.trouble = ""
-        self._dispatcher = dispatcher
-        self._stamp = ""
-        self._file: Any = None
+        function = dispatcher.py_func
+        self._name = f"{function.__module__}.{function.__qualname__}"
 
-    @cached_property
-    def _format(self) -> Any:
-        """Folder and format of this function's code; None where no folder can be written."""
-        try:
-            return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
-        except Exception as error:  # also what another version of Numba may raise here
-            no_folder = "no locator available" in str(error)
-            self._warn("no folder for it can be written" if no_folder else error)
-            return None
-
-    @property
-    def cache_path(self) -> Any:
-        return None if self._format is None else self._format.locator.get_cache_path()
+    def _file(self, sig: Any) -> tuple[Any, Path]:
+        """Format and path of the code for these types of arguments."""
+        code, folder = _place(config.CACHE_DIR)  # type: ignore[attr-defined]
+        digest = hashlib.sha256(f"{self._name} {sig}".encode()).hexdigest()[:16]
+        return code, folder / f"{self._name.rpartition('.')[2]}-{digest}.nbc"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        file = self._take_stamp()
         try:
-            found = None if file is None else file.load(self._key(sig))
-            if found is None:
+            code, path = self._file(sig)
+            data = path.read_bytes()
+            if hashlib.sha256(data[32:]).digest() != data[:32]:  # damaged
                 return None
-            # Processes that compile for other arguments, or another text, may have written it, too.
-            stamp, arguments, code = found
-            if (stamp, arguments) != (self._stamp, sig):
-                return None
-            return self._format.rebuild(target_context, code)
-        except Exception:  # a damaged file raises almost anything
+            return code.rebuild(target_context, pickle.loads(data[32:]))
+        except Exception:  # there is none yet, or `save_overload` says what is wrong
             return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        file = self._file
+    def save_overload(self, sig: Any, result: Any) -> None:
         try:
-            if file is None or not self._format.check_cachable(data):
-                return
-            self._format.locator.ensure_cache_path()
-            entry = self._stamp, sig, self._format.reduce(data)
-            try:
-                file.save(self._key(sig), entry)
-            except OSError:
-                raise
-            except Exception:  # a damaged index
-                file.flush()
-                file.save(self._key(sig), entry)
+            self.save(sig, result)
         except Exception as error:  # the code is in memory: a run does not end for want of a file
-            self._warn(error)
+            _warn(error)
 
-    def has_code(self) -> bool:
-        """Whether there is code of the function as it is now."""
-        file = self._take_stamp()
-        try:
-            return file is not None and bool(file._load_index())
-        except Exception:  # a damaged index raises almost anything
-            return False
-
-    def _take_stamp(self) -> Any:
-        """File of the function as it is now; None where it has none."""
-        self._file = None
-        if self._format is not None:
-            try:
-                self._stamp = stamp_of(self._dispatcher)
-                self._file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
-                    cache_path=self.cache_path,
-                    filename_base=self._format.filename_base,
-                    source_stamp=self._stamp,
-                )
-            except Exception as error:  # also what another version of Numba may raise here
-                self._warn(error)
-        return self._file
-
-    def _key(self, sig: Any) -> Any:
-        return sig, self._dispatcher.targetctx.codegen().magic_tuple()
-
-    def _warn(self, why: object) -> None:
-        """Warn once that code is not kept, in the process that starts workers and not in them."""
-        global _warned
-        text = why.strerror if isinstance(why, OSError) and why.strerror else str(why)
-        self.trouble = " ".join(text.split()) or type(why).__name__
-        if not _warned and multiprocessing.parent_process() is None:
-            _warned = True
-            text = f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}"
-            warnings.warn(text, CacheWarning, stacklevel=2)
+    def save(self, sig: Any, result: Any) -> Path | None:
+        """Keep code; an error of any kind is raised where it cannot be kept."""
+        code, path = self._file(sig)
+        if code.check_cachable(result) and _read_sources() == _sources:
+            data = dumps(code.reduce(result))  # type: ignore[no-untyped-call]
+            with atomic_file(path) as file:
+                file.write(hashlib.sha256(data).digest() + data)
+        return path
 
 
 _warned = False
-_functions: dict[str, _Function] = {}
 
 CACHE_ADVICE = (
     "every process compiles anew, for a minute or so: name a folder that can be written in "
@@ -197,26 +205,27 @@ CACHE_ADVICE = (
 """What it means that compiled code is not kept, and what helps."""
 
 
-def is_on_disk(function: _Function) -> bool:
-    """Whether any process here has compiled a function before, or none can do so for this one.
-
-    True, too, where code is not kept and where nothing is compiled (``NUMBA_DISABLE_JIT``).
-    """
-    cache = getattr(function, "_cache", None)
-    return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
+def _reason(error: Exception) -> str:
+    """Say in one line why code is not kept."""
+    text = "no folder for it can be written" if "no locator available" in str(error) else str(error)
+    return " ".join(text.split()) or type(error).__name__
 
 
-def functions_to_compile() -> set[str]:
-    """Compiled functions, of modules imported so far, of which there is no code on disk.
-
-    None where code is not kept, and where nothing is compiled.
-    """
-    return {name for name, function in _functions.items() if not is_on_disk(function)}
+def _warn(error: Exception) -> None:
+    """Warn once that code is not kept, in the process that starts workers and not in them."""
+    global _warned
+    if not _warned and multiprocessing.parent_process() is None:
+        _warned = True
+        text = f"compiled code is not kept ({_reason(error)}); {CACHE_ADVICE}"
+        warnings.warn(text, CacheWarning, stacklevel=2)
 
 
 def check_cache() -> None:
     """Warn where no folder for compiled code can be written, before workers start, which do not."""
-    is_on_disk(compiled()(_increment))
+    try:
+        _place(config.CACHE_DIR)  # type: ignore[attr-defined]
+    except Exception as error:  # also what another version of Numba may raise here
+        _warn(error)
 
 
 def try_cache() -> tuple[str, str]:
@@ -232,16 +241,15 @@ def try_cache() -> tuple[str, str]:
             "NUMBA_DISABLE_JIT is set, which makes all of it very slow: unset it",
         )
     cache, sig = dispatcher._cache, (types.int64,)
-    cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first
     dispatcher._cache = NullCache()  # whatever is there, it is compiled
     dispatcher.compile(sig)
-    cache.save_overload(sig, dispatcher.overloads[sig])
-    trouble = cache.trouble
-    if not trouble and cache.load_overload(sig, dispatcher.targetctx) is None:
-        trouble = "what was written could not be loaded again"
-    if trouble:
-        return f"not kept: {trouble}", f"compiled code is not kept; {CACHE_ADVICE}"
-    return f"kept, for one in {cache.cache_path}", ""
+    try:
+        path = cache.save(sig, dispatcher.overloads[sig])
+        if cache.load_overload(sig, dispatcher.targetctx) is None:
+            raise OSError("what was written could not be loaded again")
+    except Exception as error:
+        return f"not kept: {_reason(error)}", f"compiled code is not kept; {CACHE_ADVICE}"
+    return f"kept, in {path.parent}", ""
 
 
 def _increment(number):

@@ -53,8 +53,7 @@ class Capture:
     ``summed`` is the model of the echoes that are summed at every chirp: all but ghosts that the
     room approximates. ``link_budget`` is that of the people's parts, ``warned`` its warnings.
     ``n_chirps`` are whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame,
-    ``noise`` is that of the IF samples, ``receiver`` what else their receiver adds, and
-    ``warmup_s`` the time until everything was compiled or loaded [s].
+    ``noise`` is that of the IF samples, and ``receiver`` what else their receiver adds.
     """
 
     people: tuple[Person, ...]
@@ -71,7 +70,6 @@ class Capture:
     receiver: ReceiverStage | None
     n_chirps: int
     frame_starts: NDArray[np.int64]
-    warmup_s: float
 
     @property
     def radar(self) -> Radar:

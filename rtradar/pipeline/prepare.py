@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -13,14 +12,11 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Person
 from rtradar.body.people import body_of_people
 from rtradar.description import Movers
-from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
 from rtradar.pipeline.processing import Processing
-from rtradar.pipeline.timing import reuse_freed_memory, stage_line
-from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
+from rtradar.pipeline.timing import stage_line
 from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
@@ -28,7 +24,6 @@ from rtradar.scatter.binary_phase import BinaryPhaseModel
 from rtradar.scatter.common.poses import has_mesh
 from rtradar.scatter.link_budget import LinkBudget, link_budget, power_of_parts_alone
 from rtradar.scatter.people_and_objects import PeopleAndObjects, build_model_of_all
-from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.validity import warn_of
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
@@ -49,25 +44,18 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
     """
     scene, everyone = people_in(scene, moving)
     _refuse_together(radar, scene, settings)
-    reuse_freed_memory()
     processing = Processing.of(radar, settings)
-    with stage_line("preparing"):
-        with processing_compiled_beside():
-            # People, objects and the radar at their places in the world.
-            with processing.stages.time("motion"):
-                body = body_of_people(everyone, settings)
-                radar = scene.place(radar)
-                processing = replace(processing, radar=radar)
-            n_chirps, frame_starts = _frames(radar, body)
-            # What they return at this level, over every path.
-            warm_up_start = time.perf_counter()
-            model = _echo_model(radar, body, scene, settings)
-            first = _first_echoes(model, radar, body)
-        warm_up_processing(first, radar)
-        warmup_s = time.perf_counter() - warm_up_start
-    # How strong people are without the room, and with that the noise.
+    # People, objects and the radar at their places in the world.
+    with stage_line("preparing"), processing.stages.time("motion"):
+        body = body_of_people(everyone, settings)
+        radar = scene.place(radar)
+        processing = replace(processing, radar=radar)
+    n_chirps, frame_starts = _frames(radar, body)
+    # What they return at this level, over every path, and how strong they are without the room.
     with processing.stages.time("survey"):
+        model = _echo_model(radar, body, scene, settings)
         budget, warned = _surveyed(model, radar, body, n_chirps, scene, settings)
+    # With that the noise.
     noise = _noise(radar, budget, settings)
     # The room: its clutter, and which echoes over its walls are worth their cost beside the noise.
     room: PreparedRoom | None = None
@@ -80,7 +68,7 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
             room = prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
             summed = room.summed
     # What else the receiver does to the samples, by the strongest that moves.
-    movers = _movers(budget, model, first, n_chirps) if radar.receiver is not None else ()
+    movers = _movers(budget, model, radar, n_chirps) if radar.receiver is not None else ()
     receiver = _receiver(radar, movers, noise, room, n_chirps, settings)
     return Capture(
         people=everyone,
@@ -97,7 +85,6 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
         receiver=receiver,
         n_chirps=n_chirps,
         frame_starts=frame_starts,
-        warmup_s=warmup_s,
     )
 
 
@@ -116,20 +103,6 @@ def _refuse_together(radar: Radar, scene: Scene, settings: RunSettings) -> None:
             f"scene '{scene.name}': radar '{radar.name}' has multiplexing = 'bpm', which is "
             "simulated in free space only; take 'tdm', or leave the scene out"
         )
-
-
-def _first_echoes(model: PeopleAndObjects, radar: Radar, body: Body) -> Echoes:
-    """Compute some echoes, so that what they need is compiled, and specular points.
-
-    Not every level has these, and the report shows them of all.
-    """
-    chirps = np.arange(2 * radar.n_tx)
-    # Which paths of a room need a model of their own is not yet known.
-    room = model.room
-    echoes = model.echoes(chirps) if room is None else room.optical_echoes(chirps)
-    geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
-    solve_specular_points(geometry, points=True)
-    return echoes
 
 
 def _surveyed(
@@ -219,10 +192,13 @@ def power_alone(
 
 
 def _movers(
-    budget: LinkBudget, model: PeopleAndObjects, echoes: Echoes, n_chirps: int
+    budget: LinkBudget, model: PeopleAndObjects, radar: Radar, n_chirps: int
 ) -> tuple[Mover, ...]:
     """Return people, by the link budget and some echoes of everything, and each moving object."""
     objects = model.movers(n_chirps)
+    # Which paths of a room need a model of their own is not yet known.
+    chirps, room = np.arange(2 * radar.n_tx), model.room
+    echoes = model.echoes(chirps) if room is None else room.optical_echoes(chirps)
     own = echoes.part < len(budget.part_power)
     delays = mean_delays(replace(echoes, amplitude=np.where(own, echoes.amplitude, 0)))
     power = sum(budget.person_power)

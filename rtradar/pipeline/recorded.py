@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from io import BytesIO
@@ -21,12 +20,13 @@ from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
+from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.settings import ProcessingOptions, RunSettings, settings_of
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import brief
+from rtradar.system.clock import Moment
 from rtradar.system.output_folder import atomic_folder
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def process_samples(
     """
     settings = settings_of("process_samples", ProcessingOptions, options)
     forget_peak_memory()
-    started = time.perf_counter()
+    started = Moment.now()
     blocks = _Blocks(samples, radar, in_memory=out is None)
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
@@ -137,12 +137,11 @@ def process_samples(
 
 
 def _write(
-    folder: Path, blocks: _Blocks, processing: Processing, settings: RunSettings, started: float
+    folder: Path, blocks: _Blocks, processing: Processing, settings: RunSettings, started: Moment
 ) -> tuple[Clouds, dict[str, Any]]:
     """Write maps, clouds, pictures, report and summary; return the clouds and the summary."""
     radar = processing.radar
     clouds = _stream(blocks, processing, folder / "maps.h5")
-    return_freed_memory()
     with processing.stages.time("write"):
         write_clouds(folder, clouds)
     with processing.stages.time("pictures"):

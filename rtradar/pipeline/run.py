@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, Unpack
@@ -29,7 +28,7 @@ from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write
 from rtradar.pipeline.prepare import people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.timing import forget_peak_memory, return_freed_memory
+from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.view import run_view_of
 from rtradar.radar import Radar
 from rtradar.report import write_report
@@ -37,6 +36,7 @@ from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, settings_of, takes_settings
 from rtradar.system.checks import check_path
+from rtradar.system.clock import Moment
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
 
@@ -161,7 +161,6 @@ def run_into(
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
         clouds, table = _stream(capture, folder / "maps.h5", kept)
-        return_freed_memory()
         points = clouds.rdt.points
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
@@ -176,7 +175,6 @@ def run_into(
             save_snapshots(folder / "view.npz", snapshots(table))
             with read_maps(folder / "maps.h5") as maps:
                 _add_room(summary, capture, maps)
-        return_freed_memory()
         with capture.stages.time("report"):
             write_report(
                 folder / "report.html",
@@ -206,10 +204,10 @@ def run_into(
     )
 
 
-def _start() -> tuple[float, int]:
-    """Return the time at which a run starts, and the number of rays traced before."""
+def _start() -> tuple[Moment, int]:
+    """Return the moment at which a run starts, and the number of rays traced before."""
     forget_peak_memory()
-    return time.perf_counter(), rays_traced()
+    return Moment.now(), rays_traced()
 
 
 def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:

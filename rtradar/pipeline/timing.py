@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import platform
 import resource
 import sys
 import time
@@ -12,6 +10,8 @@ from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TypeVar
+
+from rtradar.system.clock import Moment
 
 _LINES = {
     "survey": "link budget",
@@ -56,7 +56,7 @@ def stage_line(text: str) -> Iterator[None]:
 
 
 class Stages:
-    """Wall-clock time [s] by the name of the stage, in ``seconds``."""
+    """Wall-clock time [s] by the name of the stage, in ``seconds``, without that of warming up."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -64,12 +64,12 @@ class Stages:
     @contextmanager
     def time(self, name: str) -> Iterator[None]:
         """Add the time spent inside to stage ``name``."""
-        start = time.perf_counter()
+        start = Moment.now().work_s
         try:
             with stage_line(_LINES[name]) if name in _LINES else nullcontext():
                 yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + Moment.now().work_s - start
 
     def each(self, name: str, items: Iterable[_Item]) -> Iterator[_Item]:
         """Yield items, and add the time until each comes to stage ``name``."""
@@ -81,28 +81,6 @@ class Stages:
                 except StopIteration:
                     return
             yield item
-
-
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h of the GNU C library
-_HEAP_BYTES = 1 << 24
-
-
-def reuse_freed_memory() -> None:
-    """Make the GNU C library reuse freed arrays of up to 16 MB, in one heap, for the whole process.
-
-    By default it returns them to the system, which has to clear the pages for the next block.
-    """
-    if platform.libc_ver()[0] == "glibc":
-        library = ctypes.CDLL(None)
-        library.mallopt(_M_ARENA_MAX, 1)
-        library.mallopt(_M_MMAP_THRESHOLD, _HEAP_BYTES)
-        library.mallopt(_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)
-
-
-def return_freed_memory() -> None:
-    """Return freed arrays to the system, so that what follows does not come on top of them."""
-    if platform.libc_ver()[0] == "glibc":
-        ctypes.CDLL(None).malloc_trim(0)
 
 
 def forget_peak_memory() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import sys
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -10,14 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rtradar.pipeline import timing
-from rtradar.pipeline.timing import (
-    Stages,
-    forget_peak_memory,
-    peak_memory_mb,
-    return_freed_memory,
-    reuse_freed_memory,
-)
+from rtradar.pipeline.timing import Stages, forget_peak_memory, peak_memory_mb
+from rtradar.system import clock
+from rtradar.system.clock import warming_up
 
 
 def test_stages_add_up_by_name_also_after_an_error() -> None:
@@ -35,7 +29,7 @@ def test_stages_add_up_by_name_also_after_an_error() -> None:
 
 def test_the_time_until_each_item_comes_is_that_of_a_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = [0.0]
-    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))
+    monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))
     stages = Stages()
 
     def items() -> Iterator[int]:
@@ -52,6 +46,20 @@ def test_the_time_until_each_item_comes_is_that_of_a_stage(monkeypatch: pytest.M
     assert stages.seconds == {"items": 7.0}
 
 
+def test_warming_up_is_the_time_of_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = [0.0]
+    monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))
+    stages = Stages()
+    with stages.time("a stage"):
+        now_s[0] += 1.0
+        with warming_up():
+            now_s[0] += 2.0
+        now_s[0] += 4.0
+    with warming_up(), stages.time("another"):
+        now_s[0] += 8.0
+    assert stages.seconds == {"a stage": 5.0, "another": 0.0}
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
 def test_a_peak_is_seen_and_forgotten() -> None:
     forget_peak_memory()  # that of whatever this process has tested before
@@ -63,17 +71,3 @@ def test_a_peak_is_seen_and_forgotten() -> None:
     assert peak_memory_mb() >= with_it - 1
     forget_peak_memory()
     assert peak_memory_mb() < with_it - 200
-
-
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only the GNU C library is told")
-def test_what_is_freed_below_what_is_in_use_is_returned() -> None:
-    reuse_freed_memory()
-    arrays = [np.ones(125_000) for _ in range(200)]  # 200 MB
-    last = arrays[-1]
-    arrays.clear()
-    forget_peak_memory()
-    before = peak_memory_mb()
-    return_freed_memory()
-    forget_peak_memory()
-    assert peak_memory_mb() < before - 150
-    assert last.all()

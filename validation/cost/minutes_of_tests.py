@@ -29,6 +29,8 @@ from typing import Any
 
 import pytest
 
+from rtradar.system.clock import Moment
+
 CHECKOUT = Path(__file__).resolve().parents[2]
 FOLDER = "RTRADAR_MINUTES_OF_TESTS"
 """Environment variable of the folder into which each worker writes its rows."""
@@ -44,28 +46,8 @@ class Recorder:
     """The plug-in: one row a test and phase, with its seconds, processor time and compiling."""
 
     def __init__(self, folder: Path, worker: str) -> None:
-        from numba.core import event
-
         self._file = (folder / f"{worker}.jsonl").open("w")
-        self._compiling = self._depth = 0.0
-        self._began = 0.0
         self._collected = False
-        recorder = self
-
-        class Compiling(event.Listener):
-            """Sums the outermost compilations; those they start in turn are within them."""
-
-            def on_start(self, _: event.Event) -> None:
-                if not recorder._depth:
-                    recorder._began = time.perf_counter()
-                recorder._depth += 1
-
-            def on_end(self, _: event.Event) -> None:
-                recorder._depth -= 1
-                if not recorder._depth:
-                    recorder._compiling += time.perf_counter() - recorder._began
-
-        event.register("numba:compile", Compiling())
 
     def _row(self, **values: Any) -> None:
         self._file.write(json.dumps(values) + "\n")
@@ -76,7 +58,7 @@ class Recorder:
         self._row(phase="collect", at=time.time(), cpu=own, child_cpu=children, test="", fixture="")
 
     def _measured(self, phase: str, item: pytest.Item, fixture: str = "") -> Iterator[None]:
-        began, (own, children), compiling = time.perf_counter(), _cpu(), self._compiling
+        began, (own, children), compiling = time.perf_counter(), _cpu(), Moment.now().warm_up_s
         outcome = yield
         now = _cpu()
         self._row(
@@ -86,7 +68,7 @@ class Recorder:
             wall=time.perf_counter() - began,
             cpu=now[0] - own,
             child_cpu=now[1] - children,
-            compiling=self._compiling - compiling,
+            compiling=Moment.now().warm_up_s - compiling,
             at=time.time(),
         )
         return outcome

@@ -53,11 +53,11 @@ def measure(checkout: Path, words: list[str], folder: Path, first_use: bool) -> 
         command = [sys.executable, "-P", "-c", RUN, str(checkout), "run", *words]
         command += ["--out", out, "--json", str(summary_file)]
         environment = os.environ | ({"NUMBA_CACHE_DIR": cache} if first_use else {})
-        began, used_s = time.perf_counter(), _children_s()
+        began, used_s = time.perf_counter(), children_s()
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, cwd=folder, env=environment
         )
-        whole_s, used_s = time.perf_counter() - began, _children_s() - used_s
+        whole_s, used_s = time.perf_counter() - began, children_s() - used_s
     if done.returncode:
         raise SystemExit(f"{checkout}: {' '.join(words)}: {done.stderr.strip()}")
     summary = json.loads(summary_file.read_text())
@@ -67,7 +67,7 @@ def measure(checkout: Path, words: list[str], folder: Path, first_use: bool) -> 
     return to_cloud_s(summary["stages"], summary["wall_s"]), summary["wall_s"], used_s, peak_mb
 
 
-def _children_s() -> float:
+def children_s() -> float:
     """CPU time of all processes that were started and have ended [s]."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

@@ -7,7 +7,6 @@ import json
 import math
 import os
 import platform
-import time
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -22,22 +21,22 @@ from rtradar.radar import Radar
 from rtradar.scatter import account_of
 from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions, RunSettings
+from rtradar.system.clock import Moment
 
 _PACKAGES = (
     "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
 )  # fmt: skip
 
 
-def cost_of(capture: Capture, started_s: float) -> dict[str, Any]:
+def cost_of(capture: Capture, started: Moment) -> dict[str, Any]:
     """Return the cost of a run so far, see `cost`."""
-    return cost(capture.processing, capture.n_chirps, started_s, capture.warmup_s)
+    return cost(capture.processing, capture.n_chirps, started)
 
 
-def cost(
-    processing: Processing, n_chirps: int, started_s: float, warmup_s: float = 0.0
-) -> dict[str, Any]:
-    """Return time and memory since ``started_s`` of `time.perf_counter`, for so many chirps."""
-    wall_s = time.perf_counter() - started_s - warmup_s
+def cost(processing: Processing, n_chirps: int, started: Moment) -> dict[str, Any]:
+    """Return time since ``started``, and memory, for so many chirps."""
+    now = Moment.now()
+    wall_s, warmup_s = now.work_s - started.work_s, now.warm_up_s - started.warm_up_s
     capture_s = processing.radar.duration_of(n_chirps)
     return {
         "stages": {name: round(spent, 4) for name, spent in processing.stages.seconds.items()},
@@ -49,8 +48,8 @@ def cost(
     }
 
 
-def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, Any]:
-    """Return the summary of a run that started at ``started_s``, see `cost`."""
+def summary_of(capture: Capture, clouds: Clouds, started: Moment) -> dict[str, Any]:
+    """Return the summary of a run that started at ``started``, see `cost`."""
     settings, radar, budget = capture.settings, capture.radar, capture.link_budget
     # A model may trace nothing yet, and would if a part came near a line of sight.
     traces = capture.model.variant is not None or getattr(
@@ -69,7 +68,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
-        **cost_of(capture, started_s),
+        **cost_of(capture, started),
         **_found(radar, capture.n_chirps, clouds),
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
@@ -128,9 +127,9 @@ def summary_of_samples(
     settings: RunSettings,
     n_chirps: int,
     clouds: Clouds,
-    started_s: float,
+    started: Moment,
 ) -> dict[str, Any]:
-    """Return the summary of so many chirps of IF samples; their processing began at ``started_s``.
+    """Return the summary of so many chirps of IF samples; their processing began at ``started``.
 
     It has no entries of motion, scene, echoes and noise, which are not known.
     """
@@ -143,7 +142,7 @@ def summary_of_samples(
         | {"duration_s": capture_s, "unit": processing.unit, "radar": dataclasses.asdict(radar)},
         "seed": settings.seed,
         "versions": {"python": platform.python_version(), **_versions()},
-        **cost(processing, n_chirps, started_s),
+        **cost(processing, n_chirps, started),
         **_found(radar, n_chirps, clouds),
         "limits": _limits_of_detections(clouds),
     }

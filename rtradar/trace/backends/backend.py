@@ -16,6 +16,7 @@ from types import ModuleType
 from typing import Literal
 
 from rtradar.errors import BackendError, InputError
+from rtradar.system.clock import warming_up
 from rtradar.trace.backends.jit_threads import begin_with_one
 from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
 from rtradar.trace.backends.probe import ProbeResult, probe_backend
@@ -50,6 +51,7 @@ class Backend:
     warning: str | None = None
 
 
+@warming_up()
 def select(variant: str = "auto") -> Backend:
     """The backend to use.
 
@@ -88,6 +90,7 @@ def select(variant: str = "auto") -> Backend:
     return Backend("scalar", VARIANTS["scalar"], None, None, warning)
 
 
+@warming_up()
 def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
@@ -98,11 +101,12 @@ def use(backend: Backend) -> ModuleType:
     """
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules
-    if loaded is None and backend.llvm_path is not None:
-        os.environ[ENVIRONMENT_VARIABLE] = backend.llvm_path
-    elif backend.kind == "llvm" and loaded != backend.llvm_version:
+    if backend.kind == "llvm" and loaded not in (None, backend.llvm_version):
         raise BackendError(_loaded_before(loaded))
+    named = os.environ.get(ENVIRONMENT_VARIABLE)
     try:
+        if backend.llvm_path is not None:
+            os.environ[ENVIRONMENT_VARIABLE] = backend.llvm_path
         import mitsuba as mi
 
         # Whoever imported Dr.Jit before us may have computed with it, and sets its threads.
@@ -115,6 +119,10 @@ def use(backend: Backend) -> ModuleType:
         raise BackendError(
             f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor"
         ) from error
+    finally:  # only Dr.Jit was to read it
+        os.environ.pop(ENVIRONMENT_VARIABLE, None)
+        if named is not None:
+            os.environ[ENVIRONMENT_VARIABLE] = named
     return mi
 
 

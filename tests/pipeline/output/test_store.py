@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rtradar.pipeline.output.map_store import MapStore, read_maps
-from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb, return_freed_memory
+from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb
 
 FIXED = {"range": np.arange(256.0), "velocity": np.arange(128.0)}
 
@@ -65,7 +65,6 @@ def test_reading_a_long_file_through_takes_no_more_memory_than_a_frame(tmp_path:
         power, mask = maps["range_doppler"], maps["detections"]
         assert power[0].all()
         assert mask[0].all()
-        return_freed_memory()
         forget_peak_memory()
         before = peak_memory_mb()
         for window in range(200):
