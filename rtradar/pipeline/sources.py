@@ -132,7 +132,7 @@ class Sources:
         radar, count = self._capture.radar, min(len(one.part) for one in looks)
         # More may come while they are asked for.
         range_m, rate_mps, power_m2 = (
-            np.array([getattr(one, name)[:count] for one in looks])
+            np.array([getattr(one, name)[:count] for one in looks], dtype=np.float64)
             for name in ("range_m", "rate_mps", "power_m2")
         )
         power_m2 = np.where(range_m < radar.max_range_m, power_m2, 0.0)

@@ -377,7 +377,8 @@ def _map(spectra: AngleSpectra, line: str, sines: _Reals, radar: Radar) -> _Real
             f"line of at least 2 channels along {line}; give it one"
         )
     total = np.zeros((radar.samples_per_chirp, sines.shape[-1]))
-    own = np.ascontiguousarray(np.broadcast_to(sines, (len(power), sines.shape[-1])))
+    # What may not be written to is another type to Numba, for which it would compile all again.
+    own = np.array(np.broadcast_to(sines, (len(power), sines.shape[-1])), order="C")
     bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
     grid = spectra.sines
     add_interpolated(power, own, grid[0], grid[1] - grid[0], bins, total)

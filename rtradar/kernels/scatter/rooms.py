@@ -236,7 +236,8 @@ def outline_near(origins, ways, later_m, edges):
                 continue
             if count == found.shape[1]:
                 more = np.empty((2, 2 * count), dtype=np.int64)
-                more[:, :count] = found
+                for own in range(count):  # a slice would bring in the texts of Numba's errors
+                    more[0, own], more[1, own] = found[0, own], found[1, own]
                 found = more
             found[0, count], found[1, count] = leg, edge
             count += 1
