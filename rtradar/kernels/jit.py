@@ -46,11 +46,10 @@ class _Compiler(Compiler):
     and how others' do on ours. Here each ``fastmath`` has a table.
     """
 
-    def __init__(
-        self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any
-    ) -> None:
+    def __init__(self, typing: Any, target: Any, *given: Any) -> None:
+        _, _, _, flags, _ = given  # library, arguments, result, flags, locals
         own = target.subtarget(cached_internal_func=_tables[frozenset(flags.fastmath.flags)])
-        super().__init__(typing, own, library, args, result, flags, *more)  # type: ignore[no-untyped-call]
+        super().__init__(typing, own, *given)  # type: ignore[no-untyped-call]
 
 
 def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
@@ -101,7 +100,10 @@ def on_cache_lines(count, like):
     return store[begin : begin + count]
 
 
-_SETTINGS = "OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE"
+_SETTINGS = (
+    *("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT"),
+    *("LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML"),
+)
 """Settings of Numba, by environment variables, that change its code."""
 
 _UNUSED_S = 30 * 86400.0  # after which code of other versions goes

@@ -105,6 +105,17 @@ def test_threads_disk_and_what_came_before_change_no_bit(runs: Path, case: str, 
     assert [name for name in one if one[name] != other.get(name)] == []
 
 
+@pytest.mark.slow
+def test_compiling_is_warm_up_wherever_it_falls(runs: Path) -> None:
+    first, again = (
+        json.loads((runs / "analytic" / way / "summary.json").read_text())
+        for way in ("compiled", "loaded")
+    )
+    assert first["warmup_s"] > 3 * again["warmup_s"]
+    # Without compiling, which takes much longer than this small run.
+    assert sum(first["stages"].values()) <= first["wall_s"] < first["warmup_s"]
+
+
 def compiled_functions() -> dict[tuple[Path, str], tuple[set[str], bool]]:
     """By file and name: what each compiled function calls, and whether it is always inlined."""
     found = {}

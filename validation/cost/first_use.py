@@ -5,11 +5,13 @@ of fonts that are empty, and then with those that the first has filled. Function
 one process that runs all levels and a room in turn; a function is named with all that it takes in
 and that no function before it needed. `rtradar doctor` is timed by the clock.
 
-    python validation/cost/first_use.py [--quick] [--json FILE]
+    python validation/cost/first_use.py [--duration 1] [--json FILE]
 """
 
 from __future__ import annotations
 
+import argparse
+import dataclasses
 import json
 import subprocess
 import sys
@@ -23,7 +25,7 @@ from numba.core import event
 from speed_since import CASES, children_s
 
 from rtradar.bench.runs import with_caches_in
-from rtradar.validate.rows import Row, judged, main, reported
+from rtradar.validate.rows import Row, judged, reported, table
 
 MOST_S = {"specular": 6.0, "specular, living-room": 14.0}
 ALL_S, FUNCTION_S, DOCTOR_S = 45.0, 4.0, 5.0
@@ -72,8 +74,8 @@ def run(words: list[str], home: Path) -> tuple[str, float, float]:
     return done.stdout, time.perf_counter() - began, children_s() - used_s
 
 
-def measure(quick: bool) -> list[Row]:
-    duration, rows = "0.2" if quick else "1", list[Row]()
+def measure(duration: str) -> list[Row]:
+    rows: list[Row] = []
     walk = ["run", "synthetic:walk", "--duration", duration, "--overwrite", "--out"]
     for name, options in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
@@ -87,13 +89,25 @@ def measure(quick: bool) -> list[Row]:
         doctor_s = run(["-m", "rtradar", "doctor"], Path(folder))[1]
     seconds = json.loads(said.splitlines()[-1])
     rows.append(judged("all functions", "CPU", "s", sum(seconds.values()), ALL_S))
-    for name in sorted(seconds, key=seconds.__getitem__, reverse=True):
-        rows.append(judged(name, "CPU", "s", seconds[name], FUNCTION_S))
+    slowest_first = sorted(seconds, key=seconds.__getitem__, reverse=True)
+    rows += [judged(name, "CPU", "s", seconds[name], FUNCTION_S) for name in slowest_first]
     rows.append(judged("rtradar doctor", "time", "s", doctor_s, DOCTOR_S))
     return rows
 
 
-if __name__ == "__main__":
+def main() -> int:
     if sys.argv[1:2] == [_FUNCTIONS]:
-        sys.exit(compile_all(json.loads(sys.argv[2])))
-    sys.exit(main(__doc__.splitlines()[0], measure))
+        return compile_all(json.loads(sys.argv[2]))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--duration", default="1", help="duration of the walk [s] (default: 1)")
+    parser.add_argument("--json", type=Path, help="file for all figures")
+    options = parser.parse_args()
+    rows = measure(options.duration)
+    print(table(rows))
+    if options.json is not None:
+        options.json.write_text(json.dumps([dataclasses.asdict(row) for row in rows]) + "\n")
+    return int(not all(row.passed for row in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
