@@ -52,6 +52,10 @@ class _Compiler(Compiler):
         super().__init__(typing, own, *given)  # type: ignore[no-untyped-call]
 
 
+# Nobody calls ours from C: without the wrapper for that, compiling takes a tenth less.
+_OPTIONS: Any = {"error_model": "numpy", "pipeline_class": _Compiler, "no_cfunc_wrapper": True}
+
+
 def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
@@ -60,9 +64,7 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
     loading is that of `warming_up`. ``fastmath`` are the liberties that LLVM may take with floating
     point: all of them, or those named.
     """
-    numba_decorator: Callable[[_Function], Any] = njit(
-        nogil=True, error_model="numpy", fastmath=fastmath, pipeline_class=_Compiler
-    )
+    numba_decorator: Callable[[_Function], Any] = njit(nogil=True, fastmath=fastmath, **_OPTIONS)
 
     def decorator(function: _Function) -> _Function:
         dispatcher = numba_decorator(function)
@@ -83,7 +85,7 @@ def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Func
     `compiled`, for what this function does.
     """
     numba_decorator: Callable[[_Function], _Function] = register_jitable(
-        forceinline=True, error_model="numpy", fastmath=fastmath, pipeline_class=_Compiler
+        forceinline=True, fastmath=fastmath, **_OPTIONS
     )
     return numba_decorator
 

@@ -93,15 +93,20 @@ def slab_fields(field, ways, slab, out):
     numbers of passes reflect it, odd ones let it through.
     """
     nodes, waves, _ = out.shape
-    normal = slab.normal
-    across, up, leaving, up_after = np.empty((4, 3))
+    # Rows of one array are of one type: for each other Numba would compile `_cross` again.
+    normal, way, across, up, leaving, up_after, axis, spare = np.zeros((8, 3))
+    least = 0
+    for i in range(3):
+        normal[i] = slab.normal[i]
+        if abs(normal[i]) < abs(normal[least]):
+            least = i
     # At normal incidence both coefficients do the same: any direction across the ray serves.
-    spare, axis = np.empty(3), np.zeros(3)
-    axis[np.argmin(np.abs(normal))] = 1
+    axis[least] = 1
     _cross(normal, axis, spare)
     size = math.sqrt(dot(spare, spare))
     for wave in range(waves):
-        way = ways[wave]
+        for i in range(3):
+            way[i] = ways[wave, i]
         along = dot(way, normal)
         bend = 2 * along if slab.passes % 2 == 0 else 0.0
         for i in range(3):
