@@ -373,6 +373,8 @@ def wrong_tables(text: str, folder: Path) -> list[str]:
         try:
             if tables & {"each", "windows", "synthetic", "recordings"}:
                 read_spec(path)
+            elif tables & {"scene", "settings"}:
+                _ = rt.Experiment.load(path).parts
             elif tables & {"materials", *(key.strip("[]") for key in KEYS)}:
                 rt.Scene.load(path)
             elif "project" not in tables:  # which is of a package of the reader's own

@@ -79,9 +79,15 @@ def unsafe(source: str) -> list[str]:
 
 def test_no_source_can_load_a_pickle() -> None:
     assert len(SOURCES) > 100
-    assert {
-        str(path): found for path in SOURCES if (found := unsafe(path.read_text(encoding="utf-8")))
-    } == {}
+    found = {
+        path.as_posix(): wrong
+        for path in SOURCES
+        if (wrong := unsafe(path.read_text(encoding="utf-8")))
+    }
+    # Numba's machine code is kept as Numba keeps it: who can write there can run code anyway.
+    (compiled,) = found
+    assert compiled.endswith("rtradar/kernels/jit.py")
+    assert found[compiled] == ["pickle"]
 
 
 @pytest.mark.parametrize(

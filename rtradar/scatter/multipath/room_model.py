@@ -241,8 +241,11 @@ class RoomModel:
         if columns.delayed:
             echo = np.array(columns.echo)
             length = columns.lengths(legs, there, near.places(), length)
-            bare = bare[..., echo]
-            factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
+            # Contiguous, or Numba would compile the same for another layout.
+            bare = np.ascontiguousarray(bare[..., echo])
+            factors = [
+                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
+            ]
         # Times what walls, the body's surface and occluders leave.
         frequency = self._around.walls.frequency
         if all(bool((own.factor == own.factor[:, :1]).all()) for own in factors):
@@ -293,7 +296,9 @@ class RoomModel:
         echo = np.array(columns.echo)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
-            factors = [own._replace(seen=own.seen[..., echo]) for own in factors]
+            factors = [
+                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
+            ]
             there, legs = self._images(at)
             points = nearby_points(blend, before, after).places()
             extra = columns.lengths(legs, there, points, extra)
