@@ -167,7 +167,7 @@ def imported() -> None:
     for name in (
         "torch",
         "matplotlib.pyplot",
-        "rtradar.pipeline.view",
+        "rtradar.pipeline.output.view",
         "rtradar.campaign",
     ):
         pytest.importorskip(name)

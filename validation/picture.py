@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import rtradar as rt
-from rtradar.pipeline.view import view
+from rtradar.pipeline.output.view import view
 
 MOMENT_S = 1.3
 

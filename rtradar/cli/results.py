@@ -52,7 +52,7 @@ def _view(options: argparse.Namespace) -> int:
     check_place(options.json)
     if options.time is not None and options.still is None:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
-    from rtradar.pipeline.view import view
+    from rtradar.pipeline.output.view import view
 
     page = options.out or (None if options.still else _own_page(options.folder))
     shown = view(

@@ -23,11 +23,11 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.labelled_echoes import compared_echoes
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
+from rtradar.pipeline.output.view import load_run_view
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
-from rtradar.pipeline.view import load_run_view
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit

@@ -21,8 +21,8 @@ from rtradar.pipeline.compare import (
     map_figures,
     write_figures,
 )
+from rtradar.pipeline.output.view import run_maps, run_points, run_summary
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.pipeline.view import run_maps, run_points, run_summary
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.figures.fitting import above_floor

@@ -139,7 +139,7 @@ class Result:
             If the results are those of IF samples, where there is no body to show, or if files of
             the folder are missing or damaged.
         """
-        from rtradar.pipeline.view import assembled, load_run_view
+        from rtradar.pipeline.output.view import assembled, load_run_view
         from rtradar.report.view.run_view import write_view
 
         if self._table is not None:

@@ -24,12 +24,12 @@ from rtradar.pipeline.output.pictures import draw_pictures
 from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost_of, finished, summary_of
+from rtradar.pipeline.output.view import run_view_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
 from rtradar.pipeline.prepare import people_in, prepare
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
-from rtradar.pipeline.view import run_view_of
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.pipeline.view import load_run_view, view
+from rtradar.pipeline.output.view import load_run_view, view
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots, save_snapshots
 

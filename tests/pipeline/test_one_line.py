@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import rtradar as rt
 from rtradar.exchange import read_cloud
-from rtradar.pipeline.view import load_run_view, view
+from rtradar.pipeline.output.view import load_run_view, view
 from rtradar.system import figure_style
 
 pytestmark = pytest.mark.drawn

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline.view import load_run_view
+from rtradar.pipeline.output.view import load_run_view
 from rtradar.report.pages.comparison import comparison_data
 
 pytestmark = pytest.mark.slow

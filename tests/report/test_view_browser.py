@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline.view import load_run_view, view
+from rtradar.pipeline.output.view import load_run_view, view
 from rtradar.report.view.run_view import RunView
 from rtradar.scene import Furniture, material
 

@@ -11,7 +11,7 @@ import numpy as np
 from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
-from rtradar.pipeline.view import load_run_view
+from rtradar.pipeline.output.view import load_run_view
 from rtradar.report.view.run_view import view_data
 
 MAPS = {
