@@ -179,12 +179,14 @@ def compare(
     asked = settings = settings_of("compare", RunOptions, options)
     moving, before, there = given_parts(motion, radar, scene, settings)
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
-    with atomic_folder(check_path("out", out), kind, overwrite=overwrite) as folder:
+    place = check_path("out", out)
+    with atomic_folder(place, kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         occluded: dict[str, _Occluded] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = run_into(folder / name, moving, before, there, own)
+            into = folder / name
+            results[name] = run_into(into, moving, before, there, own, place=place / name)
             occluded[name] = _occluded(results[name], moving, before, there, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])

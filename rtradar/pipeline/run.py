@@ -149,8 +149,12 @@ def run_into(
     settings: RunSettings,
     overwrite: bool = False,
     pictures: bool = True,
+    place: Path | None = None,
 ) -> Result:
-    """Run with these settings and write the files of `RUN_FILES` into a folder; see `run`."""
+    """Run with these settings and write the files of `RUN_FILES` into a folder; see `run`.
+
+    ``place`` is where the folder will be in the end, if that is elsewhere.
+    """
     started, rays_before = _start()
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
@@ -170,7 +174,7 @@ def run_into(
                 drawn = draw_pictures(folder, capture, clouds)
         summary = summary_of(capture, clouds, started)
         summary["rays_traced"] = rays_traced() - rays_before
-        summary["run"] = write_run_file(folder, out, described)
+        summary["run"] = write_run_file(folder, place or out, described)
         with capture.stages.time("view"):
             save_snapshots(folder / "view.npz", snapshots(table))
             with read_maps(folder / "maps.h5") as maps:

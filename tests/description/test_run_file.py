@@ -159,6 +159,16 @@ def test_flags_and_keys_replace_what_the_run_file_says(tmp_path: Path) -> None:
     assert room["left"] == room["walls"] | {"material": "concrete"}
 
 
+def test_the_runs_of_a_comparison_can_be_repeated(recording: Path, tmp_path: Path) -> None:
+    levels = ("analytic-paper", "analytic")
+    walk, own = recording / "walk.npz", {"duration_s": 0.1}
+    rt.compare(walk, RADAR, out=tmp_path / "both", fidelities=levels, **own)  # type: ignore[arg-type]
+    for level in levels:
+        again = rt.Experiment.load(tmp_path / "both" / level / "run.toml")
+        again.run(tmp_path / level, pictures=False)
+        assert bits(tmp_path / level) == bits(tmp_path / "both" / level)
+
+
 # -- tables ----------------------------------------------------------------------------------------
 
 

@@ -14,7 +14,7 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.elementary import hermite_weights
+from rtradar.kernels.elementary import cubic_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
@@ -115,9 +115,10 @@ class Rays(BuiltInModel):
         frequency = self._nodes(orders > 1)
         length = np.zeros((len(at.tx), at.rx.shape[1], orders * parts))
         amplitude = np.zeros((len(frequency), *length.shape), dtype=np.complex128)
-        places = zip(*keyframe_before(self._radar, chirps, self._step), at.tx_index, strict=True)
-        for index, (before, fraction, tx) in enumerate(places):
-            for place, weight in enumerate(_cubic(fraction / self._step), start=int(before) - 1):
+        intervals, rest = keyframe_before(self._radar, chirps, self._step)
+        places = zip(intervals, cubic_weights(rest / self._step), at.tx_index, strict=True)
+        for index, (before, weights, tx) in enumerate(places):
+            for place, weight in enumerate(weights, start=int(before) - 1):
                 if weight != 0:
                     shot = self._shot(max(place, 0) * self._step, int(tx))
                     length[index] += weight * shot.length
@@ -235,9 +236,3 @@ class _Shot(NamedTuple):
 
     length: Array
     amplitude: NDArray[np.complex128]
-
-
-def _cubic(fraction: float) -> tuple[float, float, float, float]:
-    """Weights of keyframes -1, 0, 1, 2 at a fraction of the way from 0 to 1 (Catmull and Rom)."""
-    h0, h1, g0, g1 = hermite_weights(fraction, 1)
-    return -g0 / 2, h0 - g1 / 2, h1 + g0 / 2, g1 / 2
