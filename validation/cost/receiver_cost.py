@@ -52,7 +52,7 @@ def cost_rows(quick: bool) -> Iterator[Row]:
             for all_on in (False, True):
                 its = dataclasses.replace(ideal, receiver=receiver if all_on else None)
                 begin = time.process_time()
-                capture = prepare(motion, its, rt.Scene(), settings)
+                capture = prepare([motion], its, rt.Scene(), settings)
                 maker = CloudMaker(capture.processing)
                 capture.stream(maker, progress=False)
                 counts.append(len(maker.finish().spatial.points))
