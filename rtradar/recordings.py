@@ -24,6 +24,9 @@ UPWARD = ("x", "y", "z", "-x", "-y", "-z")
 SYNTHETIC = "synthetic:"
 """How the name of a synthetic motion begins."""
 
+ACTOR_S = 3.0
+"""How long a synthetic actor moves that is given by name alone [s]."""
+
 SAID = ("up", "unit", "rate_hz")
 """Keys of what may be said, in TOML as in Python."""
 

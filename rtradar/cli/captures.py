@@ -7,7 +7,6 @@ import dataclasses
 import os
 import re
 import sys
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
@@ -35,16 +34,13 @@ from rtradar.cli.values import (
     window,
 )
 from rtradar.errors import InputError
-from rtradar.recordings import SYNTHETIC
+from rtradar.recordings import ACTOR_S, SYNTHETIC
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
-    from rtradar.body import Person
     from rtradar.cli.values import OneLineParser, Subcommands
-    from rtradar.motion import Motion
     from rtradar.settings import RunSettings
 
-_SYNTHETIC_S = 3.0
 
 _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
     "fidelity": ("--fidelity", {"metavar": "NAME"}),
@@ -261,7 +257,7 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
         if default is False:
             options["action"] = "store_true"
         elif name == "duration_s":
-            text += f" (default: to the end; synthetic: {_SYNTHETIC_S:g})"
+            text += f" (default: to the end; synthetic: {ACTOR_S:g})"
         else:
             text += f" (default: {default})"
         if kind.startswith("{"):
@@ -272,18 +268,12 @@ def add_settings(command: OneLineParser, names: Iterable[str]) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.as_paper:
         _choose_as_paper(options)
-    values: dict[str, list[Any]] = {}
-    for key, value in options.set:
-        values.setdefault(key, []).append(value)
-    if any(len(own) > 1 for own in values.values()):
-        return _sweep(options, values)
+    if several := _several(options):
+        return _sweep(options, several)
     capture = _capture(options)
     from rtradar.pipeline import run
     from rtradar.pipeline.timing import lines_shown
 
-    for name in ("tolerance_db", "tolerance_complex"):
-        if getattr(options, name) is not None:
-            capture["model_options"][name] = getattr(options, name)
     with lines_shown():
         summary = run(**capture, pictures=options.pictures).summary
     tell(options, summary)
@@ -387,31 +377,26 @@ def _compare_folders(options: argparse.Namespace) -> int:
 
 def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, Any]:
     """Return the arguments that `run` and `compare` share; of several recordings each is alone."""
-    table, folder, skeletons = _tables(options, alone)
-    from rtradar.description import Parts, parts_of, with_value
+    table, folder = _tables(options, alone)
+    if several := _several(options):
+        raise InputError(f"--set {next(iter(several))}=... has several values; give it once")
+    from rtradar.description import parts_of
 
-    several = [key for key, count in Counter(key for key, _ in options.set).items() if count > 1]
-    if several:
-        raise InputError(f"--set {several[0]}=... has several values; give it once")
+    people, radar, scene, settings = parts_of(table, folder)
+    files = {"out": options.out, "overwrite": options.overwrite}
+    return {**vars(settings), "motion": people, "radar": radar, "scene": scene, **files}
+
+
+def _several(options: argparse.Namespace) -> dict[str, list[Any]]:
+    """Return the values of the keys that ``--set`` gives several."""
+    values: dict[str, list[Any]] = {}
     for key, value in options.set:
-        table = with_value(table, key, value)
-    parts: Parts = parts_of(table, folder)
-    people: list[Any] = [*parts.people] or _people(options, parts.settings, skeletons)
-    settings = vars(parts.settings)
-    return settings | {
-        "model_options": dict(settings["model_options"]) | dict(options.model_option),
-        "motion": people,
-        "radar": parts.radar,
-        "scene": parts.scene,
-        "out": options.out,
-        "overwrite": options.overwrite,
-    }
+        values.setdefault(key, []).append(value)
+    return {key: own for key, own in values.items() if len(own) > 1}
 
 
-def _tables(
-    options: argparse.Namespace, alone: bool = False
-) -> tuple[Mapping[str, Any], Path, Mapping[str, Path]]:
-    """Return the tables of the run file and the options, their folder, and skeletons by name."""
+def _tables(options: argparse.Namespace, alone: bool = False) -> tuple[Mapping[str, Any], Path]:
+    """Return the tables of the run file and of the options, and the folder of their paths."""
     check_place(options.json)
     from rtradar.settings import RunSettings
     from rtradar.system.registries import radar_table, scene_table
@@ -426,41 +411,39 @@ def _tables(
             look_up(source)
     run_file = _run_file(options)
     skeletons = {} if run_file else _checked_people(options, alone)
-    from rtradar.description import read_run_file, with_value
+    from rtradar.description import read_run_file, settings_of_table, with_value
 
     table = read_run_file(run_file, changed=options.changed) if run_file else {}
     for key, value in _described(options, settings):
         table = with_value(table, key, value)
-    return table, run_file.parent if run_file else Path(), skeletons
+    several = _several(options)
+    once = [own for own in options.set if own[0] not in several]
+    of_people = [own for own in once if own[0].startswith("people.")]
+    for key, value in once:
+        table = table if (key, value) in of_people else with_value(table, key, value)
+    if not run_file:
+        # Actors follow the settings, and what is said of them comes after.
+        chosen = settings_of_table(table.get("settings", {}))
+        table = {**table, "people": _people(options, chosen, skeletons)}
+    for key, value in of_people:
+        table = with_value(table, key, value)
+    return table, run_file.parent if run_file else Path()
 
 
 def _sweep(options: argparse.Namespace, values: Mapping[str, list[Any]]) -> int:
     """Run every combination of the values of keys that were given more than once."""
-    table, folder, skeletons = _tables(options)
-    from rtradar.description import parts_of, person_table, with_value
     from rtradar.pipeline import Experiment, sweep
     from rtradar.pipeline.timing import lines_shown
 
-    for key, (first, *others) in values.items():
-        if not others:
-            table = with_value(table, key, first)
-    if "people" not in table:
-        parts = parts_of(table, folder)
-        moving = _people(options, parts.settings, skeletons)
-        table = {**table, "people": [person_table(one) for one in moving]}
-    several = {key: own for key, own in values.items() if len(own) > 1}
+    written = {name: getattr(options, name) for name in ("out", "overwrite", "pictures")}
     with lines_shown():
-        found = sweep(
-            Experiment(table, folder),
-            several,
-            out=options.out,
-            overwrite=options.overwrite,
-            pictures=options.pictures,
-        )
+        found = sweep(Experiment(*_tables(options)), values, **written)
     if options.json is not None:
         write_json(options.json, found.summary)
     say(options, found.table())
     say(options, f"the table is {options.out / 'sweep.csv'}, each run in its folder")
+    if options.open:
+        show_page(options.out / "sweep.png")
     return 0
 
 
@@ -485,6 +468,12 @@ def _described(
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             value = dataclasses.asdict(value)
         yield f"settings.{name}", value
+    tolerances = {
+        name: getattr(options, name, None) for name in ("tolerance_db", "tolerance_complex")
+    }
+    for name, value in (*options.model_option, *tolerances.items()):
+        if value is not None:
+            yield f"settings.model_options.{name}", value
     for table in ("radar", "scene"):
         if (source := getattr(options, table)) is not None:
             # From here, not from the folder of a run file.
@@ -522,36 +511,18 @@ def _checked_people(options: argparse.Namespace, alone: bool) -> dict[str, Path]
 
 def _people(
     options: argparse.Namespace, settings: RunSettings, skeletons: Mapping[str, Path]
-) -> list[Motion | Person]:
-    """Return the motions of the command line, as people where places are given."""
-    from rtradar.motion import load_motion, synthetic_motion
+) -> list[dict[str, Any]]:
+    """Return the people of the command line as tables, whose motions are read."""
+    from rtradar.description import load_mover
 
-    motions: list[Motion] = []
-    for person, name in enumerate(options.motion):
-        if name.startswith(SYNTHETIC):
-            duration_s = _SYNTHETIC_S if settings.duration_s is None else settings.duration_s
-            motion = synthetic_motion(
-                name.removeprefix(SYNTHETIC),
-                seed=settings.seed + person,
-                duration_s=settings.start_s + duration_s,
-            )
-        else:
-            motion = load_motion(
-                name,
-                skeleton=skeletons.get(name),
-                up=options.up,
-                unit=options.unit,
-                rate_hz=options.rate,
-            )
-        motions.append(motion)
-    recorded = options.placement == "recorded"
-    if not (options.at or recorded):
-        return [*motions]
-    from rtradar.body import Person  # which takes long to import
-
-    places = options.at or [{}] * len(motions)
-    own = {"placement": options.placement} if recorded else {}
-    return [Person(motion, **own, **at) for motion, at in zip(motions, places, strict=True)]
+    said = {"up": options.up, "unit": options.unit, "rate_hz": options.rate}
+    placed = {} if options.placement is None else {"placement": options.placement}
+    people = []
+    for index, name in enumerate(options.motion):
+        motion = load_mover(name, index, settings, skeleton=skeletons.get(name), **said)
+        place = options.at[index] if options.at else {}
+        people.append({"motion": motion, **placed, **place})
+    return people
 
 
 def _skeletons(names: Sequence[str], skeletons: Sequence[Path]) -> dict[str, Path]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from rtradar.body import Person
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion, synthetic_motion
 from rtradar.radar import Radar
-from rtradar.recordings import SYNTHETIC
+from rtradar.recordings import ACTOR_S, SYNTHETIC
 from rtradar.scene import Object, Scene
 from rtradar.settings import RunSettings
 from rtradar.system.checks import brief
@@ -20,9 +20,6 @@ Movers: TypeAlias = Sequence[Motion | Person | Object]
 
 Moving: TypeAlias = Motion | Person | str | Path | Sequence[Motion | Person | Object | str | Path]
 """Who and what moves: one or several; a bare motion is a person where the scene puts them."""
-
-ACTOR_S = 3.0
-"""How long an actor moves that is given by name alone [s]."""
 
 
 def given_parts(
@@ -58,7 +55,7 @@ def given_parts(
         [moving] if isinstance(moving, str | Path) or not isinstance(moving, Sequence) else moving
     )
     found = [
-        _motion(one, number, settings) if isinstance(one, str | Path) else one
+        load_mover(one, number, settings) if isinstance(one, str | Path) else one
         for number, one in enumerate(several)
     ]
     radar = Radar.load(radar) if isinstance(radar, str | Path) else radar
@@ -77,10 +74,32 @@ def given_parts(
     return found, radar, scene
 
 
-def _motion(source: str | Path, number: int, settings: RunSettings) -> Motion:
+def load_mover(source: str | Path, number: int, settings: RunSettings, **reading: Any) -> Motion:
+    """Load a motion by the path of a recording, or ``synthetic:`` and an activity.
+
+    Parameters
+    ----------
+    source : str or path
+        Recording or actor.
+    number : int
+        Number of the person, which makes actors differ.
+    settings : RunSettings
+        Seed and interval, which actors follow.
+    **reading
+        What `load_motion` takes.
+
+    Returns
+    -------
+    Motion
+
+    Raises
+    ------
+    InputError
+        Where there is no such actor, or the recording cannot be read.
+    """
     text = str(source)
     if not text.startswith(SYNTHETIC):
-        return load_motion(source)
+        return load_motion(source, **reading)
     duration_s = ACTOR_S if settings.duration_s is None else settings.duration_s
     return synthetic_motion(
         text.removeprefix(SYNTHETIC),

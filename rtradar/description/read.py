@@ -120,7 +120,7 @@ def _merged(below: Any, over: Any) -> Any:
 def _people(table: Table, folder: Path, scene: Scene, settings: RunSettings) -> tuple[Person, ...]:
     """People of the run file, those without a place where the scene has its person."""
     where = {"position_m": list(scene.person_position_m), "heading_deg": scene.heading_deg}
-    found: list[Person] = []
+    entries: list[Table] = []
     for number, (_, entry) in enumerate(tables_at("people", table)):
         placed = entry.get("placement", "standard") == "recorded" or "position_m" in entry
         own = dict(entry) if placed else {**where, **entry}
@@ -129,8 +129,8 @@ def _people(table: Table, folder: Path, scene: Scene, settings: RunSettings) -> 
             own.setdefault("duration_s", settings.start_s + settings.duration_s)
         if actor:
             own.setdefault("seed", settings.seed + number)
-        found += people_of({"people": [own]}, folder)
-    return tuple(found)
+        entries.append(own)
+    return people_of({"people": entries}, folder)
 
 
 def with_value(table: Table, key: str, value: object) -> dict[str, Any]:

@@ -10,17 +10,19 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from rtradar.description.tables import KEPT_MOTION
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.motion.formats.saved import save_motion
+from rtradar.motion.formats.saved import load_saved, save_motion
 from rtradar.motion.synthetic import ACTORS
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene.scene import files_of
 from rtradar.system.checks import Table, brief, check_keys, check_text, read_toml, tables_at
 from rtradar.system.files import digest_of
 
-PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "numba", "trimesh")
-"""Packages whose versions decide the last bits."""
+_PACKAGES = (
+    "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
+)  # fmt: skip
 
 _HEAD = """\
 # What was simulated: `rtradar run run.toml --out DIR` gives it again. Paths start from this folder;
@@ -29,18 +31,17 @@ _HEAD = """\
 """
 
 
-def versions() -> dict[str, Any]:
-    """Return versions of rtradar, its actors and packages, and the commit where there is one."""
-    found: dict[str, Any] = {"rtradar": version("rtradar"), "actors": ACTORS}
-    if commit := _commit(Path(__file__).parents[2] / ".git"):
-        found["commit"] = commit
-    found["python"] = platform.python_version()
-    for name in PACKAGES:
+def versions() -> dict[str, str]:
+    """Return versions of Python, packages and actors, and the commit where there is one."""
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
-            continue
-    return found
+            found[name] = "not installed"
+    found["cores"] = str(os.cpu_count())
+    commit = _commit(Path(__file__).parents[2] / ".git")
+    return found | {"actors": str(ACTORS)} | ({"commit": commit} if commit else {})
 
 
 def _commit(git: Path) -> str:
@@ -79,7 +80,8 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
 
     found = copy.copy(dict(table))
     found["people"] = [dict(entry) for entry in table["people"]]
-    digests: dict[str, str] = {}
+    # What they were when they were read.
+    digests = {_from(place, entry["path"]): entry["sha256"] for entry in table.get("files", ())}
     for number, entry in enumerate(found["people"], start=1):
         if isinstance(motion := entry["motion"], Motion):
             entry["motion"] = f"person-{number}.motion"
@@ -88,10 +90,9 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
     found["scene"] = copy.deepcopy(found["scene"])
     for tables in (found, found["scene"]):
         for _, key, entry in files_of(tables):
-            if os.path.isabs(entry[key]):
-                if os.path.isfile(entry[key]):
-                    digests[_from(place, entry[key])] = digest_of(entry[key])
-                entry[key] = _from(place, entry[key])
+            path, entry[key] = entry[key], _from(place, entry[key])
+            if entry[key] not in digests and os.path.isabs(path) and os.path.isfile(path):
+                digests[entry[key]] = digest_of(path)
     files = [{"path": path, "sha256": digest} for path, digest in sorted(digests.items())]
     found |= {"versions": versions()} | ({"files": files} if files else {})
     (folder / "run.toml").write_text(_HEAD + tomli_w.dumps(found), encoding="utf-8")
@@ -99,7 +100,9 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
 
 
 def _from(place: Path, path: str) -> str:
-    """A path from the folder of the run file on, where there is a way."""
+    """An absolute path from the folder of the run file on, where there is a way."""
+    if not os.path.isabs(path):
+        return path
     try:
         return Path(os.path.relpath(path, place.absolute())).as_posix()
     except ValueError:  # another drive
@@ -117,16 +120,20 @@ def in_words(table: Table) -> dict[str, Any]:
     return {**table, "people": people, "versions": versions()}
 
 
-def refuse_another(out: Path, table: Table) -> None:
-    """Raise `InputError` where a folder holds a run of somebody else, who is another recording.
+def refuse_another(out: Path, motions: Iterable[Motion]) -> None:
+    """Raise `InputError` where a folder holds a run of other recordings or actors than these.
 
-    Of a run of the same people with other settings only the results are replaced.
+    Of a run of the same with other settings only the results are replaced.
     """
     try:
-        there = read_toml(out / "run.toml", "run", "")
-    except InputError:
+        entries = tables_at("people", read_toml(out / "run.toml", "run", ""))
+        before = [_who(str(entry.get("motion")), entry, out) for _, entry in entries]
+    except InputError:  # there is none, or nobody can tell
         return
-    before, now = _who(there, out), _who(table, Path())
+    now = [
+        _who(str(own.source.keys["motion"]), own.source.keys, out) if own.source else own.name
+        for own in motions
+    ]
     if before != now:
         raise InputError(
             f"'{out}' holds a run of {_names(before)}, and this is one of {_names(now)}; give "
@@ -134,22 +141,16 @@ def refuse_another(out: Path, table: Table) -> None:
         )
 
 
-def _who(table: Table, folder: Path) -> list[tuple[str, object]]:
-    """What moves: the file or the actor of each person, with the seed."""
-    found: list[tuple[str, object]] = []
-    for _, entry in tables_at("people", table):
-        motion = entry.get("motion")
-        if not isinstance(motion, str):
-            found.append((f"{getattr(motion, 'name', motion)}", None))
-        elif motion.startswith(SYNTHETIC):
-            found.append((motion, entry.get("seed")))
-        else:
-            found.append((os.path.normpath(folder.absolute() / motion), None))
-    return found
+def _who(motion: str, keys: Table, folder: Path) -> str:
+    """An actor with its seed, the path of a recording, or the name of a motion that was kept."""
+    if motion.startswith(SYNTHETIC):
+        return f"{motion} of seed {keys.get('seed')}"
+    path = folder.absolute() / motion
+    return load_saved(path).name if KEPT_MOTION.fullmatch(path.name) else os.path.normpath(path)
 
 
-def _names(who: list[tuple[str, object]]) -> str:
-    return " and ".join(Path(name).name for name, _ in who) or "nobody"
+def _names(who: list[str]) -> str:
+    return " and ".join(Path(name).name for name in who) or "nobody"
 
 
 def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:
@@ -173,14 +174,7 @@ def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:
         Where it cannot be read, or a file has changed.
     """
     table = read_toml(path, "run", "give a run file, such as the run.toml of a folder")
-    if not changed:
-        check_files(path, tables_at("files", table))
-    return dict(table)
-
-
-def check_files(path: Path, entries: Iterable[tuple[str, Table]]) -> None:
-    """Raise `InputError` where a file that a run file lists is another one now."""
-    for where, entry in entries:
+    for where, entry in () if changed else tables_at("files", table):
         check_keys(where, entry, ("path", "sha256"), ())
         text = check_text(where.strip(), "path", entry["path"])
         told = f"run file '{path}': {brief(text)}"
@@ -191,3 +185,4 @@ def check_files(path: Path, entries: Iterable[tuple[str, Table]]) -> None:
             raise InputError(f"{told}: {error.strerror}; {cure}") from None
         if digest != entry["sha256"]:
             raise InputError(f"{told} has changed since; {cure}")
+    return dict(table)

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import math
+import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtradar.body import Person
-from rtradar.motion import Motion
 from rtradar.radar import Radar
 from rtradar.scene import MATERIALS, Material, Object, Scene
 from rtradar.scene.materials import PowerLaw
@@ -23,6 +25,9 @@ from rtradar.scene.objects import Furniture
 from rtradar.settings import RunSettings
 
 Plain = dict[str, Any]
+
+KEPT_MOTION = re.compile(r"person-\d+\.motion")
+"""Name of the file of a motion that no other file holds."""
 
 
 def table_of(people: Sequence[Person], radar: Radar, scene: Scene, settings: RunSettings) -> Plain:
@@ -42,17 +47,28 @@ def table_of(people: Sequence[Person], radar: Radar, scene: Scene, settings: Run
     Returns
     -------
     dict
-        Tables ``people``, ``radar``, ``scene`` and ``settings`` with absolute paths. The motion of
-        a person that no file holds is a `Motion`.
+        Tables ``people``, ``radar``, ``scene`` and ``settings`` with absolute paths, and the
+        ``files`` that motions were read from. The motion of a person that no file holds is a
+        `Motion`.
     """
     missing: list[str] = []
     found = {
-        "people": [person_table(person) for person in people],
+        "people": [_person(person) for person in people],
         "radar": plain(radar),
         "scene": _scene(scene, missing),
-        "settings": plain(settings),
+        "settings": _settings(settings),
     }
+    sources = [source for person in people if (source := person.motion.source) is not None]
+    digests = {path: digest for source in sources for path, digest in source.files.items()}
+    files = [{"path": path, "sha256": digest} for path, digest in digests.items()]
+    found |= {"files": files} if files else {}
     return {"missing": missing, **found} if missing else found
+
+
+def _settings(settings: RunSettings) -> Plain:
+    found: Plain = plain(settings)
+    # TOML has no word for nothing, which here is not what is left out.
+    return found | ({"path_tolerance_db": -math.inf} if settings.path_tolerance_db is None else {})
 
 
 def plain(value: Any) -> Any:
@@ -70,13 +86,11 @@ def plain(value: Any) -> Any:
     return next((kind(value) for kind in (bool, int, float, str) if isinstance(value, kind)), value)
 
 
-def person_table(person: Person | Motion) -> Plain:
-    """Return the table of a person; of a bare motion one without a place."""
-    motion = person if isinstance(person, Motion) else person.motion
-    source = motion.source
-    made = {"motion": motion} if source is None else copy.deepcopy(dict(source.keys))
-    if isinstance(person, Motion):
-        return made
+def _person(person: Person) -> Plain:
+    source = person.motion.source
+    # What was kept beside another run is kept beside this one, too.
+    lost = source is None or KEPT_MOTION.fullmatch(Path(source.keys["motion"]).name)
+    made = {"motion": person.motion} if source is None or lost else copy.deepcopy(dict(source.keys))
     rest = (field for field in dataclasses.fields(person) if field.name != "motion")
     own = {field.name: plain(getattr(person, field.name)) for field in rest}
     return made | {name: value for name, value in own.items() if value is not None}

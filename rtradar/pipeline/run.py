@@ -156,11 +156,11 @@ def run_into(
     ``place`` is where the folder will be in the end, if that is elsewhere.
     """
     started, rays_before = _start()
+    if not overwrite:
+        refuse_another(out, [person.motion for person in people_in(scene, motion)[1]])
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
     described = capture.described()
-    if not overwrite:
-        refuse_another(out, described)
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import json
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -13,11 +14,12 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import tomli_w
 import trimesh
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.description import table_of, with_value
+from rtradar.description import settings_of_table, table_of, with_value
 from rtradar.description.tables import plain
 from rtradar.settings import RunSettings
 from rtradar.system.registries import RADARS, scene_files
@@ -98,6 +100,15 @@ def test_what_no_file_holds_is_kept_beside_the_run(tmp_path: Path) -> None:
     again = rt.Experiment.load(tmp_path / "first" / "run.toml")
     again.run(tmp_path / "second", pictures=False)
     assert bits(tmp_path / "first") == bits(tmp_path / "second")
+    # Neither run in its own folder is refused, nor loses what it needs.
+    rt.run([person, fan], RADAR, out=tmp_path / "first", snr_db=np.inf, **QUICK)
+    for name in ("first", "second"):
+        again = rt.Experiment.load(tmp_path / name / "run.toml")
+        again.run(tmp_path / name, pictures=False)
+        assert (tmp_path / name / "person-1.motion").is_file()
+    assert bits(tmp_path / "first") == bits(tmp_path / "second")
+    with pytest.raises(rt.InputError, match="holds a run of"):
+        rt.run("synthetic:walk", RADAR, out=tmp_path / "first", **QUICK)
     assert first.summary["run"]["settings"]["snr_db"] == "inf"
     assert first.experiment is not None
     np.testing.assert_array_equal(first.experiment.run().points, first.points)
@@ -197,6 +208,12 @@ def test_receivers_and_antennas_are_in_the_table() -> None:
     assert rt.Radar.load(plain(radar)) == radar
 
 
+def test_every_bounce_is_not_the_default_of_bounces() -> None:
+    settings = dataclasses.replace(SETTINGS, path_tolerance_db=None)
+    made = tomllib.loads(tomli_w.dumps(table_of((), RADAR, rt.Scene(), settings)))
+    assert settings_of_table(made["settings"]).path_tolerance_db in (None, -math.inf)
+
+
 def test_own_materials_and_meshes_of_files_are_in_the_table(tmp_path: Path) -> None:
     (tmp_path / "below").mkdir()
     trimesh.creation.box((0.5, 0.5, 0.5)).export(tmp_path / "below" / "box.ply")
@@ -253,6 +270,11 @@ def test_keys_lead_to_tables_and_lists_and_nowhere_else() -> None:
         ("[radar]\nbase = 5", "base = 5; it must be a name or a path"),
         ("[scene]\nbase = 5", "base = 5; it must be a name or a path"),
         ("[[people]]\nmotion = 'nobody.bvh'", "nobody.bvh"),
+        (
+            "[[people]]\nmotion = 'synthetic:walk'\n"
+            "[[people]]\nmotion = 'synthetic:walk'\nbody = 'glass'",
+            "number 2 person 'synthetic:walk': body = 'glass'",
+        ),
     ],
 )
 def test_a_wrong_word_is_told(tmp_path: Path, text: str, why: str) -> None:
@@ -275,6 +297,20 @@ def test_people_recorded_together_keep_their_places() -> None:
     np.testing.assert_allclose(turned.at([0.2])[0][0], np.stack([1 - y, x, z], 1), atol=1e-12)
     with pytest.raises(rt.InputError, match="placement = 'here'; allowed: standard, recorded"):
         rt.Person(walk, placement="here")
+
+
+def test_a_run_file_can_leave_people_to_its_scene(tmp_path: Path) -> None:
+    (tmp_path / "room.toml").write_text('[[people]]\nmotion = "synthetic:walk"\n')
+    (tmp_path / "run.toml").write_text(
+        '[scene]\nbase = "room.toml"\n[settings]\nfidelity = "analytic"\nduration_s = 0.1\n'
+    )
+    words = ["run", str(tmp_path / "run.toml"), "--no-pictures", "--quiet"]
+    assert main([*words, "--out", str(tmp_path / "one")]) == 0
+    several = [f"settings.snr_db={value}" for value in (0, 10)]
+    sets = [word for key in several for word in ("--set", key)]
+    assert main([*words, *sets, "--out", str(tmp_path / "two")]) == 0
+    made = tomllib.loads((tmp_path / "two" / "001-snr_db=0" / "run.toml").read_text())
+    assert "synthetic:walk" in json.dumps(made)
 
 
 # -- names, and other runs -------------------------------------------------------------------------
@@ -332,6 +368,7 @@ def test_several_values_of_a_key_are_a_run_each(
 ) -> None:
     words = ["run", "synthetic:walk", "--duration", "0.1", "--fidelity", "analytic"]
     keys = ["settings.snr_db=0", "settings.snr_db=20", "settings.clutter_removal=mean"]
+    keys += ["people.0.heading_deg=45"]
     words += [word for key in keys for word in ("--set", key)]
     out = tmp_path / "out"
     assert main([*words, "--no-pictures", "--out", str(out)]) == 0
@@ -343,6 +380,7 @@ def test_several_values_of_a_key_are_a_run_each(
         assert run["figures"]["snr_db"] == pytest.approx(run["values"][0], abs=0.1)
         made = tomllib.loads((out / run["folder"] / "run.toml").read_text())
         assert made["settings"]["clutter_removal"] == "mean"
+        assert made["people"][0]["heading_deg"] == 45
     assert found["runs"][0]["figures"]["cloud_bins"] == 0
     assert found["runs"][1]["figures"]["cloud_bins"] > 0
     assert (out / "sweep.png").is_file()
@@ -350,7 +388,9 @@ def test_several_values_of_a_key_are_a_run_each(
     assert len((out / "sweep.csv").read_text().splitlines()) == 3
 
 
-def test_a_sweep_is_refused_before_its_first_run(tmp_path: Path) -> None:
+def test_a_sweep_is_refused_before_its_first_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     experiment = rt.Experiment({"people": [{"motion": "synthetic:walk"}]})
     for values, why in (
         ({"radar.pitch_deg": [0, "steep"]}, "pitch_deg"),
@@ -359,4 +399,8 @@ def test_a_sweep_is_refused_before_its_first_run(tmp_path: Path) -> None:
     ):
         with pytest.raises(rt.InputError, match=why):
             rt.sweep(experiment, values, out=tmp_path / "out")  # type: ignore[arg-type]
+    words = ["run", "synthetic:walk", "--fidelity", "analytic", "--model-option", "rays=3"]
+    words += ["--set", "settings.snr_db=0", "--set", "settings.snr_db=20"]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    assert "has no option 'rays'" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -9,6 +9,7 @@ from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import OWN_NAMES
 from rtradar.recordings import Source, check_rate, check_unit, check_up
 from rtradar.system.files import digest_of
 from rtradar.system.registries import READERS, reader_of
@@ -83,7 +84,9 @@ def load_motion(
     keys: dict[str, Any] = {"motion": str(file.absolute())}
     if skeleton is not None:
         keys["skeleton"] = str(Path(skeleton).absolute())
-    files = {path: digest_of(Path(path)) for path in keys.values() if os.path.isfile(path)}
+    read_too = [os.path.abspath(own)] if (own := os.environ.get(OWN_NAMES)) else []
+    paths = [path for path in (*keys.values(), *read_too) if os.path.isfile(path)]
+    files = {path: digest_of(path) for path in paths}
     told = {"up": given["up"], "unit": given["unit_m"], "rate_hz": given["rate_hz"]}
     keys |= {key: value for key, value in told.items() if value is not None}
     return motion.made_from(Source(keys, files))

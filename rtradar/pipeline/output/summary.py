@@ -5,14 +5,12 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rtradar.description import versions
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.writer import RUN_FILES
 from rtradar.pipeline.processing import Clouds, Processing
@@ -22,10 +20,6 @@ from rtradar.scatter import account_of
 from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions, RunSettings
 from rtradar.system.clock import Moment
-
-_PACKAGES = (
-    "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
-)  # fmt: skip
 
 
 def cost_of(capture: Capture, started: Moment) -> dict[str, Any]:
@@ -64,7 +58,7 @@ def summary_of(capture: Capture, clouds: Clouds, started: Moment) -> dict[str, A
             "radar": dataclasses.asdict(radar),
         },
         "seed": settings.seed,
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": versions(),
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
@@ -141,7 +135,7 @@ def summary_of_samples(
         "parameters": of_processing
         | {"duration_s": capture_s, "unit": processing.unit, "radar": dataclasses.asdict(radar)},
         "seed": settings.seed,
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": versions(),
         **cost(processing, n_chirps, started),
         **_found(radar, n_chirps, clouds),
         "limits": _limits_of_detections(clouds),
@@ -220,13 +214,3 @@ def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
     )
     share = ranges.side_lobes / ranges.detections
     return [dataclasses.asdict(Limit("range_side_lobes", share, message))]
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in _PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found | {"cores": str(os.cpu_count())}

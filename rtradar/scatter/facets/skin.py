@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,8 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.common.poses import ChirpPoses, has_mesh
+from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
 from rtradar.scatter.facets.surfaces import (
     body_facets,
@@ -69,15 +70,6 @@ class _Piece(NamedTuple):
     facets: slice
     vertices: Indices
     faces: NDArray[np.int32]
-
-
-def refuse_facets(level: str, facets: int | None) -> None:
-    """Raise an `InputError` if a number of facets is given for people with a mesh."""
-    if facets is not None:
-        raise InputError(
-            f"{level}: facets = {facets}; a mesh is divided by the wavelength: leave facets out, "
-            "or take body = 'ellipsoids'"
-        )
 
 
 def skin_of(person: Body, frequency_hz: float) -> Skin:
@@ -299,3 +291,21 @@ def _piece(fine: Indices, part: Indices, own: int) -> _Piece:
     facets = slice(4 * int(first), 4 * int(last))
     vertices, faces = np.unique(fine[facets], return_inverse=True)
     return _Piece(facets, vertices, np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int32))
+
+
+def facets_of_people(
+    level: str, radar: Radar, body: Body, *, facets: int | None, look_s: float, **common: Any
+) -> FacetBody | SkinFacets:
+    """Return the facets of ellipsoids, or of all skins where somebody has a mesh.
+
+    ``common`` are the parameters of both, ``look_s`` [s] is for skins. Raises `InputError` where a
+    number of facets is given for a mesh.
+    """
+    if not has_mesh(body):
+        return FacetBody(radar, body, facets=facets, **common)
+    if facets is not None:
+        raise InputError(
+            f"{level}: facets = {facets}; a mesh is divided by the wavelength: leave facets out, "
+            "or take body = 'ellipsoids'"
+        )
+    return SkinFacets(radar, body, look_s=look_s, **common)

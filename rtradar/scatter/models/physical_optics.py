@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,7 @@ from rtradar.scatter.double_reflections import (
     double_scattering,
 )
 from rtradar.scatter.facets.array_envelope import ArrayEnvelope
-from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.skin import SkinFacets, refuse_facets
+from rtradar.scatter.facets.skin import facets_of_people
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -129,14 +128,17 @@ class PhysicalOptics(TwoBounceModel):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"physical-optics: {name} = {value}; it must be positive")
         self._radar, self._body = radar, body
-        common: dict[str, Any] = {"variant": variant, "spreading": spreading, "nodes": frequencies}
-        self._surface: FacetBody | SkinFacets
-        if not has_mesh(body):
-            self._surface = FacetBody(radar, body, facets=facets, **common)
-        else:
-            refuse_facets("physical-optics", facets)
+        self._surface = facets_of_people(
+            "physical-optics",
+            radar,
+            body,
+            variant=variant,
+            spreading=spreading,
+            nodes=frequencies,
+            facets=facets,
             # An edge that crosses a limb fades over half an interval, not a whole one.
-            self._surface = SkinFacets(radar, body, look_s=anchor_s / 2, **common)
+            look_s=anchor_s / 2,
+        )
         self.variant: str | None = self._surface.variant
         if bounces == 2:
             if has_mesh(body):

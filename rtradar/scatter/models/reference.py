@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, has_mesh, one_echo_a_part
-from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.skin import SkinFacets, refuse_facets
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.facets.skin import facets_of_people
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
@@ -50,13 +47,16 @@ class Reference(BuiltInModel):
         facets: int | None = None,
     ) -> None:
         self._radar, self._body = radar, body
-        common: dict[str, Any] = {"variant": variant, "spreading": spreading, "nodes": NODES}
-        self._surface: FacetBody | SkinFacets
-        if not has_mesh(body):
-            self._surface = FacetBody(radar, body, facets=facets, **common)
-        else:
-            refuse_facets("reference", facets)
-            self._surface = SkinFacets(radar, body, look_s=radar.cycle_duration_s, **common)
+        self._surface = facets_of_people(
+            "reference",
+            radar,
+            body,
+            variant=variant,
+            spreading=spreading,
+            nodes=NODES,
+            facets=facets,
+            look_s=radar.cycle_duration_s,
+        )
         self.variant: str | None = self._surface.variant
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
