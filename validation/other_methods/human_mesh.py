@@ -258,7 +258,7 @@ def moving_rows(preset: str, chirps_each: int) -> Iterator[Row]:
     radar = one_pair(preset)
     body = bodies(rt.synthetic_motion("walk", seed=0, duration_s=0.5))["mesh"]
     step = round(PIECE_S / chirps_each / radar.chirp_interval_s)
-    # Between keyframes, which are at multiples of 5 and 10 ms.
+    # Between keyframes, which at 12 GHz are at multiples of 5 and 10 ms.
     chirps = round(0.2033 / radar.chirp_interval_s) + step * np.arange(chirps_each)
     reference = spectrum(build_model("reference", radar, body).echoes(chirps))
     claim = f"{preset}, a walk of {PIECE_S:g} s"

@@ -56,7 +56,7 @@ class EllipsoidGrid:
         because the phase over each is integrated exactly as far as it is linear. An `InputError` is
         raised if they would be more than `MOST_TUBES`.
         """
-        divisions = np.maximum(2, np.ceil(np.sqrt(_areas(semi_axes) / (5 * np.sqrt(3) * edge**2))))
+        divisions = np.maximum(2, np.ceil(_sides(_areas(semi_axes) / 20, edge)))
         _refuse_many(20 * divisions**2)
         grids = [_sphere(int(n)) for n in divisions]
         return cls(
@@ -119,6 +119,18 @@ class MeshGrid:
         _refuse_many(divisions**2)
         return divisions.astype(np.int64)
 
+    @staticmethod
+    def divisions_of_skin(triangles: Array, edge: float) -> NDArray[np.int64]:
+        """How often to cut triangles (face, 3, 3) for facets of the area that `EllipsoidGrid` has.
+
+        None of a skin is so long and thin that its sides would have to be cut. An `InputError` is
+        raised if the facets would be more than `MOST_TUBES`.
+        """
+        areas = np.linalg.norm(_across(triangles), axis=1) / 2
+        divisions = np.maximum(1, np.round(_sides(areas, edge)))
+        _refuse_many(divisions**2)
+        return divisions.astype(np.int64)
+
     @classmethod
     def cut(cls, triangles: Array, divisions: NDArray[np.int64]) -> MeshGrid:
         """Cut triangles (face, 3, 3) evenly, each so often; those without area are left out."""
@@ -155,6 +167,11 @@ def _longest(triangles: Array) -> Array:
     """Longest side of each triangle (face,) [m]."""
     sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1)
     return np.asarray(sides.max(axis=1))
+
+
+def _sides(areas: Array, edge: float) -> Array:
+    """How many edges long the sides of equilateral triangles of these areas [m^2] are."""
+    return np.sqrt(areas / (np.sqrt(3) / 4)) / edge
 
 
 def _across(triangles: Array) -> Array:

@@ -13,6 +13,8 @@ from rtradar.body.people import body_of_people
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter import build_model
 from rtradar.scatter.facets.skin import skin_of
+from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH
+from rtradar.scatter.ray_tubes.tubes import MOST_TUBES, MeshGrid
 from rtradar.settings import RunSettings
 
 needs_anny = pytest.mark.skipif(
@@ -35,6 +37,12 @@ def field(echoes, radar=RADAR):
     middle = len(echoes.frequency) // 2
     k = 2 * np.pi * echoes.frequency[middle] / SPEED_OF_LIGHT_MPS
     return (np.conj(echoes.amplitude[middle]) * np.exp(-1j * k * echoes.length)).sum(axis=2)
+
+
+def area_of(triangles):
+    """Area of each triangle (face, 3, 3) [m^2]."""
+    first, second = (triangles[:, 1:] - triangles[:, :1]).swapaxes(0, 1)
+    return np.linalg.norm(np.cross(first, second), axis=1) / 2
 
 
 @needs_anny
@@ -123,6 +131,20 @@ def test_four_fine_triangles_lie_over_each_coarse_one():
         toward = np.linalg.norm(four[:, :3, None] - corners[:, None], axis=3).argmin(axis=2)
         assert (toward == [0, 1, 2]).mean() > 0.95
         assert np.linalg.norm(four[:, 3] - corners.mean(axis=1), axis=1).max() < 0.01
+
+
+@needs_anny
+@pytest.mark.parametrize("preset", ["paper-12ghz", "paper-77ghz"])
+def test_tubes_on_a_skin_are_as_large_as_asked_and_cover_it(preset):
+    radar = rt.Radar.preset(preset)
+    skin = skin_of(person(), radar.start_frequency_hz + radar.bandwidth_hz)
+    corners, edge = skin.posed(0.0)[1][skin.fine], radar.wavelength_m / RAYS_PER_WAVELENGTH
+    areas = area_of(corners)
+    divisions = MeshGrid.divisions_of_skin(corners, edge)
+    assert (divisions**2).sum() < MOST_TUBES
+    # Rounding leaves a side of 1.5 edges whole.
+    assert (areas / divisions**2).max() <= 2.25 * np.sqrt(3) / 4 * edge**2
+    assert area_of(MeshGrid.cut(corners, divisions).corners).sum() == pytest.approx(areas.sum())
 
 
 @needs_anny
