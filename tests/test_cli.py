@@ -551,7 +551,7 @@ def test_actors_of_one_activity_are_two_people(monkeypatch: pytest.MonkeyPatch) 
         (["synthetic:walk", "--at", "1,2", "--at", "1,3"], "1 MOTION and 2 --at"),
         (["synthetic:walk", "--at", "1"], "place X,Y"),
         (["synthetic:walk", "--at", "1,2,3,4"], "place X,Y"),
-        ([], "nobody is there"),
+        ([], "nobody is in the scene"),
         (["a.amc", "b.amc", "--at", "0,1", "--at", "1,0", *["--skeleton", "a.asf"] * 3], "2 rec"),
     ],
 )

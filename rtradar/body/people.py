@@ -163,44 +163,42 @@ class Bodies(Body):
     """Several people as one moving set of ellipsoids with one clock.
 
     The parts of one person come after those of another, and are named ``NAME: part``. Past the end
-    of their motion a person rests in the last pose. The ``motion`` is that of the first person;
-    `people` has all.
+    of their motion a person rests in the last pose. Nobody has no parts.
 
     Parameters
     ----------
     people : sequence of Body
-        The people, each with a motion that begins at 0.
+        The people, each with a motion that begins at 0; it may be empty.
     duration_s : float, optional
         Time for which the set is asked [s]; that of the shortest motion if left out.
 
     Raises
     ------
     InputError
-        Where there is nobody, or one is no `Body`.
+        Where one is no `Body`, or there is nobody and no duration.
     """
 
     def __init__(self, people: Sequence[Body], duration_s: float | None = None) -> None:
         given: object = people
         listed = isinstance(given, Sequence) and all(isinstance(one, Body) for one in given)
-        if not listed or not people:
+        if not listed or (not people and duration_s is None):
             raise InputError(
-                f"Bodies: people = {brief(given)}; it must be a list of one Body or more, "
-                "such as Body.from_motion gives"
+                f"Bodies: people = {brief(given)}; it must be a list of one Body or more, such as "
+                "Body.from_motion gives, or of nobody, for a given duration_s"
             )
         names = distinct_names([person.motion.name for person in people])
         sizes = [len(person.part_names) for person in people]
-        shortest = min(person.duration_s for person in people)
+        shortest = min((person.duration_s for person in people), default=0.0)
         own = list(zip(names, people, strict=True))
         for name, value in (
-            ("motion", people[0].motion),
-            ("semi_axes", np.concatenate([person.semi_axes for person in people])),
+            ("semi_axes", np.concatenate([np.empty((0, 3)), *(one.semi_axes for one in people)])),
             ("_people", tuple(people)),
             ("names", names),
             (
                 "part_names",
                 tuple(f"{name}: {part}" for name, one in own for part in one.part_names),
             ),
-            ("owner", np.repeat(np.arange(len(sizes)), sizes)),
+            ("owner", np.repeat(np.arange(len(sizes)), np.array(sizes, np.int64))),
             ("materials", tuple(name for person in people for name in person.materials)),
             ("duration_s", shortest if duration_s is None else duration_s),
         ):
@@ -231,13 +229,12 @@ class Bodies(Body):
             Where a time is negative.
         """
         instants = np.asarray(times, dtype=np.float64)
-        poses = [
-            person._posed(np.minimum(instants, person.duration_s), instants)
-            for person in self.people
-        ]
-        centres, frames = (
-            np.concatenate(arrays, axis=1) for arrays in list(zip(*poses, strict=True))[:2]
-        )
+        shape = len(instants), len(self.semi_axes), 3
+        centres, frames = np.empty(shape), np.empty((*shape, 3))
+        for number, person in enumerate(self.people):
+            own = self.owner == number
+            moving = np.minimum(instants, person.duration_s)
+            centres[:, own], frames[:, own], _ = person._posed(moving, instants)
         return Poses(centres, frames, self.semi_axes)
 
 
@@ -321,6 +318,10 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     """
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     duration_s = settings.duration_s
+    if not people and duration_s is None:
+        raise InputError(
+            "nobody is in the scene; give a motion, or say for how long it is simulated (--duration)"
+        )
     # Whose recording ends before the start is refused by name.
     if duration_s is None and len(people) > 1 and min(left) > 0:
         duration_s = min(left)

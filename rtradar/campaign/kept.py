@@ -61,7 +61,7 @@ def capture_of(
     capture.stream(keeper, progress=False)
     maps = keeper.maps()
     if "joints" in keep:
-        maps["joints"] = capture.body.motion.at(maps["time"])[0]
+        maps["joints"] = capture.body.people[0].motion.at(maps["time"])[0]
     return Capture(keeper.finish(), maps, sources if several else ())
 
 

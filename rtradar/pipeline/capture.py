@@ -78,8 +78,8 @@ class Capture:
 
     @property
     def motion(self) -> str:
-        """Names of the motions."""
-        return " and ".join(self.body.names)
+        """Names of the motions, or that there is nobody."""
+        return " and ".join(self.body.names) or "nobody"
 
     @property
     def stages(self) -> Stages:

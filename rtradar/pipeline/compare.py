@@ -25,7 +25,7 @@ from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.view import load_run_view
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.pipeline.prepare import power_alone, prepare
+from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
@@ -178,6 +178,11 @@ def compare(
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     asked = settings = settings_of("compare", RunOptions, options)
     moving, before, there = given_parts(motion, radar, scene, settings)
+    if not people_in(there, moving)[1]:
+        raise InputError(
+            f"compare: nobody is in scene '{there.name}', and it is people's echoes that levels "
+            "differ in; give a motion"
+        )
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     place = check_path("out", out)
     with atomic_folder(place, kind, overwrite=overwrite) as folder:

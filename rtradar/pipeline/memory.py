@@ -37,7 +37,9 @@ def refuse_large_maps(people: Sequence[Person], radar: Radar, settings: RunSetti
     """Raise an `InputError` if maps of this run are too large for memory."""
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     asked = settings.duration_s
-    interval_s = max(min(left) if asked is None else min(max(left), asked), 0.0)
+    if not left and asked is None:
+        return  # refused where people are placed
+    interval_s = max(min(left) if asked is None else min(max(left, default=asked), asked), 0.0)
     if math.isnan(interval_s):
         return  # a start or duration that is none is refused where people are placed
     n_bytes = bytes_of_maps(radar, radar.chirps_in(interval_s), sources=True)

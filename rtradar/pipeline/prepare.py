@@ -62,7 +62,7 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
     summed: EchoModel = model
     if radar.multiplexing == "bpm":
         summed = BinaryPhaseModel(radar, lambda own: _echo_model(own, body, scene, settings))
-    if model.room is not None:
+    if not scene.is_empty:
         with processing.stages.time("room"):
             powers = budget.power, noise.power
             room = prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
@@ -140,12 +140,7 @@ def people_in(scene: Scene, several: Movers) -> tuple[Scene, tuple[Person, ...]]
         for one in several
         if not isinstance(one, Object)
     )
-    everyone += scene.people
-    if not everyone:
-        raise InputError(
-            f"scene '{scene.name}': nobody is there; give a motion, or several with their places"
-        )
-    return scene, everyone
+    return scene, everyone + scene.people
 
 
 def _frames(radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:

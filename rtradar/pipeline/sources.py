@@ -69,6 +69,8 @@ class Sources:
         cells are in the order of `numpy.nonzero`.
         """
         rows, columns = np.nonzero(mask)
+        if not len(self._owner):
+            return CellSources(np.full(len(rows), -1), np.full(len(rows), -1))
         of_parts = self.expected(start_cycle, rows, columns)
         # The parts of one owner are neighbours.
         first_parts = np.flatnonzero(np.diff(self._owner, prepend=-1))

@@ -30,7 +30,7 @@ class InsidePeople:
         Given are the times (time,) [s], the poses, and the echo power (time, part) [m^2]. An
         `InputError` is raised if the centre of a part of someone's trunk is inside another's.
         """
-        if len(self._people) == 1:
+        if len(self._people) < 2:
             return
         held = np.zeros((*power.shape, len(self._people)), dtype=bool)
         for person in range(len(self._people)):

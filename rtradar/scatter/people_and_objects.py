@@ -17,7 +17,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
-from rtradar.scatter.echo_models import build_model
+from rtradar.scatter.echo_models import build_model, takes_backend
 from rtradar.scatter.inside_solids import objects_inside
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
@@ -37,6 +37,27 @@ _GLANCES = 64
 LEAST_GHOST_DB = -25.0
 """Power of a ghost over that of the object's direct echoes, below which it is left out: each takes
 as long as these."""
+
+
+class Nobody:
+    """The echoes of nobody in a scene: none. Objects are traced by the ``variant`` there is."""
+
+    def __init__(self, radar: Radar, variant: str | None) -> None:
+        self._radar, self.variant = radar, variant
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """No echoes at these chirps."""
+        tx = self._radar.tx_of_chirp(chirps)
+        length = np.empty((len(tx), self._radar.n_rx, 0))
+        none = np.empty(0, dtype=np.int64)
+        return Echoes(
+            length=length,
+            amplitude=np.empty((1, *length.shape), dtype=np.complex128),
+            frequency=np.array([self._radar.centre_frequency_hz]),
+            tx=tx,
+            part=none,
+            bounces=none,
+        )
 
 
 class PeopleAndObjects:
@@ -64,7 +85,7 @@ class PeopleAndObjects:
 
     @property
     def room(self) -> RoomModel | None:
-        """The model of the people in a room; None without one."""
+        """The model of the people in a room; None without a room, or with nobody in it."""
         return self.person if isinstance(self.person, RoomModel) else None
 
     @property
@@ -175,7 +196,10 @@ def build_model_of_all(
     """
     overlaps = objects_inside(scene, body.duration_s) if scene.objects else []
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
-    model = build_model(fidelity, radar, body, spreading=spreading, **settled)
+    if len(body.part_names):
+        model = build_model(fidelity, radar, body, spreading=spreading, **settled)
+    else:
+        model = Nobody(radar, select(variant).kind if takes_backend(fidelity) else None)
     if scene.objects and radar.is_moving and (scene.walls or scene.furniture):
         raise InputError(
             f"scene '{scene.name}': objects that move, in a room before a radar that moves, are "

@@ -134,7 +134,9 @@ class MapStore:
         self._names(f"{_TRUTH}/part", parts.names)
         axes, n_parts = (f"{_TRUTH}/time", f"{_TRUTH}/part"), len(parts.names)
         for name, (dtype, unit, meaning) in OF_PARTS.items():
-            options = {"maxshape": (None, n_parts), "chunks": (_STEPS_A_CHUNK, n_parts)}
+            # HDF5 has no chunks of nothing.
+            sizes = (None, n_parts or None), (_STEPS_A_CHUNK, n_parts or 1)
+            options: dict[str, Any] = dict(zip(("maxshape", "chunks"), sizes, strict=True))
             data = self._file.create_dataset(f"{_TRUTH}/{name}", (0, n_parts), dtype, **options)
             self._describe(data, _Map(axes, meaning, dtype, unit))
         data = self._file.create_dataset(f"{_TRUTH}/person", data=parts.person)

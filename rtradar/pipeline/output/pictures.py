@@ -122,10 +122,13 @@ def _draw_room(
     named = dict(zip(body.names, np.swapaxes(tracks, 0, 1), strict=True))
     if len(named) == 1:
         named = {"person": tracks[:, 0]}
-    middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
-    paths = {
-        number: room.model.course(ghost.path, middle, there) for number, ghost in numbered.items()
-    }
+    paths = {}
+    if room.model is not None:
+        middle = body.people[0].motion.at([min(time_s, body.duration_s)])[0][0, 0]
+        paths = {
+            number: room.model.course(ghost.path, middle, there)
+            for number, ghost in numbered.items()
+        }
     drawn["Plan of the room, with paths"] = folder / "plan.png"
     rooms.draw_room_plan(folder / "plan.png", scene, there, named, paths, key, heading)
     return drawn

@@ -131,7 +131,7 @@ def _corners(
     """
     centre = radar.poses_at(times)[1]
     poses = body.at(times)
-    most = max(paths[path].order for path, _, _ in keys) + 1
+    most = max((paths[path].order for path, _, _ in keys), default=0) + 1
     out = np.full((len(times), len(keys), most, 3), np.nan)
     for number in {path for path, _, _ in keys}:
         path = paths[number]

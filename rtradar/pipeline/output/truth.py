@@ -76,17 +76,13 @@ def truth_of(body: Body, times: NDArray[np.float64]) -> dict[str, NDArray[np.flo
 
     The speed is that over 10 ms, and 0 of a person who rests in the last pose.
     """
-    joints, speeds = [], []
-    for person in body.people:
+    joints = np.empty((len(times), len(body.names), len(NODES), 3))
+    speeds = np.empty(joints.shape[:2])
+    for number, person in enumerate(body.people):
         end = person.duration_s
-        joints.append(person.motion.at(np.minimum(times, end))[0])
+        joints[:, number] = person.motion.at(np.minimum(times, end))[0]
         ends = np.clip([times - _STEP_S / 2, times + _STEP_S / 2], 0.0, end)
         before, after = (person.motion.at(instants)[0][:, 0] for instants in ends)
         apart_s, away = ends[1] - ends[0], np.linalg.norm(after - before, axis=1)
-        speeds.append(np.divide(away, apart_s, out=np.zeros_like(away), where=apart_s > 0))
-    together = np.stack(joints, axis=1)
-    return {
-        "person_position": together[:, :, 0],
-        "person_speed": np.stack(speeds, axis=1),
-        "joints": together,
-    }
+        speeds[:, number] = np.divide(away, apart_s, out=np.zeros_like(away), where=apart_s > 0)
+    return {"person_position": joints[:, :, 0], "person_speed": speeds, "joints": joints}

@@ -69,7 +69,7 @@ def draw_room_plan(
     (point, 3) of the path of each ghost [m] by its number, ``key`` the walls of each.
     """
     place = radar.position_m[:2]
-    walked = np.concatenate(list(tracks.values()))
+    walked = np.concatenate([np.empty((0, 2)), *tracks.values()])
     ways = [xy for way in paths.values() for xy in way[:, :2]]
     limits = plan_limits(scene, [place, *walked, *ways])
     axes = new_figure(height_of_plan(limits) + 0.5).add_subplot()
@@ -94,7 +94,7 @@ def draw_room_plan(
         x, y = track[len(track) // 2].tolist()
         labels.append(Label(name, around((x, y), 12.0), theme.person))
     square = np.array([[-0.03], [0.03]])
-    avoided = [point + square for point in walked[:: len(walked) // (20 * len(tracks)) + 1]]
+    avoided = [point + square for point in walked[:: len(walked) // (20 * max(1, len(tracks))) + 1]]
     notes = [_key("Paths of echoes over", key), plan_note(scene)]
     dress(axes, title=f"Plan of the room\n{title}", note="\n".join(filter(None, notes)))
     name_parts(axes, scene, labels, avoided)

@@ -100,10 +100,8 @@ class Snapshots:
         for one in fields(self):
             array = _checked(one.name, getattr(self, one.name), sizes, **one.metadata)
             object.__setattr__(self, one.name, array)
-        if not sizes["step"] or not sizes["part"]:
-            raise InputError(
-                "view: there is no snapshot or no body part; at least one of each is needed"
-            )
+        if not sizes["step"]:
+            raise InputError("view: there is no snapshot; at least one is needed")
         for name, axis in _POINTS_INTO.items():
             index = getattr(self, name)
             if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):

@@ -146,7 +146,8 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     if len(of_face):
         own = snapshots.mesh_part[of_face]
         source = snapshots.mesh_source[snapshots.mesh_of_vertex[of_face]]
-        rgba = np.where(own[:, None] >= 0, tints[own], paint.sources[source])
+        rgba = paint.sources[source]
+        rgba[own >= 0] = tints[own[own >= 0]]
         style = {"facecolors": rgba[:, :3], "shade": True, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(moving[snapshots.mesh_faces], **style))
     outlines = [np.concatenate([corners, corners[:1]]) for corners in snapshots.walls]

@@ -24,12 +24,15 @@ class Ghost(NamedTuple):
     power_m2: float
 
 
-def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
+def ghosts(model: RoomModel | None, radar: Radar, time_s: float) -> list[Ghost]:
     """Find where the echoes over walls show at one time [s], path by path.
 
     Each is the mean of its parts, weighted by their power. The azimuth is that from which the last
-    leg comes, or that of its antenna's image mirrored back.
+    leg comes, or that of its antenna's image mirrored back. Without a model, of nobody in a room,
+    there are none.
     """
+    if model is None:
+        return []
     cycle, step = round(time_s / radar.cycle_duration_s - _STEP_CYCLES / 2), _STEP_CYCLES
     if radar.frame_period_s is not None:
         step = min(step, max(radar.cycles_per_frame - 1, 1))
