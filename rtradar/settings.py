@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict, TypeVar, get_type_hints
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number, check_order, is_real, is_whole
+from rtradar.system.checks import brief, check_number, check_order, check_path, is_real, is_whole
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -93,6 +93,7 @@ class ProcessingOptions(_Seed, total=False):
 
     pfa: float
     clutter_removal: str
+    background: str | None
     detector: str
     detector_options: Mapping[str, Any] | None
     range_window: str | tuple[str, float]
@@ -145,6 +146,10 @@ class RunSettings:
         model documents them.
     clutter_removal : {"none", "mean", "exponential", "mti"}
         Filter that removes static clutter before Doppler. See `rtradar.process.clutter`.
+    background : str, optional
+        The room alone, whose mean cycle is subtracted before Doppler: the folder of a run, which is
+        simulated again unless it kept its IF samples, or a file of IF samples. The radar must have
+        been the same, at the same place.
     body_material : {"perfect-conductor", "skin"}
         Material of the person's surface.
     breathing : Breathing, optional
@@ -195,6 +200,7 @@ class RunSettings:
     spreading: bool = True
     model_options: Mapping[str, Any] | None = field(default_factory=dict)
     clutter_removal: str = "none"
+    background: str | None = None
     body_material: str = "perfect-conductor"
     breathing: Breathing | None = None
     order: int = 1
@@ -226,6 +232,8 @@ class RunSettings:
             value = getattr(self, name)
             if not (is_real(value) or (value is None and name == "duration_s")):
                 raise InputError(f"{name} = {brief(value)}; it must be a number")
+        if self.background is not None:
+            object.__setattr__(self, "background", str(check_path("background", self.background)))
         cycles, overlap = self.spectrogram_cycles, self.spectrogram_overlap
         if cycles is not None and not (is_whole(cycles) and 2 <= cycles <= _MOST_CYCLES):
             raise InputError(

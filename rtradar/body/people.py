@@ -320,7 +320,7 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     duration_s = settings.duration_s
     if not people and duration_s is None:
         raise InputError(
-            "nobody is in the scene; give a motion, or say for how long it is simulated (--duration)"
+            "nobody is in the scene; give a motion, or say how long it is simulated (--duration)"
         )
     # Whose recording ends before the start is refused by name.
     if duration_s is None and len(people) > 1 and min(left) > 0:

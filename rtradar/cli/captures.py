@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
     "fidelity": ("--fidelity", {"metavar": "NAME"}),
     "clutter_removal": ("--clutter-removal", {}),
+    "background": ("--background", {"metavar": "DIR"}),
     "body_material": ("--body-material", {}),
     "breathing": ("--breathing", {"type": breathing, "metavar": "AMPLITUDE_MM,RATE_HZ"}),
     "detector": ("--detector", {"metavar": "NAME"}),

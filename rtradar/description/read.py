@@ -58,20 +58,22 @@ def parts_of(table: Table, folder: Path) -> Parts:
     check_keys("", table, (), KEYS)
     for what in table.get("missing", ()):
         raise InputError(f"the run file lacks {what}: no file holds it; run it from Python again")
-    settings = settings_of_table(table_at("settings", table))
+    settings = settings_of_table(table_at("settings", table), folder)
     scene = _scene(table, folder)
     radar = _radar(table_at("radar", table), folder)
     return Parts(_people(table, folder, scene, settings), radar, scene, settings)
 
 
-def settings_of_table(table: Table) -> RunSettings:
-    """Make the settings of the table ``[settings]``."""
+def settings_of_table(table: Table, folder: Path = Path()) -> RunSettings:
+    """Make the settings of the table ``[settings]``, whose paths start from a folder."""
     given = dict(table)
     check_keys("[settings] ", given, (), tuple(RunSettings.__dataclass_fields__))
     if "breathing" in given:
         breath = table_at("breathing", given, "settings.")
         check_keys("[settings] breathing: ", breath, ("amplitude_mm", "rate_hz"), ("phase_deg",))
         given["breathing"] = Breathing(**breath)
+    if isinstance(background := given.get("background"), str):
+        given["background"] = str((folder / background).absolute())
     for key in ("range_window", "doppler_window"):
         if isinstance(given.get(key), list):
             given[key] = tuple(given[key])

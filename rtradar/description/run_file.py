@@ -93,6 +93,12 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
             path, entry[key] = entry[key], _from(place, entry[key])
             if entry[key] not in digests and os.path.isabs(path) and os.path.isfile(path):
                 digests[entry[key]] = digest_of(path)
+    if background := found["settings"].get("background"):
+        found["settings"] = {**found["settings"], "background": _from(place, background)}
+        # Of a folder what it was made from, for its samples follow from that.
+        for path in (background, os.path.join(background, "run.toml")):
+            if os.path.isfile(path):
+                digests[_from(place, path)] = digest_of(path)
     files = [{"path": path, "sha256": digest} for path, digest in sorted(digests.items())]
     found |= {"versions": versions()} | ({"files": files} if files else {})
     (folder / "run.toml").write_text(_HEAD + tomli_w.dumps(found), encoding="utf-8")

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body, Person
 from rtradar.body.people import body_of_people
-from rtradar.description import Movers
+from rtradar.description import Movers, parts_of, read_run_file
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.exchange import open_samples
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
 from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import stage_line
+from rtradar.process import clutter_removal, range_spectrum
 from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
@@ -27,10 +30,13 @@ from rtradar.scatter.people_and_objects import PeopleAndObjects, build_model_of_
 from rtradar.scatter.validity import warn_of
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
-from rtradar.signal import Noise
+from rtradar.signal import Noise, separate
 from rtradar.signal.phase_noise import mean_delays
 from rtradar.signal.receiver import Expected, Mover, ReceiverStage
 from rtradar.system.threads import one_blas_thread
+
+_ROWS_AT_ONCE = 4096
+"""Chirps of a background that are read together."""
 
 _CREST = 9.0
 """Power of people's samples at their peak over its mean: the echoes of parts add up by chance."""
@@ -50,6 +56,7 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
         body = body_of_people(everyone, settings)
         radar = scene.place(radar)
         processing = replace(processing, radar=radar)
+    processing = with_background(processing, settings)
     n_chirps, frame_starts = _frames(radar, body)
     # What they return at this level, over every path, and how strong they are without the room.
     with processing.stages.time("survey"):
@@ -86,6 +93,61 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
         n_chirps=n_chirps,
         frame_starts=frame_starts,
     )
+
+
+def with_background(processing: Processing, settings: RunSettings) -> Processing:
+    """Return a processing that subtracts the background of the settings, where they name one."""
+    if settings.background is None:
+        return processing
+    radar, windows, path = processing.radar, processing.window_functions, Path(settings.background)
+    if radar.is_moving or radar.multiplexing == "ddm":
+        how = "moves" if radar.is_moving else "has multiplexing = 'ddm'"
+        raise InputError(
+            f"background: radar '{radar.name}' {how}, and a room is then not the same in every "
+            "cycle; leave --background out"
+        )
+    with processing.stages.time("background"), warnings.catch_warnings():
+        # They were given when it was simulated.
+        warnings.simplefilter("ignore", ValidityWarning)
+        cycle = separate(_mean_cycle(path, radar, processing.unit), radar, 0)
+        spectra = range_spectrum(cycle, radar, window_functions=windows)
+    removal = clutter_removal(settings.clutter_removal, radar, background=spectra)
+    return replace(processing, removal=removal)
+
+
+def _mean_cycle(path: Path, radar: Radar, unit: str) -> NDArray[np.complex64]:
+    """Mean of all cycles (tx, rx, sample) of the IF samples of a file, or of a run again."""
+    if not path.exists():
+        raise InputError(
+            f"background '{path}' does not exist; give the folder of a run, or a file of IF samples"
+        )
+    step = max(1, _ROWS_AT_ONCE // radar.n_tx) * radar.n_tx
+    if (path / "run.toml").is_file() and not (path / "if.zarr").exists():
+        capture = prepare(*parts_of(read_run_file(path / "run.toml"), path))
+        theirs, of_unit = capture.radar, "m"
+        blocks = (values for _, values in capture.received(step, progress=False))
+    else:
+        file = open_samples(path, None if path.is_dir() else radar)
+        theirs, of_unit = file.radar or radar, file.unit
+        blocks = (file[first : first + step] for first in range(0, len(file), step))
+    told = f"background '{path}': "
+    if of_unit != unit:
+        raise InputError(f"{told}its samples are in {of_unit}, and these in {unit}")
+    for field in fields(Radar):
+        if field.name != "name" and getattr(theirs, field.name) != getattr(radar, field.name):
+            raise InputError(
+                f"{told}its radar has another {field.name}; give a run or a recording of the room "
+                "by the same radar at the same place"
+            )
+    total = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex128)
+    count = 0
+    for block in blocks:
+        cycles = np.asarray(block)[: len(block) // radar.n_tx * radar.n_tx]
+        total += cycles.reshape(-1, *total.shape).sum(axis=0, dtype=np.complex128)
+        count += len(cycles) // radar.n_tx
+    if not count or not np.isfinite(total).all():
+        raise InputError(f"{told}it has no whole cycle, or samples that are not finite")
+    return (total / count).astype(np.complex64)
 
 
 def _refuse_together(radar: Radar, scene: Scene, settings: RunSettings) -> None:

@@ -1,4 +1,4 @@
-"""People in a room, or nobody: the paths over its walls, its static clutter, and what is left out."""
+"""People in a room, or nobody: paths over its walls, static clutter, and what is left out."""
 
 from __future__ import annotations
 
@@ -57,10 +57,9 @@ def prepare_room(
 ) -> PreparedRoom:
     """Trace a room with whoever is in it, and leave out what stays below the noise.
 
-    The settings give the backend, the order of the paths,
-    and whether everything is kept. The powers are those of people's echoes without the room, and of
-    noise, per IF sample [m^2]. What is not worth its cost is taken out of the model of
-    ``everything``.
+    The settings give the backend, the order of the paths, and whether everything is kept. The
+    powers are those of people's echoes without the room, and of noise, per IF sample [m^2]. What is
+    not worth its cost is taken out of the model of ``everything``.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     allowed = 0.0

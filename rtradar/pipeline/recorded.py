@@ -18,6 +18,7 @@ from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.pictures import draw_found
 from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
+from rtradar.pipeline.prepare import with_background
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
@@ -114,7 +115,7 @@ def process_samples(
     blocks = _Blocks(samples, radar, in_memory=out is None)
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
-    processing = replace(Processing.of(radar, settings), unit=unit)
+    processing = with_background(replace(Processing.of(radar, settings), unit=unit), settings)
     maps, file = None, BytesIO()
     if out is None:
         clouds = _stream(blocks, processing, file)

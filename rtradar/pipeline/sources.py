@@ -148,7 +148,9 @@ class Sources:
         """Power of the room in each cell, none where its clutter is removed [m^2]."""
         capture, radar = self._capture, self._capture.radar
         power = np.zeros((radar.samples_per_chirp, self._cycles))
-        if capture.room is not None and capture.settings.clutter_removal == "none":
+        settings = capture.settings
+        left = settings.clutter_removal == "none" and settings.background is None
+        if capture.room is not None and left:
             samples = np.zeros((radar.n_tx, radar.n_rx, len(power)), np.complex64)
             capture.room.clutter.add(samples, np.arange(radar.n_tx))
             windows = capture.processing.window_functions

@@ -29,7 +29,10 @@ what is constant there from cycle to cycle is removed. T is the cycle, f the Dop
     multiples of 1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar
     at 12 GHz). Noise takes on the same colour. The first one or two cycles come out as zeros.
 
-``mean`` works frame by frame, the other two on the stream. All of them are linear, and treat all
+A background, the range spectra of one cycle of the same room without what is looked for, may be
+subtracted before any of these: what the room returns goes, and a person who does not move stays.
+
+``mean`` works frame by frame, the others on the stream. All of them are linear, and treat all
 channels alike, so that directions stay.
 """
 
@@ -259,8 +262,37 @@ class _Mti(ClutterRemoval):
         return out
 
 
+class _Background(ClutterRemoval):
+    def __init__(self, radar: Radar, background: ArrayLike, then: ClutterRemoval) -> None:
+        super().__init__(radar)
+        cycle = _complex(background)
+        shape = radar.n_tx, radar.n_rx, radar.samples_per_chirp
+        if cycle.shape != shape:
+            raise InputError(
+                f"clutter removal: background has shape {cycle.shape}; that of a cycle of radar "
+                f"'{radar.name}' is (tx, rx, range) = {shape}"
+            )
+        self._cycle, self._then = cycle, then
+        self.works_by_windows = then.works_by_windows
+
+    def description(self, window_cycles: int) -> str:
+        then = self._then.description(window_cycles)
+        return "background" + ("" if then == "none" else f", then {then}")
+
+    def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        return self._then._stream(cycles - self._cycle.astype(cycles.dtype))
+
+    def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        return self._then._window(cycles)
+
+
 def clutter_removal(
-    method: str, radar: Radar, *, time_constant_s: float | None = None, pulses: int | None = None
+    method: str,
+    radar: Radar,
+    *,
+    time_constant_s: float | None = None,
+    pulses: int | None = None,
+    background: ArrayLike | None = None,
 ) -> ClutterRemoval:
     """Remove static clutter from a stream of range spectra and from its frames.
 
@@ -281,6 +313,8 @@ def clutter_removal(
         Time constant of ``exponential`` [s]; 1 s if left out.
     pulses : {2, 3}, optional
         Number of pulses of the canceller ``mti``; 2 if left out.
+    background : (tx, rx, range) complex, optional
+        Range spectra of one cycle of the room alone, subtracted from every cycle before.
 
     Returns
     -------
@@ -290,9 +324,12 @@ def clutter_removal(
     Raises
     ------
     InputError
-        Where there is no such method, a setting has no meaning or belongs to another method, or
-        ``mean`` has only one cycle to average.
+        Where there is no such method, a setting has no meaning or belongs to another method,
+        ``mean`` has only one cycle to average, or the background is no cycle of the radar.
     """
+    if background is not None:
+        then = clutter_removal(method, radar, time_constant_s=time_constant_s, pulses=pulses)
+        return _Background(radar, background, then)
     if method not in CLUTTER_REMOVALS:
         raise InputError(
             f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}"

@@ -35,6 +35,7 @@ _LABELS = {
     "seed": "Seed of random numbers",
     "spreading": "Spreading loss over the path",
     "clutter_removal": "Static clutter removed",
+    "background": "Background subtracted",
     "body_material": "Material of the body",
     "breathing": "Breathing",
     "order": "Most reflections off walls",
