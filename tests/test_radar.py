@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 from fractions import Fraction
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 
 LOW, HIGH = Radar.preset("paper-12ghz"), Radar.preset("paper-77ghz")
@@ -304,3 +306,9 @@ def test_a_frame_of_exactly_whole_cycles_keeps_the_last_one() -> None:
 def test_carriers_of_fdm_lie_evenly_about_the_sweep() -> None:
     radar = Radar(multiplexing="fdm", carrier_step_hz=10e6, tx_y=2, tx_z=1)
     np.testing.assert_allclose(radar.tx_offset_hz, [-10e6, 0, 10e6])
+
+
+def test_a_word_that_is_no_field_is_told_in_one_line() -> None:
+    with pytest.raises(InputError, match=r"unknown key 'start_freq' \(did you mean start_frequ"):
+        Radar(start_freq=60e9)  # type: ignore[call-arg]
+    assert "start_frequency_hz" in inspect.signature(Radar).parameters

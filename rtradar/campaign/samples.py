@@ -251,7 +251,7 @@ def _plan(
         "heading_deg": drawn["heading_deg"] if each.heading_deg is None else each.heading_deg,
         "snr_db": drawn["snr_db"] if each.snr_db is None else each.snr_db,
         "person_position_m": list(place),
-        "radar_position_m": list(scene.radar_position_m or radar.position_m),
+        "radar_position_m": list(scene.radar_place(radar)),
     }
     if others is not None:
         parameters["others"] = _drawn_others(others, interval.parameters["seed"], place)

@@ -337,8 +337,13 @@ def _combinations(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
         dataclasses.replace(scene, **person, **radar)
         for scene, person, radar in itertools.product(lists["scene"], *places)
     ]
+    radars = lists["radar"]
+    if lists["radar_position_m"] != [None]:
+        # What the data set says goes before what the radar does.
+        usual = Radar().position_m
+        radars = [dataclasses.replace(radar, position_m=usual) for radar in radars]
     values = itertools.product(
-        lists["radar"], placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
+        radars, placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
     )
     return tuple(itertools.starmap(Combination, values))
 

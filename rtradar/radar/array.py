@@ -15,6 +15,10 @@ from rtradar.radar.waveform import Waveform
 Places = tuple[tuple[float, float, float], ...]
 
 
+class UsualPlace(tuple[float, float, float]):
+    """Place of a radar that neither its file nor its caller has said; a scene may say another."""
+
+
 class Array(Waveform):
     """What of a radar follows from the places of its antennas; `Radar` has the fields."""
 

@@ -10,6 +10,7 @@ import numpy as np
 from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.radar.array import UsualPlace
 from rtradar.radar.schedule import FollowingCount
 from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, is_real, is_whole
@@ -153,7 +154,9 @@ FIELD_RULES: dict[str, FieldRule] = {
     "channels": _choice("pairs", "all"),
     "polarization": _choice("v", "h"),
     "multiplexing": _choice("tdm", "fdm", "ddm", "bpm"),
-    "position_m": _TRIPLE,
+    "position_m": _TRIPLE._replace(
+        convert=lambda value: value if isinstance(value, UsualPlace) else _TRIPLE.convert(value)
+    ),
     "path_times_s": _or_none(_TIMES),
     "path_m": _or_none(_PLACES),
     "path_angles_deg": _or_none(_ANGLES),

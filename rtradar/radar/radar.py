@@ -8,8 +8,9 @@ file with the fields of `Radar` as its keys needs no code.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,7 +18,7 @@ from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
 from rtradar.radar import display
-from rtradar.radar.array import Places
+from rtradar.radar.array import Places, UsualPlace
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.radar.powers import Powers
 from rtradar.radar.schedule import FollowingCount
@@ -72,7 +73,8 @@ class Radar(Powers):
         Tx in the order in which they transmit, each once: indices into the list, or of the y-line
         and then the z-line. By default they transmit in that order.
     position_m : tuple of float
-        Centre of both lines, or the origin of the lists, in world axes [m].
+        Centre of both lines, or the origin of the lists, in world axes [m]. Where it is not given a
+        scene may have another.
     yaw_deg, pitch_deg, roll_deg : float
         How the radar is turned [deg]: yaw turns its boresight from world x to the left, pitch
         raises it, and roll turns the array about it, anticlockwise seen from the front.
@@ -160,7 +162,7 @@ class Radar(Powers):
     tx_positions_m: Places | None = None
     rx_positions_m: Places | None = None
     tx_order: tuple[int, ...] | None = None
-    position_m: tuple[float, float, float] = (-4.0, 1.0, 1.0)
+    position_m: tuple[float, float, float] = UsualPlace((-4.0, 1.0, 1.0))
     yaw_deg: float = 0.0
     pitch_deg: float = 0.0
     roll_deg: float = 0.0
@@ -378,3 +380,17 @@ class Radar(Powers):
         pose = dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), (angles % 360).tolist(), strict=True))
         still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
         return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)
+
+
+def _refusing_other_words(made: Callable[..., None]) -> Callable[..., None]:
+    """Let the constructor tell in one line which fields there are."""
+
+    @wraps(made)
+    def checked(self: Radar, **fields: Any) -> None:
+        check_keys("Radar: ", fields, (), tuple(Radar.__dataclass_fields__))
+        made(self, **fields)
+
+    return checked
+
+
+Radar.__init__ = _refusing_other_words(Radar.__init__)  # type: ignore[method-assign]

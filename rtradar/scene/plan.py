@@ -119,8 +119,7 @@ def _place_and_limits(
     scene: Scene, radar: Radar | None
 ) -> tuple[tuple[float, float], NDArray[np.float64]]:
     """Return the radar's place in a plan (2,) and the limits of the plan (2, 2) [m]."""
-    own = Radar().position_m if radar is None else radar.position_m
-    x, y = (own if scene.radar_position_m is None else scene.radar_position_m)[:2]
+    x, y = scene.radar_place(Radar() if radar is None else radar)[:2]
     places = [one.position_m for one in scene.people] or [scene.person_position_m]
     return (x, y), plan_limits(scene, [(x, y), (x + _ARROW_M, y), *places])
 

@@ -16,6 +16,7 @@ from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
+from rtradar.radar.array import UsualPlace
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene import display, people
 from rtradar.scene.materials import MATERIALS, Material, own_material
@@ -93,11 +94,10 @@ class Scene:
     people : tuple of Person
         People who are in the scene already, beside those whom a run is given.
     radar_position_m : tuple of float, optional
-        Position of the radar in this scene, world [m]. The radar keeps its own where this is left
-        out.
+        Position in this scene of a radar that has not been given one of its own, world [m].
     radar_yaw_deg, radar_pitch_deg, radar_roll_deg : float, optional
-        How the radar is turned in this scene, as the fields of `rtradar.Radar` [deg]. It keeps its
-        own angles where they are left out.
+        How a radar is turned in this scene whose own angle is 0, as the fields of `rtradar.Radar`
+        [deg].
     person_position_m : tuple of float
         Mean position of the person, x and y [m].
     heading_deg : float
@@ -291,7 +291,7 @@ class Scene:
         Parameters
         ----------
         radar : Radar
-            Radar that keeps its own position where the scene has none.
+            Radar, which keeps the position that its file or its caller has given.
 
         Returns
         -------
@@ -303,11 +303,12 @@ class Scene:
             Where a material is not known over the sweep of the radar, or the radar is inside a wall
             or nearer than 0.3 m to furniture.
         """
-        place, placed = self.radar_position_m, self.turn(radar)
-        placed = placed if place is None else replace(placed, position_m=place)
-        if place is None and self.is_outside(radar.position_m):
+        place, placed = self.radar_place(radar), self.turn(radar)
+        if place is not radar.position_m:
+            placed = replace(placed, position_m=place)
+        elif self.is_outside(place):
             warnings.warn(
-                f"scene '{self.name}': the radar at {radar.position_m} m, its own position, is "
+                f"scene '{self.name}': the radar at {place} m, its own position, is "
                 "outside of the room; give one inside (--radar-position, [radar] position_m)",
                 ValidityWarning,
                 stacklevel=2,
@@ -341,20 +342,40 @@ class Scene:
                 )
         return placed
 
+    def radar_place(self, radar: Radar) -> Vector:
+        """Where a radar stands: as its file or its caller says, else as the scene does.
+
+        Parameters
+        ----------
+        radar : Radar
+            Radar that is asked about, not yet placed.
+
+        Returns
+        -------
+        (3,) tuple of float
+            World [m].
+        """
+        own, said = radar.position_m, self.radar_position_m
+        return own if said is None or not isinstance(own, UsualPlace) else said
+
     def turn(self, radar: Radar) -> Radar:
         """Turn a radar as it is turned in this scene.
 
         Parameters
         ----------
         radar : Radar
-            Radar that keeps its own angles where the scene has none.
+            Radar, which keeps its own angles where they are not 0.
 
         Returns
         -------
         Radar
         """
         given = {key: getattr(self, f"radar_{key}") for key in _ANGLES}
-        given = {key: value for key, value in given.items() if value is not None}
+        given = {
+            key: value
+            for key, value in given.items()
+            if value is not None and getattr(radar, key) == 0
+        }
         return replace(radar, **given) if given else radar
 
     def is_outside(self, place: Sequence[float]) -> bool:

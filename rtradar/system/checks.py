@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
@@ -212,7 +213,7 @@ def wrong_keys(
     """Return a message about each key that is unknown or missing; see `check_keys`."""
     allowed = (*needed, *optional)
     unknown = [
-        f"{where}unknown key {brief(key)}; allowed: {', '.join(allowed)}"
+        f"{where}unknown key {brief(key)}{meant(key, allowed)}; allowed: {', '.join(allowed)}"
         for key in table
         if key not in allowed
     ]
@@ -221,6 +222,12 @@ def wrong_keys(
         for key in needed
         if key not in table
     ]
+
+
+def meant(word: object, allowed: Iterable[str]) -> str:
+    """Return the question whether the nearest of some words was meant; empty if none is near."""
+    near = difflib.get_close_matches(str(word), allowed, 1)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 class Complaints:

@@ -249,7 +249,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (RECORDING, "[[recordings]] number 1 file = 'walk.bvh': there is no such file"),
         (
             RECORDING.replace("licence", "license"),
-            "unknown key 'license'; allowed: file, label, subject, licence",
+            "unknown key 'license' (did you mean licence?); allowed: file, label, subject, licence",
         ),
         (RECORDING.replace('file = "walk.bvh"', ""), "file is missing; needed: file"),
         (RECORDING.replace('label = "walk"', ""), "label is missing; give it, or have {label} in"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -140,6 +141,23 @@ def test_the_radar_stands_where_the_scene_says() -> None:
     placed = Scene(radar_position_m=(-2, 0, 1.5)).place(radar)
     assert placed.position_m == (-2.0, 0.0, 1.5)
     assert placed.bandwidth_hz == radar.bandwidth_hz
+    # It is now said where it stands.
+    assert Scene(radar_position_m=(-1, 0, 1)).place(placed).position_m == (-2.0, 0.0, 1.5)
+
+
+def test_a_radar_of_which_it_is_said_stays_where_it_is(tmp_path: Path) -> None:
+    scene = Scene(radar_position_m=(-2, 0, 1.5), radar_yaw_deg=5, radar_pitch_deg=-10)
+    given = dataclasses.replace(Radar.preset("iwr6843"), position_m=(-4, 1, 1), pitch_deg=-30)
+    placed = scene.place(dataclasses.replace(given, name="mine"))
+    assert placed.position_m == (-4.0, 1.0, 1.0)
+    assert (placed.yaw_deg, placed.pitch_deg) == (5.0, -30.0)
+    file = tmp_path / "own.toml"
+    file.write_text('base = "iwr6843"\nposition_m = [-3, 0, 2]\n')
+    assert scene.place(Radar.load(file)).position_m == (-3.0, 0.0, 2.0)
+    # Another field that is replaced says nothing of the place.
+    other = dataclasses.replace(Radar.preset("iwr6843"), bandwidth_hz=1e9)
+    assert scene.place(other).position_m == (-2.0, 0.0, 1.5)
+    assert scene.place(pickle.loads(pickle.dumps(other))).position_m == (-2.0, 0.0, 1.5)
 
 
 @pytest.mark.parametrize(
