@@ -141,7 +141,8 @@ def wrong_value(option: str, value: str, action: argparse.Action) -> bool:
     """Whether an option is given a name that does not exist."""
     values = value.split(",") if option == "--fidelities" else value.split("|")
     if option in VALUES:
-        known = NAMES[VALUES[option]] | {"lane-60ghz", "points", "threshold"}  # of extending.md
+        # Of extending.md, and a room that is drawn.
+        known = NAMES[VALUES[option]] | {"lane-60ghz", "points", "threshold", "random:7"}
         return not all("." in one or one.isupper() or one in known for one in values)
     known = {str(choice) for choice in action.choices or ()}
     return bool(known) and not all(one.isupper() or one in known for one in values)

@@ -103,6 +103,11 @@ DATA_SET_KEYS = {
             "`true` leaves out recordings that are too short for an interval, with a warning",
             "`false`",
         ),
+        "random_rooms": (
+            "`true` draws a room for each interval, as [`rt.Scene.random`](scenes.md) does, in "
+            "place of a `scene` under `[each]`",
+            "`false`",
+        ),
         "folder": ("folder of the recordings, from the folder of this file", "`.`"),
     },
     "[windows]": {

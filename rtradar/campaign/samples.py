@@ -155,7 +155,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     if not spec.angles:
         common["angles"] = False
     planned = [
-        _plan(interval, combination, common, spec.others)
+        _plan(interval, _drawn(interval, combination, spec), common, spec.others)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
         for combination in spec.combinations
     ]
@@ -231,6 +231,15 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
             yield _Interval(
                 recorded.label, parameters | {"seed": own} | drawn, _draw(spec, own), motion
             )
+
+
+def _drawn(interval: _Interval, each: Combination, spec: Spec) -> Combination:
+    """Draw the room of an interval, where each has one of its own."""
+    if not spec.random_rooms:
+        return each
+    room = Scene.random(_seed("room", interval.parameters["seed"]))
+    place = each.scene.person_position_m
+    return each._replace(scene=replace(room, name="random", person_position_m=place))
 
 
 def _plan(

@@ -105,7 +105,8 @@ class Spec(NamedTuple):
 
     ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
     Without ``angles`` spatial clouds are empty. With ``skip_short`` recordings that are too short
-    for an interval are left out.
+    for an interval are left out. With ``random_rooms`` every interval has a room of its own, which
+    is drawn.
     """
 
     run: RunSettings
@@ -119,6 +120,7 @@ class Spec(NamedTuple):
     augmented: Augmented | None = None
     angles: bool = True
     skip_short: bool = False
+    random_rooms: bool = False
 
 
 def check_samples(intervals: int, combinations: int) -> None:

@@ -75,11 +75,12 @@ EACH: Mapping[str, list[Any]] = {
 }
 """Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
+_YES_OR_NO = ("skip_short", "random_rooms")
 _TOP = (
     "seed",
     *RUN_KEYS,
     "keep",
-    "skip_short",
+    *_YES_OR_NO,
     "angles",
     "folder",
     "windows",
@@ -144,8 +145,16 @@ def _spec(table: Table, folder: Path) -> Spec:
         key: wrong.of(_range, key, drawn_table.get(key, usual), least, most) or (0.0, 0.0)
         for key, (usual, least, most) in DRAWN.items()
     }
-    if not isinstance(table.get("skip_short", False), bool):
-        wrong.lines.append(f"skip_short = {brief(table['skip_short'])}; allowed: true, false")
+    wrong.lines += [
+        f"{key} = {brief(table[key])}; allowed: true, false"
+        for key in _YES_OR_NO
+        if not isinstance(table.get(key, False), bool)
+    ]
+    if table.get("random_rooms") and each.keys() & {"scene", "radar_position_m"}:
+        wrong.lines.append(
+            "random_rooms = true draws rooms and where the radar stands; leave scene and "
+            "radar_position_m under [each] out"
+        )
     keep = wrong.of(_keep, table) or ()
     angles = wrong.of(_angles, table, keep)
     run = wrong.of(_run_settings, table)
@@ -176,7 +185,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         others,
         augmented,
         angles,
-        table.get("skip_short", False),
+        *(table.get(key, False) for key in _YES_OR_NO),
     )
 
 

@@ -184,7 +184,7 @@ def _add_capture(command: OneLineParser) -> None:
     command.option(
         "--scene",
         "NAME|TOML",
-        f"scene: {', '.join(scene_files())}, or a TOML file (default: free-space)",
+        f"scene: {', '.join(scene_files())}, random:SEED, or a TOML file (default: free-space)",
     )
     command.option(
         "--set",

@@ -23,6 +23,14 @@ from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.moving import Object, motion_of
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
+from rtradar.scene.random_rooms import (
+    FURNITURE,
+    HEIGHT_M,
+    LENGTH_M,
+    RANDOM,
+    WIDTH_M,
+    random_room,
+)
 from rtradar.system.checks import (
     Table,
     Vector,
@@ -36,7 +44,7 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
-from rtradar.system.registries import scene_table
+from rtradar.system.registries import RANDOM_SCENE, scene_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,6 +57,7 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     table: (tuple(needed.split()), tuple(others.split()))
     for table, needed, others in (
         ("top", "", "name description"),
+        ("[random]", "seed", " ".join(RANDOM)),
         ("[radar]", "", "position_m yaw_deg pitch_deg roll_deg"),
         ("[person]", "", "position_m heading_deg"),
         ("[room]", "size_m corner_m", ""),
@@ -189,7 +198,8 @@ class Scene:
         Parameters
         ----------
         source : str or path
-            ``free-space``, ``living-room``, ..., or the path of a ``.toml`` file.
+            ``free-space``, ``living-room``, ..., ``random:`` and a seed, or the path of a ``.toml``
+            file.
 
         Returns
         -------
@@ -238,11 +248,57 @@ class Scene:
         InputError
             Where anything in it has no meaning.
         """
+        table = _drawn(table)
         scene = cls(**_fields(table))
         for piece in (*scene.furniture, *scene.objects):
             piece.triangles()  # refuses a mesh that cannot be used
         object.__setattr__(scene, "source", table)
         return scene
+
+    @classmethod
+    def random(
+        cls,
+        seed: int,
+        *,
+        furniture: Sequence[int] = FURNITURE,
+        length_m: Sequence[float] = LENGTH_M,
+        width_m: Sequence[float] = WIDTH_M,
+        height_m: Sequence[float] = HEIGHT_M,
+    ) -> Scene:
+        """Draw a room: its size, the materials of its sides, its furniture, where the radar stands.
+
+        Furniture stands along the walls, away from the radar and from where people walk about the
+        origin. The materials are known from 1 to 100 GHz.
+
+        Parameters
+        ----------
+        seed : int
+            Seed. The same gives the same room in the same version of rtradar; the run file of a run
+            has the room itself.
+        furniture : (int, int)
+            Least and largest number of pieces.
+        length_m, width_m, height_m : (float, float)
+            Least and largest size along x, y and z [m].
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        InputError
+            Where the seed or a range has no meaning.
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> room = rt.Scene.random(7, furniture=(3, 3))
+        >>> room.name, len(room.furniture)
+        ('random:7', 3)
+        """
+        drawn = {"seed": seed, "furniture": furniture, "length_m": length_m, "width_m": width_m}
+        drawn["height_m"] = height_m
+        return cls.of_table({"name": f"{RANDOM_SCENE}{seed}", "random": drawn})
 
     def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the plan: walls with their materials, furniture, reflectors, radar and person.
@@ -417,7 +473,7 @@ def rooted(table: Table, folder: Path) -> Table:
 
     Or below: a scene may come from a stranger, and must not open files anywhere else.
     """
-    table = copy.deepcopy(table)
+    table = copy.deepcopy(_drawn(table))
     for where, key, entry in files_of(table):
         if inside(folder, entry[key]) is None:
             raise InputError(
@@ -426,6 +482,14 @@ def rooted(table: Table, folder: Path) -> Table:
             )
         entry[key] = str((folder / entry[key]).absolute())
     return table
+
+
+def _drawn(table: Table) -> Table:
+    """Return a table with the room that its key ``random`` asks for; other keys replace its own."""
+    if "random" not in table:
+        return table
+    rest = {key: value for key, value in table.items() if key != "random"}
+    return {**random_room(table_at("random", table)), **rest}
 
 
 _FILES = ("motion", "skeleton")

@@ -86,6 +86,10 @@ DETECTORS = Registry(
 of range spectra ``cube``, ``radar`` and ``window_functions``."""
 
 
+RANDOM_SCENE = "random:"
+"""What names of rooms begin with that are drawn by the seed after it."""
+
+
 def scene_files() -> dict[str, Path]:
     """Find the scenes that come with rtradar, by name."""
     return {file.stem: file for file in sorted(shipped_folder("scenes").glob("*.toml"))}
@@ -110,17 +114,23 @@ def radar_table(source: str | Path) -> Table | None:
 def scene_table(source: str | Path) -> tuple[Path, Table]:
     """Return the TOML file of a scene, given by its path or a name, and the file's table.
 
+    Of ``random:SEED`` the table has the key ``random``.
+
     Raises
     ------
     InputError
         Where the file cannot be read or is not TOML, or no scene has the name.
     """
     path, known = check_path("scene", source, or_name=True), scene_files()
+    if (seed := str(source).removeprefix(RANDOM_SCENE)) != str(source):
+        if not (seed.isascii() and seed.isdecimal()):
+            raise InputError(f"scene {brief(str(source))}: give a seed, as in {RANDOM_SCENE}7")
+        return path, {"random": {"seed": int(seed)}}
     if path.suffix != ".toml":
         if str(source) not in known:
             raise InputError(
-                f"scene {brief(str(source))} is unknown; allowed: {', '.join(known)}, or the path "
-                "of a TOML file"
+                f"scene {brief(str(source))} is unknown; allowed: {', '.join(known)}, "
+                f"{RANDOM_SCENE}SEED, or the path of a TOML file"
             )
         path = known[str(source)]
     return path, read_toml(path, "scene", "give a TOML file or the name of a scene")

@@ -351,3 +351,20 @@ def test_every_recording_that_is_too_short_is_named_or_left_out(tmp_path: Path) 
         found = planned(tmp_path, "skip_short = true\n" + HEAD + both)
     assert [plan.parameters["recording"] for plan in found] == ["walk.bvh"]
     assert sum("left out" in str(one.message) for one in said) == 2
+
+
+def test_random_rooms_are_one_for_each_interval(tmp_path: Path) -> None:
+    text = 'random_rooms = true\n[windows]\nduration_s = 0.5\n[each]\nfidelity = ["analytic"]\n'
+    text += '[[synthetic]]\nlabel = "walk"\ncount = 3\n'
+    file = tmp_path / "set.toml"
+    file.write_text(text)
+    planned = plan_samples(read_spec(file))
+    assert len({plan.parameters["scene_digest"] for plan in planned}) == 3
+    assert {plan.kind[1] for plan in planned} == {"random"}
+    assert all(plan.scene.walls for plan in planned)
+    assert [plan.identity for plan in plan_samples(read_spec(file))] == [
+        plan.identity for plan in planned
+    ]
+    file.write_text(text.replace("[each]", '[each]\nscene = ["living-room"]'))
+    with pytest.raises(InputError, match="leave scene and radar_position_m under"):
+        read_spec(file)
