@@ -18,7 +18,7 @@ from tqdm import tqdm
 from rtradar import __version__
 from rtradar.campaign.cluster import dask_client, refuse_in_worker
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
-from rtradar.campaign.spec_file import read_spec
+from rtradar.campaign.spec_file import read_spec, write_made
 from rtradar.clouds.sample_files import check_size, is_whole, sample_path, write_sample
 from rtradar.clouds.sample_index import sweep, write_index
 from rtradar.errors import CampaignError, InputError
@@ -72,6 +72,7 @@ def build_dataset(
     plan_only: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
+    changed: bool = False,
 ) -> dict[str, Any]:
     """Make the samples of a data set that are missing or damaged.
 
@@ -88,6 +89,8 @@ def build_dataset(
         Number of processes on this machine, by default as many as there are cores.
     scheduler : str, optional
         Address of a Dask scheduler to use instead.
+    changed : bool
+        Whether files that the ``collection.toml`` of a data set lists may have changed.
 
     Returns
     -------
@@ -105,7 +108,8 @@ def build_dataset(
         If workers or their scheduler were lost.
     """
     refuse_in_worker()
-    plans = plan_samples(read_spec(spec))
+    read = read_spec(spec, changed=changed)
+    plans = plan_samples(read)
     folder = out.resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -117,6 +121,7 @@ def build_dataset(
         sweep(folder)
         store = Store.look(plans, folder)
         write_index(folder, [plan.identity for plan in plans])
+        write_made(spec, read, folder)
         began = time.perf_counter()
         done, n_workers = _make_missing(store, plan_only, workers, scheduler)
         wall_s = time.perf_counter() - began

@@ -34,8 +34,10 @@ from rtradar.campaign.spec import (
     check_equal_sizes,
     check_samples,
 )
-from rtradar.clouds.sample_files import UNKNOWN
+from rtradar.clouds.sample_files import UNKNOWN, write_durably
+from rtradar.clouds.sample_index import MADE_FROM
 from rtradar.conventions import PERSON_LIMITS
+from rtradar.description import MOST_FILES, check_files, versions
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
 from rtradar.process import WindowFunctions
@@ -59,6 +61,7 @@ from rtradar.system.checks import (
     tables_at,
     wrong_keys,
 )
+from rtradar.system.files import digest_of
 from rtradar.system.seeds import check_seed
 
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
@@ -100,21 +103,82 @@ _MOST = 1_000_000
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
-def read_spec(path: Path) -> Spec:
+_MADE_KEYS = ("root", "files", "versions")
+_HEAD = """\
+# What this data set was made from: `rtradar dataset build %s --out DIR` makes it again.
+# The paths of recordings, radars and scenes start from root; files that have changed are refused.
+
+"""
+
+
+def read_spec(path: Path, *, changed: bool = False) -> Spec:
     """Read the specification of a data set from a TOML file.
 
     InputError, in one line with the file and the key, if the file cannot be read, a key is unknown,
     a value is invalid, or a file that it names is missing; InputErrors, a line for each, if several
-    things are wrong.
+    things are wrong. Files that a `MADE_FROM` lists are compared with their digests, unless they
+    may have ``changed``.
     """
-    table = read_toml(path, "data set", "give a TOML file")
+    given = read_toml(path, "data set", "give a TOML file")
+    table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
+    if not changed:
+        check_files(f"data set file '{path}'", path.parent, given)
     try:
         # The path is absolute, because other processes read the meshes of scenes.
-        return _spec(table, path.resolve().parent)
+        beside = path.resolve().parent
+        folder = (beside / check_text("data set", "root", given.get("root", "."))).resolve()
+        spec = _spec(table, folder)
+        if "root" in given:
+            # Only files of which the digest was known may be anywhere.
+            listed = {(beside / entry["path"]).resolve() for entry in given.get("files", ())}
+            for file in sorted(_files(spec, table, folder) - listed):
+                raise InputError(f"'{file}' is not among its files; build from the original file")
+        return spec
     except InputErrors as errors:
         raise InputErrors([f"data set file '{path}': {line}" for line in errors.lines]) from None
     except InputError as error:
         raise InputError(f"data set file '{path}': {error}") from None
+
+
+def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
+    """Write into the folder of a data set what it is made from; see `MADE_FROM`.
+
+    A file of that name that rtradar did not write is refused.
+    """
+    path, head = out / MADE_FROM, _HEAD % MADE_FROM
+    if os.path.lexists(path) and not (path.is_file() and path.read_text().startswith(head[:20])):
+        raise InputError(
+            f"'{path}' is there, and not of rtradar; move it away, or give another folder (--out)"
+        )
+    import tomli_w  # only who writes needs it
+
+    given = read_toml(spec_path, "data set", "give a TOML file")
+    table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
+    folder = (spec_path.resolve().parent / given.get("root", ".")).resolve()
+    files = sorted(_files(spec, table, folder))
+    listed = [{"path": _from(file, out), "sha256": digest_of(file)} for file in files]
+    table |= {"root": _from(folder, out), "files": listed[:MOST_FILES], "versions": versions()}
+    write_durably(path, (head + tomli_w.dumps(table)).encode())
+
+
+def _from(path: Path, out: Path) -> str:
+    return Path(os.path.relpath(path, out.resolve())).as_posix()
+
+
+def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
+    """Files that a specification names: recordings, radars and scenes."""
+    named = {path for own in spec.recordings for path in (own.path, own.skeleton) if path}
+    each = table.get("each", {})
+    for value in (*each.get("radar", ()), *each.get("scene", ())):
+        base = value.get("base") if isinstance(value, Mapping) else value
+        if isinstance(base, str) and base.endswith((".toml", ".cfg")):
+            named.add(folder / base)
+    for scene in {id(one.scene): one.scene for one in spec.combinations}.values():
+        pieces = (*scene.furniture, *scene.objects)
+        named |= {piece.path for piece in pieces if piece.metres_per_unit is not None}
+        sources = (person.motion.source for person in scene.people)
+        named |= {Path(path) for source in sources if source for path in source.files}
+    return {path.resolve() for path in named}
 
 
 def _spec(table: Table, folder: Path) -> Spec:

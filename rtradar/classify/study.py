@@ -30,6 +30,8 @@ from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples
 from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_index import MADE_FROM
+from rtradar.description import made_from
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json, remove_parts
 
@@ -62,7 +64,8 @@ class Study:
     plan : dict
         ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (hash of labels
         and intervals), ``made`` (hash of how the clouds were made, None in older folders),
-        ``classes``, ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names).
+        ``classes``, ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names); in the file
+        also ``made_from``, the `MADE_FROM` of the data with their digests, and versions.
     outcomes : list of Outcome
         Outcomes of the finished trainings, in order.
     """
@@ -81,7 +84,10 @@ class Study:
 
 
 def check_plan(out: Path, plan: dict[str, Any]) -> None:
-    """Raise InputError if the folder holds another plan; only ``data`` may differ."""
+    """Raise InputError if the folder holds another plan.
+
+    Only where the clouds are and by which versions they are learnt from may differ.
+    """
     path = out / PLAN
     try:
         if not os.path.lexists(path):
@@ -95,7 +101,7 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
         raise _unwritable(out, error) from None
     try:
         there = read_json(path)
-        free = {"data"} | ({"made"} - there.keys())
+        free = {"data", "made_from"} | ({"made"} - there.keys())
         others = [name for name in plan if name not in free and there.get(name) != plan[name]]
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
@@ -202,6 +208,7 @@ def train_study(
         "folds": folds,
         "seed": seed,
         "trainings": [one.name for one in splits],
+        "made_from": made_from(*(folder.resolve() / MADE_FROM for folder in clouds.folders)),
     }
     check_plan(out, plan)
     values = values_of(clouds, split)

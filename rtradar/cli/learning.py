@@ -81,6 +81,7 @@ def _add_dataset(dataset: OneLineParser) -> None:
     )
     build.option("spec", "SPEC.toml", "file that says what the collection shall hold", type=there)
     build.option("--out", "DIR", "folder of the collection", type=path, required=True)
+    build.flag("--changed", "go on where a file that a collection.toml lists is another one now")
     build.flag("--plan", "make a sample of each kind, and say how long the others will take")
     place = build.add_mutually_exclusive_group()
     place.add_argument(
@@ -240,6 +241,7 @@ def _dataset_build(options: argparse.Namespace) -> int:
         plan_only=options.plan,
         workers=options.workers,
         scheduler=options.scheduler,
+        changed=options.changed,
     )
     if options.json is not None:
         write_json(options.json, report)

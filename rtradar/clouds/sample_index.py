@@ -17,6 +17,9 @@ from rtradar.system.files import read_json, remove_parts
 INDEX = "collection.json"
 """Name of the file that lists the samples of a data set."""
 
+MADE_FROM = "collection.toml"
+"""Name of the file that says what a data set was made from."""
+
 _IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a plain name, which cannot lead to another folder
 
 

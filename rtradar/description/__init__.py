@@ -3,7 +3,10 @@
 from rtradar.description.given import Movers, Moving, given_parts, load_mover
 from rtradar.description.read import Parts, parts_of, settings_of_table, with_value
 from rtradar.description.run_file import (
+    MOST_FILES,
+    check_files,
     in_words,
+    made_from,
     read_run_file,
     refuse_another,
     versions,
@@ -12,12 +15,15 @@ from rtradar.description.run_file import (
 from rtradar.description.tables import table_of
 
 __all__ = [
+    "MOST_FILES",
     "Movers",
     "Moving",
     "Parts",
+    "check_files",
     "given_parts",
     "in_words",
     "load_mover",
+    "made_from",
     "parts_of",
     "read_run_file",
     "refuse_another",

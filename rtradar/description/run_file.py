@@ -24,6 +24,9 @@ _PACKAGES = (
     "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
 )  # fmt: skip
 
+MOST_FILES = 5000
+"""Most files whose digests are listed; a table of them has less than a megabyte."""
+
 _HEAD = """\
 # What was simulated: `rtradar run run.toml --out DIR` gives it again. Paths start from this folder;
 # a file that has changed since is refused.
@@ -42,6 +45,13 @@ def versions() -> dict[str, str]:
     found["cores"] = str(os.cpu_count())
     commit = _commit(Path(__file__).parents[2] / ".git")
     return found | {"actors": str(ACTORS)} | ({"commit": commit} if commit else {})
+
+
+def made_from(*files: Path) -> dict[str, Any]:
+    """Return the ``files`` that there are, with their digests, and the `versions`, for JSON."""
+    there = [path for path in files if path.is_file()]
+    listed = [{"path": str(path.absolute()), "sha256": digest_of(path)} for path in there]
+    return {"files": listed, "versions": versions()}
 
 
 def _commit(git: Path) -> str:
@@ -180,15 +190,35 @@ def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:
         Where it cannot be read, or a file has changed.
     """
     table = read_toml(path, "run", "give a run file, such as the run.toml of a folder")
-    for where, entry in () if changed else tables_at("files", table):
+    if not changed:
+        check_files(f"run file '{path}'", path.parent, table)
+    return dict(table)
+
+
+def check_files(told: str, folder: Path, table: Table) -> None:
+    """Compare the files that a table lists with their digests.
+
+    Parameters
+    ----------
+    told : str
+        Name of the table in errors.
+    folder : path
+        Folder that paths start from.
+    table : mapping
+        Table whose list ``files`` has the ``path`` and the ``sha256`` of each.
+
+    Raises
+    ------
+    InputError
+        Where a file is missing or has changed.
+    """
+    for where, entry in tables_at("files", table, most=MOST_FILES):
         check_keys(where, entry, ("path", "sha256"), ())
         text = check_text(where.strip(), "path", entry["path"])
-        told = f"run file '{path}': {brief(text)}"
         cure = "give the one that it was, or go on with this one (--changed)"
         try:
-            digest = digest_of(path.parent / text)
+            digest = digest_of(folder / text)
         except OSError as error:
-            raise InputError(f"{told}: {error.strerror}; {cure}") from None
+            raise InputError(f"{told}: {brief(text)}: {error.strerror}; {cure}") from None
         if digest != entry["sha256"]:
-            raise InputError(f"{told} has changed since; {cure}")
-    return dict(table)
+            raise InputError(f"{told}: {brief(text)} has changed since; {cure}")

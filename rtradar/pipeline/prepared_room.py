@@ -105,6 +105,12 @@ def prepare_room(
     summed = everything
     if model is not None and ghosts is not None:
         summed = everything.with_person(model.without_ghosts())
+    limits = _limits(model, radar, clutter)
+    return PreparedRoom(model, summed, static, ghosts, summary, limits)
+
+
+def _limits(model: RoomModel | None, radar: Radar, clutter: Clutter) -> tuple[Limit, ...]:
+    """Return the limits of validity that a room comes near, with a warning where they matter."""
     limits = []
     if radar.is_moving and model is not None:
         limits.append(Limit("clutter_shadow", 0.0, "shadow of people in clutter, left out"))
@@ -129,4 +135,4 @@ def prepare_room(
         )
         limits.append(Limit("wall_frequency_response", fraction, message))
         warn_of(limits[-1])
-    return PreparedRoom(model, summed, static, ghosts, summary, tuple(limits))
+    return tuple(limits)

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from rtradar.description import made_from
 from rtradar.errors import InputError
-from rtradar.recognition.recogniser import OTHER, Recogniser
+from rtradar.recognition.recogniser import OTHER, WEIGHTS, Recogniser
 from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
 from rtradar.system.checks import printable
 from rtradar.system.files import read_arrays, read_json
@@ -32,7 +33,8 @@ def predict_run(folder: Path) -> dict[str, Any]:
     -------
     dict
         Plain JSON values: ``activity``, ``probabilities`` by activity, the means over all windows
-        if it is one of those, ``windows`` (their number) and ``warnings``, a list of sentences.
+        if it is one of those, ``windows`` (their number), ``warnings``, a list of sentences, and
+        ``made_from``: the files of the run and the weights with their digests, and versions.
 
     Raises
     ------
@@ -74,6 +76,7 @@ def predict_run(folder: Path) -> dict[str, Any]:
         "probabilities": chances,
         "windows": len(windows),
         "warnings": warnings,
+        "made_from": made_from(folder / "cloud_rdt.npz", folder / "run.toml", WEIGHTS),
     }
 
 

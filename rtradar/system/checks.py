@@ -187,15 +187,15 @@ def table_at(key: str, table: Table, parent: str = "") -> Table:
     return value
 
 
-def tables_at(key: str, table: Table) -> list[tuple[str, Table]]:
-    """Return the tables of a list, each with its place in the file."""
+def tables_at(key: str, table: Table, most: int = _MAX_TABLES) -> list[tuple[str, Table]]:
+    """Return the tables of a list, at most so many, each with its place in the file."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(piece, dict) for piece in value):
         raise InputError(
             f"{key} = {brief(value)}; it must be a list of tables: [[{key}]] once for each"
         )
-    if len(value) > _MAX_TABLES:
-        raise InputError(f"[[{key}]] is there {len(value)} times; {_MAX_TABLES} are allowed")
+    if len(value) > most:
+        raise InputError(f"[[{key}]] is there {len(value)} times; {most} are allowed")
     return [(f"[[{key}]] number {number} ", piece) for number, piece in enumerate(value, start=1)]
 
 

@@ -29,6 +29,7 @@ def test_a_room_alone_is_as_still_as_its_clutter_is_strong(
     clutter = result.summary["room"]["clutter"]
     assert np.mean(np.abs(cycles) ** 2) == pytest.approx(clutter["power_m2"], rel=1e-5)
     assert clutter["signal_to_clutter_db"] is None
+    assert clutter["false_alarm_rate"] == float(result.maps.detections.mean()) > 0
     # The mirror image of the radar is 3.4 m away, on the other side of the wall.
     peak = int(result.maps.range_time.values.mean(axis=0).argmax())
     assert abs(float(result.maps.range[peak]) - 1.7) < beside_a_wall[0].range_bin_m

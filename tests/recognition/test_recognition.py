@@ -76,7 +76,9 @@ def test_what_a_run_shows_is_one_of_the_actors_activities(
     answer = tmp_path / "answer.json"
     assert main(["predict", str(tmp_path), "--json", str(answer)]) == 0
     found = json.loads(answer.read_text())
-    assert set(found) == {"activity", "probabilities", "windows", "warnings"}
+    assert set(found) == {"activity", "probabilities", "windows", "warnings", "made_from"}
+    files = [Path(entry["path"]).name for entry in found["made_from"]["files"]]
+    assert files == ["cloud_rdt.npz", "weights.npz"]
     assert set(found["probabilities"]) <= set(ACTIVITIES)
     assert sum(found["probabilities"].values()) == pytest.approx(1)
     assert found["probabilities"][found["activity"]] == max(found["probabilities"].values())

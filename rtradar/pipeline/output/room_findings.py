@@ -20,7 +20,8 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
 
     ``maps`` are those of the run, open. The keys are ``ghosts``, with ``time_s`` and ``paths``, a
     list of path, range [m], velocity [m/s], azimuth [deg] and power [m^2]; and ``clutter``, to
-    which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least.
+    which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least, and of
+    a room in which nobody and nothing moves ``false_alarm_rate``, that of a cell.
     """
     if capture.room is None:
         return {}
@@ -42,6 +43,8 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
         for ghost in ghosts(capture.room.model, capture.radar, time_s)
     ]
     clutter = dict(capture.room.summary["clutter"])
+    if not (capture.people or capture.scene.objects):
+        clutter["false_alarm_rate"] = float(np.asarray(maps["detections"]).mean())
     before_db = clutter["signal_to_clutter_db"]
     if "range_doppler_received" in maps and before_db is not None:
         velocity = np.asarray(maps["velocity"])
