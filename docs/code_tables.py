@@ -103,6 +103,10 @@ DATA_SET_KEYS = {
             "`true` leaves out recordings that are too short for an interval, with a warning",
             "`false`",
         ),
+        "clouds": (
+            "`false` makes no clouds, which saves most of the time where only `keep` is wanted",
+            "`true`",
+        ),
         "random_rooms": (
             "`true` draws a room for each interval, as [`rt.Scene.random`](scenes.md) does, in "
             "place of a `scene` under `[each]`",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict, TypeVar, get_type_hints
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number, check_order, check_path, is_real, is_whole
+from rtradar.system.checks import brief, check_number, check_order, check_path, is_real
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import check_seed
 
@@ -98,7 +98,7 @@ class ProcessingOptions(_Seed, total=False):
     detector_options: Mapping[str, Any] | None
     range_window: str | tuple[str, float]
     doppler_window: str | tuple[str, float]
-    spectrogram_cycles: int | None
+    spectrogram_window_s: float | None
     spectrogram_overlap: float
 
 
@@ -108,7 +108,7 @@ class RunOptions(SimulationOptions, ProcessingOptions, total=False):
     save_if: bool
 
 
-_MOST_CYCLES, _MOST_OVERLAP = 65536, 0.999
+_LONGEST_S, _MOST_OVERLAP = 60.0, 0.999
 
 
 @dataclass(frozen=True)
@@ -174,9 +174,9 @@ class RunSettings:
     range_window, doppler_window : str or (str, float)
         Window function, such as ``blackman``, or its name and parameter. See
         `rtradar.process.WindowFunctions`.
-    spectrogram_cycles : int, optional
-        Number of cycles in a window of the spectrogram, 2 or more. By default 128, or a frame where
-        there are gaps between frames.
+    spectrogram_window_s : float, optional
+        Length of a window of the spectrogram, at least two cycles [s]. By default that of 128
+        cycles, or of a frame where there are gaps between frames.
     spectrogram_overlap : float
         Part of a window of the spectrogram that the next one shares, 0 to below 1.
     noise_power_m2 : float, optional
@@ -211,7 +211,7 @@ class RunSettings:
     detector_options: Mapping[str, Any] | None = field(default_factory=dict)
     range_window: str | tuple[str, float] = "hann"
     doppler_window: str | tuple[str, float] = "hann"
-    spectrogram_cycles: int | None = None
+    spectrogram_window_s: float | None = None
     spectrogram_overlap: float = 0.95
     noise_power_m2: float | None = None
 
@@ -234,11 +234,11 @@ class RunSettings:
                 raise InputError(f"{name} = {brief(value)}; it must be a number")
         if self.background is not None:
             object.__setattr__(self, "background", str(check_path("background", self.background)))
-        cycles, overlap = self.spectrogram_cycles, self.spectrogram_overlap
-        if cycles is not None and not (is_whole(cycles) and 2 <= cycles <= _MOST_CYCLES):
+        window_s, overlap = self.spectrogram_window_s, self.spectrogram_overlap
+        if window_s is not None and not (is_real(window_s) and 0 < window_s <= _LONGEST_S):
             raise InputError(
-                f"spectrogram_cycles = {brief(cycles)}; it must be a whole number from 2 to "
-                f"{_MOST_CYCLES} (--spectrogram-cycles)"
+                f"spectrogram_window_s = {brief(window_s)}; it must be a number of seconds up to "
+                f"{_LONGEST_S:g} (--spectrogram-window)"
             )
         if not (is_real(overlap) and 0 <= overlap <= _MOST_OVERLAP):
             raise InputError(

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from rtradar import __version__
 from rtradar.campaign.cluster import dask_client, refuse_in_worker
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
-from rtradar.campaign.spec_file import read_spec, write_made
+from rtradar.campaign.spec_file import check_shard, read_spec, write_made
 from rtradar.clouds.sample_files import check_size, is_whole, sample_path, write_sample
 from rtradar.clouds.sample_index import sweep, write_index
 from rtradar.errors import CampaignError, InputError
@@ -73,6 +73,7 @@ def build_dataset(
     workers: int | None = None,
     scheduler: str | None = None,
     changed: bool = False,
+    shard: tuple[int, int] | None = None,
 ) -> dict[str, Any]:
     """Make the samples of a data set that are missing or damaged.
 
@@ -91,6 +92,9 @@ def build_dataset(
         Address of a Dask scheduler to use instead.
     changed : bool
         Whether files that the ``collection.toml`` of a data set lists may have changed.
+    shard : (int, int), optional
+        Number i from 1 and count n: only every n-th sample is made, from the i-th on. Folders of
+        all shards together are the data set, and `rtradar.clouds.Collection` takes several.
 
     Returns
     -------
@@ -109,7 +113,13 @@ def build_dataset(
     """
     refuse_in_worker()
     read = read_spec(spec, changed=changed)
-    plans = plan_samples(read)
+    if shard is not None:
+        read = read._replace(shard=check_shard(shard))
+    number, count = read.shard
+    planned = plan_samples(read)
+    if number > len(planned):
+        raise InputError(f"shard {number} of {count} is empty: there are {len(planned)} samples")
+    plans = planned[number - 1 :: count]
     folder = out.resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.clouds import RdtCloudResult, SpatialCloud
 from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
@@ -47,29 +48,37 @@ def capture_of(
     scene: Scene,
     keep: Sequence[str],
     angles: bool = True,
+    clouds: bool = True,
     **options: Unpack[RunOptions],
 ) -> Capture:
     """Compute the clouds of a run with these settings, and the kinds of arrays to ``keep``.
 
-    Joints are those of the first person. Without ``angles`` the spatial cloud is empty.
+    Joints are those of the first person. Without ``angles`` the spatial cloud is empty, without
+    ``clouds`` all are.
     """
+    angles = angles and (clouds or "range_azimuth" in keep)
     capture = prepare(people, radar, scene, RunSettings(**options))
     sources = (*capture.body.names, *(one.name for one in capture.scene.objects))
-    several = angles and len(sources) > 1
+    several = angles and clouds and len(sources) > 1
     source_of = Sources(EchoTable(capture, middles=False)).of_cells if several else None
-    keeper = MapKeeper(capture.processing, keep, source_of, angles)
+    keeper = MapKeeper(capture.processing, keep, source_of, angles, clouds)
     capture.stream(keeper, progress=False)
     maps = keeper.maps()
     if "joints" in keep:
+        maps.setdefault("time", capture.radar.window_times(capture.frame_starts))
         maps["joints"] = capture.body.people[0].motion.at(maps["time"])[0]
     return Capture(keeper.finish(), maps, sources if several else ())
 
 
-def sizes(radar: Radar) -> tuple[object, ...]:
-    """Return what decides the sizes and axes of a radar's maps, for comparison."""
+def sizes(radar: Radar, window_s: float | None = None) -> tuple[object, ...]:
+    """Return what decides the sizes and axes of a radar's maps, for comparison.
+
+    ``window_s`` is the length of a window of the spectrogram [s].
+    """
+    window = window_cycles(radar, window_s)
     return (
         radar.range_m.tobytes(),
-        *(radar.velocity_mps(n).tobytes() for n in (radar.cycles_per_frame, window_cycles(radar))),
+        *(radar.velocity_mps(n).tobytes() for n in (radar.cycles_per_frame, window)),
         measured_angles(radar) and angle_grid(radar).tobytes(),
         radar.cycle_duration_s,
         radar.hop_cycles,
@@ -80,8 +89,8 @@ class MapKeeper:
     """Makes the clouds of one capture from its range spectra, and collects maps on the way.
 
     ``source_of`` tells who returned most of a cell, where that is asked; without ``angles`` the
-    spatial cloud is empty. So that memory stays low,
-    `push` takes at most ``max_chirps`` chirps.
+    spatial cloud is empty, without ``clouds`` all are, and frames are processed only where a map of
+    theirs is kept. So that memory stays low, `push` takes at most ``max_chirps`` chirps.
     """
 
     def __init__(
@@ -90,8 +99,9 @@ class MapKeeper:
         keep: Sequence[str],
         source_of: SourceOfCells | None = None,
         angles: bool = True,
+        clouds: bool = True,
     ) -> None:
-        self._processing, self._keep = processing, keep
+        self._processing, self._keep, self._makes_clouds = processing, keep, clouds
         self._clouds = CloudMaker(processing, source_of, angles)
         self.max_chirps = self._clouds.max_chirps
         self._spectrogram = processing.spectrogram()
@@ -103,6 +113,8 @@ class MapKeeper:
         if "spectrograms" in self._keep:
             columns = self._spectrogram.push(spectra)
             self._add(spectrogram_time=columns.time, spectrogram=columns.power)
+        if not (self._makes_clouds or {"range_doppler", "range_azimuth"} & {*self._keep}):
+            return
         for frame in self._clouds.frames(spectra):
             self._add(time=[frame.middle_s])
             if "range_doppler" in self._keep:
@@ -127,7 +139,11 @@ class MapKeeper:
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
-        return self._clouds.finish()
+        if self._makes_clouds:
+            return self._clouds.finish()
+        none = np.empty(0)
+        spatial = SpatialCloud(np.empty((0, 3)), none, none, none)
+        return Clouds(RdtCloudResult(np.empty((0, 3)), 0, 0), spatial, 0, None)
 
 
 def _axes(processing: Processing, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:

@@ -154,6 +154,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
         common["keep"] = list(spec.keep)
     if not spec.angles:
         common["angles"] = False
+    if not spec.clouds:
+        common["clouds"] = False
     planned = [
         _plan(interval, _drawn(interval, combination, spec), common, spec.others)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
@@ -350,6 +352,7 @@ def make_sample(plan: SamplePlan) -> Made:
             plan.scene,
             values.get("keep", ()),
             values.get("angles", True),
+            values.get("clouds", True),
             **settings,
         )
     limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}

@@ -38,7 +38,7 @@ NAMED = {
 }
 WINDOWS = ("range_window", "doppler_window")
 SWITCHES = ("keep_all", "spreading")
-SPECTROGRAM = ("spectrogram_cycles", "spectrogram_overlap")
+SPECTROGRAM = ("spectrogram_window_s", "spectrogram_overlap")
 RUN_KEYS = ("pfa", *NAMED, *WINDOWS, *SPECTROGRAM, "order", *SWITCHES)
 """Settings of a run that a file may give for all samples."""
 
@@ -104,9 +104,10 @@ class Spec(NamedTuple):
     """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
 
     ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
-    Without ``angles`` spatial clouds are empty. With ``skip_short`` recordings that are too short
-    for an interval are left out. With ``random_rooms`` every interval has a room of its own, which
-    is drawn.
+    Without ``angles`` spatial clouds are empty, without ``clouds`` all clouds. With ``skip_short``
+    recordings that are too short for an interval are left out. With ``random_rooms`` every interval
+    has a room of its own, which is drawn. Of ``shard``, (number, count), only every count-th sample
+    is made.
     """
 
     run: RunSettings
@@ -121,6 +122,8 @@ class Spec(NamedTuple):
     angles: bool = True
     skip_short: bool = False
     random_rooms: bool = False
+    clouds: bool = True
+    shard: tuple[int, int] = (1, 1)
 
 
 def check_samples(intervals: int, combinations: int) -> None:
@@ -135,7 +138,10 @@ def check_samples(intervals: int, combinations: int) -> None:
 
 
 def check_equal_sizes(
-    keep: tuple[str, ...], lengths_s: set[float | None], combinations: tuple[Combination, ...]
+    keep: tuple[str, ...],
+    lengths_s: set[float | None],
+    combinations: tuple[Combination, ...],
+    window_s: float | None,
 ) -> None:
     """Refuse maps of several sizes, which could not be batched, and angles not measured."""
     if len(lengths_s) > 1 or None in lengths_s:
@@ -144,7 +150,7 @@ def check_equal_sizes(
             "so that their maps have one size"
         )
     radars = list({each.radar.name: each.radar for each in combinations}.values())
-    if len(set(map(sizes, radars))) > 1:
+    if len({sizes(radar, window_s) for radar in radars}) > 1:
         raise InputError(
             f"keep = {list(keep)}: maps of radars {', '.join(radar.name for radar in radars)} "
             "have several sizes; make a data set for each of them"

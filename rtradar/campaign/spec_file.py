@@ -56,6 +56,7 @@ from rtradar.system.checks import (
     check_text,
     check_vector,
     inside,
+    is_whole,
     read_toml,
     table_at,
     tables_at,
@@ -78,7 +79,7 @@ EACH: Mapping[str, list[Any]] = {
 }
 """Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
-_YES_OR_NO = ("skip_short", "random_rooms")
+_YES_OR_NO = {"skip_short": False, "random_rooms": False, "clouds": True}
 _TOP = (
     "seed",
     *RUN_KEYS,
@@ -103,7 +104,7 @@ _MOST = 1_000_000
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
-_MADE_KEYS = ("root", "files", "versions")
+_MADE_KEYS = ("root", "shard", "files", "versions")
 _HEAD = """\
 # What this data set was made from: `rtradar dataset build %s --out DIR` makes it again.
 # The paths of recordings, radars and scenes start from root; files that have changed are refused.
@@ -133,11 +134,19 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
             listed = {(beside / entry["path"]).resolve() for entry in given.get("files", ())}
             for file in sorted(_files(spec, table, folder) - listed):
                 raise InputError(f"'{file}' is not among its files; build from the original file")
-        return spec
+        return spec._replace(shard=check_shard(given.get("shard", [1, 1])))
     except InputErrors as errors:
         raise InputErrors([f"data set file '{path}': {line}" for line in errors.lines]) from None
     except InputError as error:
         raise InputError(f"data set file '{path}': {error}") from None
+
+
+def check_shard(value: object) -> tuple[int, int]:
+    """Return the number of a shard and their count; InputError where it is none."""
+    given = value if isinstance(value, list | tuple) else ()
+    if len(given) == 2 and all(map(is_whole, given)) and 1 <= given[0] <= given[1]:
+        return int(given[0]), int(given[1])
+    raise InputError(f"shard = {brief(value)}; it must be a number and a count, such as 2 of 8")
 
 
 def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
@@ -157,6 +166,7 @@ def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
     folder = (spec_path.resolve().parent / given.get("root", ".")).resolve()
     files = sorted(_files(spec, table, folder))
     listed = [{"path": _from(file, out), "sha256": digest_of(file)} for file in files]
+    table |= {"shard": list(spec.shard)} if spec.shard[1] > 1 else {}
     table |= {"root": _from(folder, out), "files": listed[:MOST_FILES], "versions": versions()}
     write_durably(path, (head + tomli_w.dumps(table)).encode())
 
@@ -214,6 +224,8 @@ def _spec(table: Table, folder: Path) -> Spec:
         for key in _YES_OR_NO
         if not isinstance(table.get(key, False), bool)
     ]
+    if table.get("clouds") is False and not table.get("keep"):
+        wrong.lines.append("clouds = false, and keep is empty; nothing would be left")
     if table.get("random_rooms") and each.keys() & {"scene", "radar_position_m"}:
         wrong.lines.append(
             "random_rooms = true draws rooms and where the radar stands; leave scene and "
@@ -237,7 +249,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     if keep:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
-        check_equal_sizes(keep, lengths, combinations)
+        check_equal_sizes(keep, lengths, combinations, run.spectrogram_window_s)
     return Spec(
         run,
         intervals,
@@ -249,7 +261,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         others,
         augmented,
         angles,
-        *(table.get(key, False) for key in _YES_OR_NO),
+        *(table.get(key, usual) for key, usual in _YES_OR_NO.items()),
     )
 
 

@@ -46,7 +46,7 @@ _CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
 _MADE = (
     "recording_digest", "radar", "radar_parameters", "scene", "scene_digest", "fidelity", "snr_db",
     "heading_deg", "person_position_m", "radar_position_m", "pfa", "clutter_removal",
-    "detector", "range_window", "doppler_window", "spectrogram_cycles",
+    "detector", "range_window", "doppler_window", "spectrogram_window_s",
     "spectrogram_overlap", "body_material", "order", "keep_all", "spreading",
     "version",
 )  # fmt: skip

@@ -60,7 +60,7 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
     "pfa": ("--pfa", {"type": number, "metavar": "X"}),
     "range_window": ("--range-window", {"type": window, "metavar": "NAME[:X]"}),
     "doppler_window": ("--doppler-window", {"type": window, "metavar": "NAME[:X]"}),
-    "spectrogram_cycles": ("--spectrogram-cycles", {"type": whole, "metavar": "N"}),
+    "spectrogram_window_s": ("--spectrogram-window", {"type": seconds, "metavar": "S"}),
     "spectrogram_overlap": ("--spectrogram-overlap", {"type": number, "metavar": "X"}),
     "seed": ("--seed", {"type": whole, "metavar": "N"}),
     "variant": ("--variant", {}),

@@ -17,6 +17,7 @@ from rtradar.cli.values import (
     numbers,
     path,
     say,
+    shard,
     there,
     whole,
 )
@@ -82,6 +83,13 @@ def _add_dataset(dataset: OneLineParser) -> None:
     build.option("spec", "SPEC.toml", "file that says what the collection shall hold", type=there)
     build.option("--out", "DIR", "folder of the collection", type=path, required=True)
     build.flag("--changed", "go on where a file that a collection.toml lists is another one now")
+    build.option(
+        "--shard",
+        "I/N",
+        "make only every N-th sample, from the I-th on, as one of N jobs, each with a folder of "
+        "its own; whoever takes a collection takes several folders",
+        type=shard,
+    )
     build.flag("--plan", "make a sample of each kind, and say how long the others will take")
     place = build.add_mutually_exclusive_group()
     place.add_argument(
@@ -242,6 +250,7 @@ def _dataset_build(options: argparse.Namespace) -> int:
         workers=options.workers,
         scheduler=options.scheduler,
         changed=options.changed,
+        shard=options.shard,
     )
     if options.json is not None:
         write_json(options.json, report)

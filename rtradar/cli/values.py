@@ -360,6 +360,16 @@ def numbers(text: str) -> list[int]:
     return [whole(part) for part in text.split(",")]
 
 
+@_named("shard I/N, such as 2/8")
+def shard(text: str) -> tuple[int, int]:
+    """Read the number of a shard, from 1, and how many there are."""
+    number, _, of = text.partition("/")
+    found = int(number), int(of)
+    if not 1 <= found[0] <= found[1]:
+        raise ValueError
+    return found
+
+
 def path(text: str) -> Path:
     """Read a path; an empty one is refused, for it would be the current folder."""
     if not text:

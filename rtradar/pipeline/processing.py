@@ -76,7 +76,7 @@ class Processing:
 
     ``detect`` marks the cells of a frame, ``removal`` removes static clutter before Doppler,
     ``seed`` is that of the sampling of clouds, ``stages`` record the time, and ``unit`` is that of
-    the samples. ``spectrogram_cycles`` and ``spectrogram_overlap`` are those of `RunSettings`.
+    the samples. ``spectrogram_window_s`` and ``spectrogram_overlap`` are those of `RunSettings`.
     """
 
     radar: Radar
@@ -86,13 +86,13 @@ class Processing:
     seed: int = 0
     stages: Stages = field(default_factory=Stages)
     unit: str = "m"
-    spectrogram_cycles: int | None = None
+    spectrogram_window_s: float | None = None
     spectrogram_overlap: float = OVERLAP
 
     @property
     def window_cycles(self) -> int:
         """Number of cycles in a window of the spectrogram."""
-        return self.spectrogram_cycles or window_cycles(self.radar)
+        return window_cycles(self.radar, self.spectrogram_window_s)
 
     def spectrogram(self) -> SlidingSpectrogram:
         """Return what makes the spectrogram of the range spectra."""
@@ -114,7 +114,7 @@ class Processing:
             clutter_removal(settings.clutter_removal, radar),
             window_functions,
             settings.seed,
-            spectrogram_cycles=settings.spectrogram_cycles,
+            spectrogram_window_s=settings.spectrogram_window_s,
             spectrogram_overlap=settings.spectrogram_overlap,
         )
 

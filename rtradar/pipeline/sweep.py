@@ -117,7 +117,9 @@ def sweep(
     runs: list[dict[str, Any]] = []
     first: Result | None = None
     for number, (own, combination) in enumerate(zip(variants, combinations, strict=True), start=1):
-        named = zip((key.rpartition(".")[2] for key in keys), combination, strict=True)
+        # Of a path the name of its file.
+        short = (Path(one).stem if isinstance(one, str) else one for one in combination)
+        named = zip((key.rpartition(".")[2] for key in keys), short, strict=True)
         told = re.sub(r"[^\w.=-]+", "-", "-".join(f"{key}={value}" for key, value in named))
         folder = f"{number:03d}-{told[:60]}"
         result = own.run(place / folder, overwrite=overwrite, pictures=pictures)

@@ -32,23 +32,40 @@ WINDOW_CYCLES, OVERLAP = 128, 0.95
 """Cycles in a frame of the paper's spectrograms, and the overlap of frames (section 3.2.3)."""
 
 
-def window_cycles(radar: Radar) -> int:
+def window_cycles(radar: Radar, window_s: float | None = None) -> int:
     """Cycles in a window of the spectrogram.
 
     Parameters
     ----------
     radar : Radar
         Radar that gives the schedule.
+    window_s : float, optional
+        Length of a window [s]. By default it is that of the paper's `WINDOW_CYCLES` of TDM, and no
+        longer than a frame where there are gaps between frames.
 
     Returns
     -------
     int
-        As long as the paper's `WINDOW_CYCLES` of TDM; under Doppler division a multiple of the
-        bands. Where there are gaps between frames, no longer than a frame.
+        Whole cycles nearest to that; under Doppler division a multiple of the bands.
+
+    Raises
+    ------
+    InputError
+        Where a window would hold fewer than two cycles, or more than a frame before a gap.
     """
     cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
     if radar.in_frames:
         cycles = min(cycles, radar.cycles_per_frame)
+    if window_s is not None:
+        cycles = round(window_s / radar.cycle_duration_s)
+        most = radar.cycles_per_frame if radar.in_frames else cycles
+        if not 2 <= cycles <= most:
+            cycle_s = radar.cycle_duration_s
+            upto = f" to {most * cycle_s:.3g} s, a frame" if radar.in_frames else ""
+            raise InputError(
+                f"spectrogram_window_s = {window_s:g}; with radar '{radar.name}' a window is from "
+                f"{2 * cycle_s:.3g} s, two cycles,{upto or ' on'} (--spectrogram-window)"
+            )
     return max(1, round(cycles / radar.n_doppler_bands)) * radar.n_doppler_bands
 
 

@@ -177,6 +177,25 @@ def test_without_angles_the_other_clouds_are_the_same(tmp_path: Path) -> None:
     assert all(clouds.spatial(index).shape == (0, 3) for index in range(3))
 
 
+def test_without_clouds_what_is_kept_is_the_same(tmp_path: Path) -> None:
+    kept = 'keep = ["spectrograms", "joints"]\n'
+    made = []
+    for text in ("", "clouds = false\n"):
+        plans = plan_samples(read_spec(write(tmp_path, text + kept + SPEC)))
+        plans.sort(key=lambda plan: str(plan.parameters["recording"]))
+        made.append(make_sample(plans[0].packed()))
+    whole, alone = made
+    assert alone.sample.points.shape == alone.spatial.shape == (0, 3)
+    assert alone.sample.provenance["clouds"] is False
+    assert whole.maps.keys() == alone.maps.keys()
+    for name, values in whole.maps.items():
+        np.testing.assert_array_equal(values, alone.maps[name])
+    assert build_dataset(tmp_path / "set.toml", tmp_path / "out")["made"] == 3
+    assert len(Collection(tmp_path / "out")) == 3
+    with pytest.raises(InputError, match="nothing would be left"):
+        read_spec(write(tmp_path, "clouds = false\n" + SPEC))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

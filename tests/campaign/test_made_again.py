@@ -100,3 +100,19 @@ def test_a_file_of_somebody_else_is_left_alone(spec: Path, tmp_path: Path, here:
         build_dataset(spec, tmp_path)
     assert (tmp_path / "collection.toml").read_text() == "mine = true\n"
     assert plan_samples(read_spec(spec))
+
+
+def test_shards_together_are_the_whole(spec: Path, made: Path, tmp_path: Path, here: None) -> None:
+    folders = [tmp_path / str(number) for number in (1, 2)]
+    for number, folder in enumerate(folders, start=1):
+        assert build_dataset(spec, folder, shard=(number, 2))["made"] == 1
+    assert clouds(folders[0]) | clouds(folders[1]) == clouds(made)
+    assert len(rt.Collection(*folders)) == len(rt.Collection(made))
+    # Its own folder makes the share again.
+    build_dataset(folders[1] / "collection.toml", tmp_path / "again")
+    assert clouds(tmp_path / "again") == clouds(folders[1])
+    with pytest.raises(InputError, match="shard 3 of 3 is empty: there are 2 samples"):
+        build_dataset(spec, tmp_path / "third", shard=(3, 3))
+    with pytest.raises(InputError, match="it must be a number and a count"):
+        build_dataset(spec, tmp_path / "third", shard=(0, 3))
+    assert not (tmp_path / "third").exists()

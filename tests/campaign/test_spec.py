@@ -166,7 +166,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
     ("text", "says"),
     [
         ("", "neither [[synthetic]] nor [[recordings]]"),
-        ("colour = 1" + SMALL, "unknown key 'colour'; allowed: seed, pfa"),
+        ("colour = 1" + SMALL, "unknown key 'colour' (did you mean clouds?); allowed: seed, pfa"),
         ("seed = 1.5" + SMALL, "seed = 1.5; it must be a whole number"),
         ("seed = true" + SMALL, "seed = True; it must be a whole number"),
         ("pfa = 2" + SMALL, "pfa = 2; it must be a number"),

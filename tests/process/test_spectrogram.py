@@ -257,11 +257,13 @@ def test_a_block_of_another_radar_is_refused() -> None:
 def test_a_run_has_the_window_and_the_overlap_that_are_asked_of_it() -> None:
     walk = rt.synthetic_motion("walk", seed=0, duration_s=0.5)
     radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=32, bandwidth_hz=0.5e9)
+    window_s = 64.3 * radar.cycle_duration_s
     found = rt.run(
-        walk, radar, fidelity="analytic", spectrogram_cycles=64, spectrogram_overlap=0.5
+        walk, radar, fidelity="analytic", spectrogram_window_s=window_s, spectrogram_overlap=0.5
     ).maps["spectrogram"]
     cycles = radar.chirps_in(0.5) // 2
     assert found.shape == (1 + (cycles - 64) // 32, 64)
-    for name, value in (("spectrogram_cycles", 1), ("spectrogram_overlap", 1.0)):
+    wrong = ("spectrogram_window_s", 1e-6), ("spectrogram_window_s", -1), ("spectrogram_overlap", 1)
+    for name, value in wrong:
         with pytest.raises(InputError, match=name):
             rt.run(walk, radar, **{name: value})

@@ -44,7 +44,7 @@ _LABELS = {
     "detector": "Detector",
     "detector_options": "Options of the detector",
     "range_window": "Window function over range",
-    "spectrogram_cycles": "Cycles in a window of the spectrogram",
+    "spectrogram_window_s": "Window of the spectrogram [s]",
     "spectrogram_overlap": "Overlap of its windows",
     "doppler_window": "Window function over velocity",
     "unit": "Unit of the samples",
