@@ -103,10 +103,12 @@ class _Pictures:
     @staticmethod
     @wraps(Figure.savefig)  # pyplot, imported later, reads its name
     def save_or_blank(figure: Figure, file: Any, **options: Any) -> None:
-        """Do what `Figure.savefig` does, or save a blank picture in place of a PNG."""
+        """Do what `Figure.savefig` does, or save a blank picture in place of a PNG or a PDF."""
         kind = options.get("format") or Path(file).suffix[1:]
-        if _Pictures.drawn or kind != "png":
+        if _Pictures.drawn or kind not in ("png", "pdf"):
             _Pictures.save(figure, file, **options)
+        elif kind == "pdf":
+            Path(file).write_bytes(b"%PDF-blank")
         else:
             _Pictures.write_blank(file)
 

@@ -61,7 +61,7 @@ def test_the_folder_of_nobody_can_be_shown_and_run_again(
     small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
-    words = "--scene", "swinging-door", "--duration", "0.3", "--radar", str(small_file)
+    words = "--scene", "fan-beside-person", "--duration", "0.2", "--radar", str(small_file)
     assert main(["run", *words, "--fidelity", "analytic", "--out", str(first)]) == 0
     assert main(["run", str(first / "run.toml"), "--out", str(second)]) == 0
     one, other = (

@@ -357,12 +357,16 @@ def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path
     try:
         figure = new_figure(3.0)
         figure.add_subplot().imshow(POWER)
-        save_figure(figure, tmp_path / "out.png")
+        save_figure(figure, tmp_path / "out.png", pdf=tmp_path / "out.pdf")
         assert renderers() == before
     finally:
         gc.enable()
     assert figure.axes == []
     assert (tmp_path / "out.png").stat().st_size > 1000
+    written = (tmp_path / "out.pdf").read_bytes()
+    assert written.startswith(b"%PDF")
+    assert len(written) > 1000
+    assert b"CreationDate" not in written
 
 
 def test_a_map_of_cross_sections_says_what_it_does_to_echoes_of_elsewhere() -> None:
