@@ -26,7 +26,7 @@ from pathlib import Path
 import psutil
 
 from rtradar.clouds.sample_files import is_whole
-from rtradar.clouds.sample_index import INDEX
+from rtradar.clouds.sample_index import INDEX, MADE_FROM
 from rtradar.validate.rows import Row, judged, main, reported
 
 RADAR = """
@@ -388,7 +388,8 @@ def measure(quick: bool) -> list[Row]:
         reference = work / "undisturbed"
         trial.finish(reference)
         trial.undisturbed = contents(reference)
-        kinds = {name.rpartition(".")[2] for name in trial.undisturbed} | {INDEX.rpartition(".")[2]}
+        # The index, and what the data set was made from.
+        kinds = {name.rpartition(".")[2] for name in (*trial.undisturbed, INDEX, MADE_FROM)}
         found.append(
             judged(
                 "an undisturbed build",
@@ -396,11 +397,11 @@ def measure(quick: bool) -> list[Row]:
                 "1",
                 len(trial.undisturbed),
                 0,
-                reference=trial.samples + 1,
+                reference=trial.samples + 2,
             )
         )
         found.append(
-            judged("an undisturbed build", "kinds of files", "1", len(kinds), 0, reference=2)
+            judged("an undisturbed build", "kinds of files", "1", len(kinds), 0, reference=3)
         )
         for disturb in (worker_killed, build_killed, scheduler_killed, disk_full, sample_cut):
             found += disturb(trial, work / disturb.__name__)
