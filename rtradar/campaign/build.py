@@ -115,11 +115,7 @@ def build_dataset(
     read = read_spec(spec, changed=changed)
     if shard is not None:
         read = read._replace(shard=check_shard(shard))
-    number, count = read.shard
-    planned = plan_samples(read)
-    if number > len(planned):
-        raise InputError(f"shard {number} of {count} is empty: there are {len(planned)} samples")
-    plans = planned[number - 1 :: count]
+    plans = plan_samples(read)
     folder = out.resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -136,15 +132,7 @@ def build_dataset(
         done, n_workers = _make_missing(store, plan_only, workers, scheduler)
         wall_s = time.perf_counter() - began
     good = [outcome for outcome in done if not outcome.trouble]
-    if len(good) < len(done):
-        first = next(outcome for outcome in done if outcome.trouble)
-        values = next(plan.parameters for plan in plans if plan.identity == first.identity)
-        where = f"{values['recording']} from {values['start_s']:g} s"
-        raise InputError(
-            f"{len(done) - len(good)} of {len(plans)} samples cannot be made, "
-            f"the other {store.whole + len(good)} are there; the first of them, {first.identity} "
-            f"({where}, {values['radar']}, {values['scene']}): {first.trouble}"
-        )
+    _tell_troubles(done, plans, store)
     report = {
         "samples": len(plans),
         "by": counts(plans),
@@ -158,6 +146,19 @@ def build_dataset(
         "workers": n_workers,
     }
     return report | (_estimate(store.missing, good, n_workers) if plan_only else {})
+
+
+def _tell_troubles(done: Sequence[Outcome], plans: Sequence[SamplePlan], store: Store) -> None:
+    """Raise InputError about the first sample that cannot be made, and how many there are."""
+    bad = [outcome for outcome in done if outcome.trouble]
+    if bad:
+        values = next(plan.parameters for plan in plans if plan.identity == bad[0].identity)
+        where = f"{values['recording']} from {values['start_s']:g} s"
+        raise InputError(
+            f"{len(bad)} of {len(plans)} samples cannot be made, the other "
+            f"{store.whole + len(done) - len(bad)} are there; the first of them, {bad[0].identity} "
+            f"({where}, {values['radar']}, {values['scene']}): {bad[0].trouble}"
+        )
 
 
 def _make_missing(

@@ -125,7 +125,7 @@ class _Interval(NamedTuple):
 
 
 def plan_samples(spec: Spec) -> list[SamplePlan]:
-    """Plan all samples, in the order of their ids.
+    """Plan all samples, or those of a shard, in the order of their ids.
 
     InputError if a recording cannot be read or is too short, two samples are equal, or there are
     too many.
@@ -168,7 +168,10 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
                 f"recording '{plan.parameters['recording']}' from {plan.parameters['start_s']:g} s "
                 "is given twice; leave one out"
             )
-    return sorted(planned, key=lambda plan: plan.identity)
+    number, count = spec.shard
+    if number > len(planned):
+        raise InputError(f"shard {number} of {count} is empty: there are {len(planned)} samples")
+    return sorted(planned, key=lambda plan: plan.identity)[number - 1 :: count]
 
 
 def counts(planned: Sequence[SamplePlan]) -> dict[str, dict[str, int]]:
