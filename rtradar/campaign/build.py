@@ -93,8 +93,7 @@ def build_dataset(
     changed : bool
         Whether files that the ``collection.toml`` of a data set lists may have changed.
     shard : (int, int), optional
-        Number i from 1 and count n: only every n-th sample is made, from the i-th on. Folders of
-        all shards together are the data set, and `rtradar.clouds.Collection` takes several.
+        Number i from 1 and count n: of every n samples the i-th is made (`Collection` joins them).
 
     Returns
     -------
