@@ -122,8 +122,7 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     """
     given = read_toml(path, "data set", "give a TOML file")
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
-    if not changed:
-        check_files(f"data set file '{path}'", path.parent, given)
+    listed = check_files(f"data set file '{path}'", path.parent, given, changed=changed)
     try:
         # The path is absolute, because other processes read the meshes of scenes.
         beside = path.resolve().parent
@@ -131,7 +130,6 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
         spec = _spec(table, folder)
         if "root" in given:
             # Only files of which the digest was known may be anywhere.
-            listed = {(beside / entry["path"]).resolve() for entry in given.get("files", ())}
             for file in sorted(_files(spec, table, folder) - listed):
                 raise InputError(f"'{file}' is not among its files; build from the original file")
         return spec._replace(shard=check_shard(given.get("shard", [1, 1])))
@@ -155,7 +153,8 @@ def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
     A file of that name that rtradar did not write is refused.
     """
     path, head = out / MADE_FROM, _HEAD % MADE_FROM
-    if os.path.lexists(path) and not (path.is_file() and path.read_text().startswith(head[:20])):
+    ours = path.is_file() and path.read_bytes().startswith(head[:20].encode())
+    if os.path.lexists(path) and not ours:
         raise InputError(
             f"'{path}' is there, and not of rtradar; move it away, or give another folder (--out)"
         )

@@ -190,12 +190,11 @@ def read_run_file(path: Path, *, changed: bool = False) -> dict[str, Any]:
         Where it cannot be read, or a file has changed.
     """
     table = read_toml(path, "run", "give a run file, such as the run.toml of a folder")
-    if not changed:
-        check_files(f"run file '{path}'", path.parent, table)
+    check_files(f"run file '{path}'", path.parent, table, changed=changed)
     return dict(table)
 
 
-def check_files(told: str, folder: Path, table: Table) -> None:
+def check_files(told: str, folder: Path, table: Table, *, changed: bool = False) -> set[Path]:
     """Compare the files that a table lists with their digests.
 
     Parameters
@@ -206,15 +205,26 @@ def check_files(told: str, folder: Path, table: Table) -> None:
         Folder that paths start from.
     table : mapping
         Table whose list ``files`` has the ``path`` and the ``sha256`` of each.
+    changed : bool
+        Whether files may be missing or have changed.
+
+    Returns
+    -------
+    set of Path
+        The files.
 
     Raises
     ------
     InputError
-        Where a file is missing or has changed.
+        Where an entry has no meaning, or a file is missing or has changed.
     """
+    found = set()
     for where, entry in tables_at("files", table, most=MOST_FILES):
-        check_keys(where, entry, ("path", "sha256"), ())
-        text = check_text(where.strip(), "path", entry["path"])
+        check_keys(f"{told}: {where}", entry, ("path", "sha256"), ())
+        text = check_text(f"{told}: {where.strip()}", "path", entry["path"])
+        found.add((folder / text).resolve())
+        if changed:
+            continue
         cure = "give the one that it was, or go on with this one (--changed)"
         try:
             digest = digest_of(folder / text)
@@ -222,3 +232,4 @@ def check_files(told: str, folder: Path, table: Table) -> None:
             raise InputError(f"{told}: {brief(text)}: {error.strerror}; {cure}") from None
         if digest != entry["sha256"]:
             raise InputError(f"{told}: {brief(text)} has changed since; {cure}")
+    return found

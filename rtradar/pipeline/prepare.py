@@ -123,7 +123,9 @@ def _mean_cycle(path: Path, radar: Radar, unit: str) -> NDArray[np.complex64]:
         )
     step = max(1, _ROWS_AT_ONCE // radar.n_tx) * radar.n_tx
     if (path / "run.toml").is_file() and not (path / "if.zarr").exists():
-        capture = prepare(*parts_of(read_run_file(path / "run.toml"), path))
+        parts = parts_of(read_run_file(path / "run.toml"), path)
+        # What was subtracted from its maps is in its samples.
+        capture = prepare(*parts[:3], replace(parts.settings, background=None))
         theirs, of_unit = capture.radar, "m"
         blocks = (values for _, values in capture.received(step, progress=False))
     else:

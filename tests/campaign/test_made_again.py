@@ -92,13 +92,17 @@ def test_files_that_it_does_not_list_are_not_opened(spec: Path, made: Path) -> N
     (spec.parent / "rooms/other.toml").write_text(ROOM)
     with pytest.raises(InputError, match=r"other\.toml' is not among its files"):
         read_spec(own)
+    own.write_text(own.read_text() + "\n[[files]]\nsha256 = 1\n")
+    for changed in (False, True):
+        with pytest.raises(InputError, match="data set file"):
+            read_spec(own, changed=changed)
 
 
 def test_a_file_of_somebody_else_is_left_alone(spec: Path, tmp_path: Path, here: None) -> None:
-    (tmp_path / "collection.toml").write_text("mine = true\n")
+    (tmp_path / "collection.toml").write_bytes(b"mine = \xff\n")
     with pytest.raises(InputError, match="is there, and not of rtradar"):
         build_dataset(spec, tmp_path)
-    assert (tmp_path / "collection.toml").read_text() == "mine = true\n"
+    assert (tmp_path / "collection.toml").read_bytes() == b"mine = \xff\n"
     assert plan_samples(read_spec(spec))
 
 

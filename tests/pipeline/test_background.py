@@ -92,6 +92,20 @@ def test_the_run_file_names_the_background_and_notices_a_change(
     assert "has changed since" in capsys.readouterr().err
 
 
+def test_a_background_that_names_itself_is_that_of_its_samples(
+    beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path
+) -> None:
+    radar, scene = beside_a_wall
+    out = tmp_path / "out"
+    rt.run([], radar, scene, duration_s=0.2, out=out, pictures=False)
+    options = {"duration_s": 0.2, "fidelity": "analytic", "background": str(out)}
+    before = rt.run(STILL, radar, scene, **options).maps.range_doppler.values
+    file = out / "run.toml"
+    file.write_text(file.read_text().replace("[settings]\n", '[settings]\nbackground = "."\n'))
+    after = rt.run(STILL, radar, scene, **options).maps.range_doppler.values
+    np.testing.assert_array_equal(before, after)
+
+
 def test_another_radar_unit_or_place_is_refused(
     beside_a_wall: tuple[rt.Radar, rt.Scene], empty: Path, tmp_path: Path
 ) -> None:

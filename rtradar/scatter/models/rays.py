@@ -38,7 +38,7 @@ ANCHOR_S = 10e-3
 _OF_MESHES_MPS = 4.3
 """Wavelength over the time between keyframes of people with a mesh [m/s]. Several places of one
 part send there, each past the part's path at a speed of its own: 10 ms would leave an error of
--16 dB at 12 GHz, 2 ms one of -16 dB at 77 GHz (``validation/other_methods/human_mesh.py``)."""
+-16 dB at 12 GHz (``validation/other_methods/human_mesh.py``)."""
 
 _SAME = 1e-5
 """Fraction of the people's extent: what is met nearer to a face than that is the face."""
