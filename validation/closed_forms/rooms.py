@@ -46,7 +46,7 @@ def scored(out: Path, truth: np.ndarray[Any, Any]) -> DetectionScore:
 
 def measure(quick: bool) -> list[Row]:
     rows: list[Row] = []
-    duration_s = 0.25 if quick else 3.0
+    duration_s = 0.15 if quick else 3.0
     rooms, removals = (ROOMS[:1], ("none", "mean")) if quick else (ROOMS, CLUTTER_REMOVALS)
     motion = rt.synthetic_motion(ACTIVITY, seed=0, duration_s=duration_s)
     with tempfile.TemporaryDirectory() as folder:

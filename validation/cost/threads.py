@@ -43,7 +43,7 @@ def seconds(motion: rt.Motion, scene: rt.Scene) -> float:
 
 
 def measure(quick: bool) -> list[Row]:
-    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3 if quick else 3.0)
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.15 if quick else 3.0)
     found = []
     for scene in (rt.Scene(), rt.Scene.load("living-room")):
         seconds(motion, scene)

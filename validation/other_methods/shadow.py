@@ -106,7 +106,7 @@ def crossing_rows(quick: bool) -> Iterator[Row]:
     plate = rt.Object("plate", sheet, "metal", position_m=(-0.5, -0.9, 1.2), motion=path)
     clutter = Clutter(radar, Scene(walls=(wall,)), order=1)
     [own] = clutter.objects
-    chirps = np.arange(0, int(0.95 / radar.chirp_interval_s), 80 if quick else 20)
+    chirps = np.arange(0, int(0.95 / radar.chirp_interval_s), 160 if quick else 20)
     still = RoomIf(radar, clutter.cycle()).clutter_if(chirps)
     middle = radar.samples_per_chirp // 2
     frequency = radar.start_frequency_hz + radar.slope_hz_per_s * middle / radar.sample_rate_hz

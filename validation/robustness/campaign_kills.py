@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -58,6 +59,8 @@ heading_deg = [-30, 30]
 {HALVES}
 """
 RTRADAR = [sys.executable, "-m", "rtradar", "dataset", "build"]
+ONE_WORKER = ("--workers", "1")  # is enough to continue a build
+UNDISTURBED = "undisturbed"
 PATIENCE_S = 600.0
 SAMPLE_BYTES = 60_000  # fewer than any sample has
 
@@ -193,7 +196,7 @@ def worker_killed(trial: Trial, out: Path) -> list[Row]:
         says="a build that loses a worker ends well",
     )
     stamps = whole(out)
-    return [status, *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])]
+    return [status, *trial.rows(claim, out, stamps, trial.finish(out, *ONE_WORKER)[2]["made"])]
 
 
 def build_killed(trial: Trial, out: Path) -> list[Row]:
@@ -213,7 +216,7 @@ def build_killed(trial: Trial, out: Path) -> list[Row]:
         0,
         says="a build that is killed leaves no process",
     )
-    return [orphans, *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])]
+    return [orphans, *trial.rows(claim, out, stamps, trial.finish(out, *ONE_WORKER)[2]["made"])]
 
 
 def scheduler_killed(trial: Trial, out: Path) -> list[Row]:
@@ -260,7 +263,7 @@ def scheduler_killed(trial: Trial, out: Path) -> list[Row]:
     stamps = whole(out)
     return [
         *one_line(claim, said, process.returncode, 1),
-        *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"]),
+        *trial.rows(claim, out, stamps, trial.finish(out, *ONE_WORKER)[2]["made"]),
     ]
 
 
@@ -302,7 +305,7 @@ def disk_full(trial: Trial, out: Path) -> list[Row]:
         stamps = whole(out)
         give_more()
         rows = (
-            trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])
+            trial.rows(claim, out, stamps, trial.finish(out, *ONE_WORKER)[2]["made"])
             if not (left or spoiled)
             else []
         )
@@ -318,7 +321,7 @@ def disk_full(trial: Trial, out: Path) -> list[Row]:
 
 
 def sample_cut(trial: Trial, out: Path) -> list[Row]:
-    trial.finish(out)
+    shutil.copytree(trial.work / UNDISTURBED, out)
     victims = sorted(out.glob("*.npz"))[:2]
     victims[0].write_bytes(victims[0].read_bytes()[:1000])
     content = bytearray(victims[1].read_bytes())
@@ -326,7 +329,7 @@ def sample_cut(trial: Trial, out: Path) -> list[Row]:
     victims[1].write_bytes(content)
     stamps = whole(out)
     claim = "a sample cut short and one of a flipped bit"
-    report = trial.finish(out)[2]
+    report = trial.finish(out, *ONE_WORKER)[2]
     found = judged(
         claim,
         "damaged samples found",
@@ -385,7 +388,7 @@ def measure(quick: bool) -> list[Row]:
             else {"samples": 40, "seconds": 1.0, "fidelity": "specular"}
         )
         trial = Trial(work, **size)
-        reference = work / "undisturbed"
+        reference = work / UNDISTURBED
         trial.finish(reference)
         trial.undisturbed = contents(reference)
         # The index, and what the data set was made from.

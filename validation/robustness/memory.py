@@ -214,7 +214,7 @@ def write_bvh(path: Path, frames: int) -> None:
 
 def measure(quick: bool) -> list[Row]:
     rows = []
-    short_s, long_s = (1.5, 3.0) if quick else (3.0, 12.0)
+    short_s, long_s = (1.0, 2.0) if quick else (3.0, 12.0)
     for radar in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
         for fidelity in ("specular",) if quick else ("analytic", "specular"):
             peaks: dict[float, list[float]] = {short_s: [], long_s: []}
@@ -249,9 +249,9 @@ def measure(quick: bool) -> list[Row]:
                     says=says,
                 )
             )
-    rows += long_runs(*((6.0, 30.0) if quick else (30.0, 300.0)))
-    rows += starved(1.5 if quick else 3.0)
-    rows += reading(60.0, 300.0 if quick else 3600.0)
+    rows += long_runs(*((4.0, 20.0) if quick else (30.0, 300.0)))
+    rows += starved(1.0 if quick else 3.0)
+    rows += reading(*((30.0, 150.0) if quick else (60.0, 3600.0)))
     return rows
 
 
