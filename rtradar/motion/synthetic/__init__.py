@@ -13,11 +13,10 @@ import numpy as np
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
-from rtradar.motion.synthetic import kick as kicks
-from rtradar.motion.synthetic import punch as punches
-from rtradar.motion.synthetic.daily import WAVES, bend, sit, squat, wave
-from rtradar.motion.synthetic.falls import FALLS, fall
+from rtradar.motion.synthetic.balance import stand
+from rtradar.motion.synthetic.daily import bend, fall, sit, squat, wave
 from rtradar.motion.synthetic.figure import (
+    STYLES,
     Array,
     Pose,
     PosesAt,
@@ -28,9 +27,8 @@ from rtradar.motion.synthetic.figure import (
     rotations,
 )
 from rtradar.motion.synthetic.gait import walk, walk_in_place
-from rtradar.motion.synthetic.gait_styles import GAITS
 from rtradar.motion.synthetic.jacks import jump, jumping_jack
-from rtradar.motion.synthetic.stance import stand
+from rtradar.motion.synthetic.strikes import boxing, kick, punch
 from rtradar.recordings import SYNTHETIC, Source
 from rtradar.system.checks import is_whole
 from rtradar.system.registries import check_activity
@@ -51,8 +49,8 @@ ACTORS = 3
 
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
-    "kick": kicks.kick,
-    "punch": punches.punch,
+    "kick": kick,
+    "punch": punch,
     "jumping_jack": jumping_jack,
     "stand": _repeating(stand),
     "sit": sit,
@@ -62,19 +60,9 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "jump": jump,
     "fall": fall,
     "walk_in_place": walk_in_place,
-    "boxing": punches.boxing,
+    "boxing": boxing,
 }
 """Activities of the actors, by name."""
-
-STYLES: Mapping[str, tuple[str, ...]] = {
-    "walk": tuple(GAITS),
-    "kick": kicks.STYLES,
-    "wave": WAVES,
-    "fall": FALLS,
-    "punch": punches.STYLES,
-    "boxing": punches.BOXING_STYLES,
-}
-"""Ways to do an activity, by its name; without a style a subject has a way of its own."""
 
 
 class Traits(TypedDict, total=False):
@@ -107,9 +95,9 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
 
     Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
-    turns round within 1.5 m of the middle. Who stands sways by millimetres
-    (`rtradar.motion.synthetic.stance`); who bends or squats keeps the centre of mass over the feet.
-    All but walks repeat with short rests.
+    turns round within 1.5 m of the middle. Who stands sways by millimetres; who bends or squats
+    keeps the centre of mass over the feet (`rtradar.motion.synthetic.balance`). All but walks
+    repeat with short rests.
 
     Parameters
     ----------

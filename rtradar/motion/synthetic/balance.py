@@ -1,4 +1,13 @@
-"""Bodies that move on the spot: repetitions, and a centre of mass that stays over the feet.
+"""Bodies that stay on the spot: who stands, repetitions, and a centre of mass over the feet.
+
+In quiet standing the body rotates about the ankles, forward and back, an inverted pendulum that the
+calf muscles hold as a spring; sideways the hips move over both feet, and the trunk stays upright
+(D. A. Winter et al., Stiffness control of balance in quiet standing, J. Neurophysiol. 80 (1998)
+1211-1221). The root, about the height of the centre of mass, moves by 4 mm (root mean square)
+forward and back and by 2 mm sideways, as of healthy young adults with open eyes (T. E. Prieto et
+al., Measures of postural steadiness, IEEE Trans. Biomed. Eng. 43 (1996) 956-966). The power
+spectral density is that of noise through a low-pass of second order, 1 / (1 + (f / f0)^2)^2: most
+is slow drift, little is above 1 Hz.
 
 Masses and the centres of segments are those of D. A. Winter, Biomechanics and Motor Control of
 Human Movement, table 4.1; trunk and head, which bend here, are split between their ends.
@@ -7,8 +16,9 @@ Human Movement, table 4.1; trunk and head, which bend here, are split between th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +38,7 @@ from rtradar.motion.synthetic.figure import (
     offsets,
     rotations,
     smooth,
+    swing_arm,
     xyz,
 )
 
@@ -118,41 +129,35 @@ def over_feet(feet: Pose, height_m: float, pelvis: Rotation, forward: Array, leg
     return np.asarray(hips + pelvis.apply([0.0, 0.0, (ROOT - HIP) * height_m]))
 
 
-def restless(subject: Subject, t: Array, pose: Pose) -> Pose:
+def restless(subject: Subject, own: SimpleNamespace, t: Array, pose: Pose) -> Pose:
     """The same pose with hips and shoulders that turn a little, and sway to the sides."""
-    turn, aside = (
-        np.sin(2 * np.pi * (subject.drawn(f"{name} rate", *rates) * t + subject.drawn(name, 0, 1)))
-        for name, rates in (("restless", (0.3, 0.7)), ("swaying", (0.2, 0.5)))
-    )
-    turn = math.radians(subject.drawn("turns", 0.7, 3.5)) * turn
-    sway_m = subject.drawn("sways", 0.001, 0.006) * subject.height_m * aside
+    turn = np.sin(2 * np.pi * (own.restless_rate * t + own.restless))
+    aside = np.sin(2 * np.pi * (own.swaying_rate * t + own.swaying))
+    turn = math.radians(own.turns) * turn
     return replace(
         pose,
-        root=pose.root + xyz(0.0, sway_m, 0.0),
+        root=pose.root + xyz(0.0, own.sways * subject.height_m * aside, 0.0),
         pelvis=about(z=turn) * pose.pelvis,
         thorax=about(z=-0.6 * turn) * pose.thorax,
     )
 
 
-Repetitions = Callable[[Array], Array]
-"""How far a movement is (n,), from 0 to about 1, at times (n,) [s]."""
-
-
 def repetitions(
     subject: Subject,
+    own: SimpleNamespace,
     until_s: float,
-    spans_s: Mapping[str, tuple[float, float]],
     *,
     sudden: float = 1.0,
     extent: float = 0.06,
-) -> Repetitions:
+) -> Callable[[Array], Array]:
     """Plan a movement that goes there, stays, comes back and rests, again and again.
 
-    ``spans_s`` are the ranges of the durations "go", "stay", "back" and "rest" at tempo 1, from
-    which a subject is drawn; each repetition differs by some percent in time, and by ``extent`` in
-    how far it goes. With ``sudden`` above 1 the way there begins slowly and ends fast.
+    How far it is at times (n,) [s] is given, from 0 to about 1. The subject's usual durations are
+    the traits "go", "stay", "back" and "rest" at tempo 1; each repetition differs by some percent
+    in time, and by ``extent`` in how far it goes. With ``sudden`` above 1 the way there begins
+    slowly and ends fast.
     """
-    usual = np.array([subject.drawn(name, *span) for name, span in spans_s.items()]) / subject.tempo
+    usual = np.array([own.go, own.stay, own.back, own.rest]) / subject.tempo
     rng = np.random.default_rng(subject.manner)
     begin = -subject.phase * float(usual.sum())
     rows = []
@@ -171,3 +176,63 @@ def repetitions(
         return np.asarray(far * (there - smooth((since - go - stay) / back)))
 
     return fraction
+
+
+# -- who stands ----------------------------------------------------------------------------------
+
+FORWARD_M, SIDEWAYS_M = 0.004, 0.002
+"""Root mean squares of the sway of the root, forward and back and sideways [m]."""
+
+CORNER_HZ = 0.25
+"""Frequency f0 of the spectrum, above which it falls with the fourth power."""
+
+LEAN = math.radians(2.5)
+"""Mean lean: the centre of mass is 4 cm ahead of the ankles."""
+
+_TONES_HZ = np.geomspace(0.02, 2.0, 48)
+"""Frequencies of the sway, in a geometric progression, so that it does not repeat."""
+
+_PHASES = 2 * np.pi * np.outer([math.sqrt(2), math.sqrt(3)], np.arange(1, 49) ** 2)
+"""Phases of the tones in both directions, without order (Weyl)."""
+
+_LONGEST_S = 5000.0
+"""Subjects and takes begin anywhere in this part of the same sway."""
+
+
+def sway(t: Array, phases: Array) -> Array:
+    """Sway (n,) of root mean square 1 in the long run, at times (n,) of tempo 1 [s]."""
+    power = np.gradient(_TONES_HZ) / (1 + (_TONES_HZ / CORNER_HZ) ** 2) ** 2
+    amplitudes = np.sqrt(2 * power / power.sum())
+    turned = 2 * np.pi * np.multiply.outer(t, _TONES_HZ) + phases
+    return np.asarray(np.cos(turned) @ amplitudes)
+
+
+def stand(subject: Subject, t: Array) -> Pose:
+    """Stand quietly, facing +x."""
+    height = subject.height_m
+    begun = subject.tempo * t + _LONGEST_S * subject.phase
+    forward, sideways = (
+        subject.amplitude * size * sway(begun, phases)
+        for size, phases in zip((FORWARD_M, SIDEWAYS_M), _PHASES, strict=True)
+    )
+    # A leg is all but straight: it reaches from the ankle to a hip that moves on a circle about it.
+    pendulum = (ROOT - ANKLE - 0.001) * height
+    lean, aside = LEAN + forward / pendulum, sideways / pendulum
+    upright = pendulum * np.cos(aside)
+    root = xyz(
+        upright * np.sin(lean), pendulum * np.sin(aside), ANKLE * height + upright * np.cos(lean)
+    )
+    body = about(y=lean)
+    arms = {
+        side: swing_arm(
+            body,
+            side,
+            forward=LEAN + math.radians(4),
+            outward=math.radians(8),
+            elbow=np.full(len(t), math.radians(12) * subject.uneven[side]),
+        )
+        for side in SIDES
+    }
+    head = about(y=np.full(len(t), math.radians(2)))
+    feet = soles(subject, len(t), 1.1, 8.0)
+    return replace(feet, root=root, pelvis=body, thorax=body, head=head, arms=arms)

@@ -1,18 +1,27 @@
-"""Synthetic actors who sit down and stand up, bend, squat and wave, again and again on the spot."""
+"""Synthetic actors who sit down and stand up, bend, squat, wave and fall, again and again.
+
+Of falls, backward the hips come down behind feet that stay, and the trunk follows; forward the
+knees come down first, over the toes, and the arms go ahead. Who fell lies, and gets up slowly.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rtradar.motion.synthetic.balance import (
+    AHEAD,
     over_feet,
     repetitions,
     restless,
     soles,
+    stand,
     standing,
 )
 from rtradar.motion.synthetic.figure import (
@@ -22,6 +31,7 @@ from rtradar.motion.synthetic.figure import (
     ROOT,
     SHANK,
     SIDES,
+    STYLES,
     THIGH,
     Arm,
     Array,
@@ -29,161 +39,159 @@ from rtradar.motion.synthetic.figure import (
     PosesAt,
     Subject,
     about,
+    rolled,
     smooth,
     swing_arm,
+    xyz,
 )
-from rtradar.motion.synthetic.stance import stand
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 LEGS = (THIGH + SHANK) * MAXIMUM_REACH
 """Length of the legs, all but straight, relative to the height."""
 
-WAVES = ("one_hand", "two_hands")
-"""Styles of waving."""
-
-_Bent = Callable[[Array, Array], Pose]
-"""A pose by how far the movement is (n,) and by the way of the root forward (n,) [m]."""
+_SUDDEN = 1.35
+"""Whoever falls is slow first, as what topples, and fastest shortly before the floor."""
 
 
-def _upright(subject: Subject) -> float:
-    """How straight the legs of somebody who stands are, relative to `LEGS`."""
-    return subject.drawn("straight legs", 0.985, 0.996)
+def _crouched(
+    subject: Subject,
+    own: SimpleNamespace,
+    forward: Array,
+    *,
+    legs: Array,
+    tilts: tuple[Array, Array, Array],
+    arms: tuple[Array, Array],
+) -> Pose:
+    """A pose with hips at a way forward (n,) [m], over feet that stand.
 
-
-def _arms(pose: Pose, subject: Subject, forward: Array, elbow: Array) -> dict[str, Arm]:
-    outward = math.radians(subject.drawn("arms out", 5.0, 16.0))
-    return {
-        side: swing_arm(
-            pose.thorax, side, forward=forward * subject.uneven[side], outward=outward, elbow=elbow
-        )
-        for side in SIDES
-    }
+    ``legs`` are their lengths over the height, ``tilts`` those of pelvis, thorax and head, and
+    ``arms`` the angles of arms forward and of elbows [rad].
+    """
+    feet = soles(subject, len(forward), own.feet, own.toes)
+    pelvis, thorax, head = (about(y=tilt) for tilt in tilts)
+    outward = math.radians(own.arms_out)
+    return replace(
+        feet,
+        root=over_feet(feet, subject.height_m, pelvis, forward, legs),
+        pelvis=pelvis,
+        thorax=thorax,
+        head=head,
+        arms={
+            side: swing_arm(
+                thorax,
+                side,
+                forward=arms[0] * subject.uneven[side],
+                outward=outward,
+                elbow=arms[1],
+            )
+            for side in SIDES
+        },
+    )
 
 
 def bend(duration_s: float, subject: Subject) -> PosesAt:
     """Bend down, with hanging arms, and up again."""
-    drawn = subject.drawn
-    done = repetitions(
-        subject,
-        duration_s,
-        {"go": (0.8, 1.3), "stay": (0.0, 0.25), "back": (0.8, 1.3), "rest": (0.0, 0.4)},
-    )
-    deep = math.radians(drawn("bend", 64.0, 110.0)) * min(subject.amplitude, 1.0)
-    hips, knees = drawn("hips", 0.5, 0.72), drawn("knees", 0.93, 0.99)
-    reach, elbows = drawn("reach", -0.1, 0.25), drawn("elbows", 6.0, 25.0)
-    # Many raise their arms each time before they go down.
-    raised = math.radians(max(drawn("raised", -50.0, 165.0), 0.0))
+    own = subject.traits("bend")
+    deep = math.radians(own.bend) * min(subject.amplitude, 1.0)
+    raised = math.radians(max(own.raised, 0.0))
+    straight = own.straight_legs
 
     def pose(bent: Array, forward: Array) -> Pose:
-        straight = _upright(subject)
-        legs = LEGS * (straight + (min(knees, straight) - straight) * bent)
-        feet = soles(subject, len(bent), drawn("feet", 0.9, 1.7), drawn("toes", 3.0, 14.0))
-        pelvis = about(y=hips * deep * bent)
-        some = replace(
-            feet,
-            root=over_feet(feet, subject.height_m, pelvis, forward, legs),
-            pelvis=pelvis,
-            thorax=about(y=deep * bent + math.radians(2)),
-            head=about(y=0.8 * deep * bent),
+        tilt = deep * bent
+        return _crouched(
+            subject,
+            own,
+            forward,
+            legs=LEGS * (straight + (min(own.knees, straight) - straight) * bent),
+            tilts=(own.hips * tilt, tilt + math.radians(2), 0.8 * tilt),
+            arms=(
+                math.radians(4) + raised * (1 - bent) + (1 + own.reach) * tilt,
+                np.radians(own.elbows + 0 * bent),
+            ),
         )
-        hanging = math.radians(4) + raised * (1 - bent) + (1 + reach) * deep * bent
-        return replace(some, arms=_arms(some, subject, hanging, np.radians(elbows + 0 * bent)))
 
-    return _balanced(subject, pose, done)
+    return _balanced(duration_s, subject, own, pose)
 
 
 def squat(duration_s: float, subject: Subject) -> PosesAt:
     """Squat and rise; the arms go forward."""
-    drawn = subject.drawn
-    done = repetitions(
-        subject,
-        duration_s,
-        {"go": (0.6, 1.3), "stay": (0.0, 0.4), "back": (0.6, 1.2), "rest": (0.05, 0.5)},
-    )
-    low = 1 - (1 - drawn("depth", 0.45, 0.68)) * min(subject.amplitude, 1.05)
-    lean, arms = math.radians(drawn("lean", 18.0, 48.0)), math.radians(drawn("arms", 15.0, 95.0))
+    own = subject.traits("squat")
+    low = 1 - (1 - own.depth) * min(subject.amplitude, 1.05)
+    lean, arms = math.radians(own.lean), math.radians(own.arms)
 
     def pose(bent: Array, forward: Array) -> Pose:
-        straight, pelvis = _upright(subject), about(y=0.8 * lean * bent)
-        legs = LEGS * (straight - (straight - low) * bent)
-        feet = soles(subject, len(bent), drawn("feet", 1.5, 3.4), drawn("toes", 8.0, 30.0))
-        some = replace(
-            feet,
-            root=over_feet(feet, subject.height_m, pelvis, forward, legs),
-            pelvis=pelvis,
-            thorax=about(y=lean * bent + math.radians(2)),
-            head=about(y=0.2 * lean * bent),
+        tilt = lean * bent
+        return _crouched(
+            subject,
+            own,
+            forward,
+            legs=LEGS * (own.straight_legs - (own.straight_legs - low) * bent),
+            tilts=(0.8 * tilt, tilt + math.radians(2), 0.2 * tilt),
+            arms=(math.radians(4) + (arms + lean) * bent, np.radians(14 + 0 * bent)),
         )
-        raised = math.radians(4) + (arms + lean) * bent
-        return replace(some, arms=_arms(some, subject, raised, np.radians(14 + 0 * bent)))
 
-    return _balanced(subject, pose, done)
+    return _balanced(duration_s, subject, own, pose)
 
 
-def sit(duration_s: float, subject: Subject) -> PosesAt:
-    """Sit down on a seat, stay, and stand up again."""
-    drawn, height = subject.drawn, subject.height_m
-    done = repetitions(
-        subject,
-        duration_s,
-        {"go": (1.0, 1.7), "stay": (0.2, 1.7), "back": (1.0, 1.6), "rest": (0.1, 0.9)},
-        extent=0.0,
-    )
-    down, behind = drawn("seat", 0.2, 0.27), drawn("seat behind", 0.19, 0.23)
-    lean, rests = math.radians(drawn("lean", 30.0, 52.0)), math.radians(drawn("rests", -6.0, 12.0))
-    thighs, elbows = drawn("thighs", 18.0, 42.0), drawn("elbows", 25.0, 70.0)
-
-    def pose(bent: Array, forward: Array) -> Pose:
-        feet = soles(subject, len(bent), drawn("feet", 0.9, 2.0), drawn("toes", 3.0, 16.0))
-        way = 4 * bent * (1 - bent)
-        pelvis = about(y=0.7 * lean * way + rests * bent)
-        legs = LEGS * _upright(subject)
-        root = over_feet(feet, height, pelvis, forward, legs + 0 * bent)
-        root[:, 2] += bent * ((ANKLE + legs + ROOT - HIP - down) * height - root[:, 2])
-        some = replace(
-            feet,
-            root=root,
-            pelvis=pelvis,
-            thorax=about(y=lean * way + rests * bent + math.radians(2)),
-            head=about(y=0.3 * lean * way),
-        )
-        forearms = np.radians(12 + (elbows - 12) * bent)
-        hands = math.radians(3) + math.radians(thighs) * bent + 0.3 * lean * way
-        return replace(some, arms=_arms(some, subject, hands, forearms))
+def _balanced(
+    duration_s: float,
+    subject: Subject,
+    own: SimpleNamespace,
+    pose: Callable[[Array, Array], Pose],
+) -> PosesAt:
+    """Repeat a pose by how far it is and by the way of the root forward, in balance."""
+    done = repetitions(subject, own, duration_s)
 
     def poses(t: Array) -> Pose:
         bent = done(t)
-        seated = np.full(len(t), -behind * height)
-        # The feet carry until the seat does.
-        carried = smooth((bent - 0.55) / 0.45)
-        stood = standing(subject, lambda way: pose(np.minimum(bent, 1.0), way), 0.4 * bent * seated)
-        return restless(subject, t, pose(bent, stood + carried * (seated - stood)))
+        way = standing(subject, partial(pose, bent), np.zeros(len(t)))
+        return restless(subject, own, t, pose(bent, way))
 
     return poses
 
 
-def _balanced(subject: Subject, pose: _Bent, done: Callable[[Array], Array]) -> PosesAt:
+def sit(duration_s: float, subject: Subject) -> PosesAt:
+    """Sit down on a seat, stay, and stand up again."""
+    own, height = subject.traits("sit"), subject.height_m
+    done = repetitions(subject, own, duration_s, extent=0.0)
+    lean, rests = math.radians(own.lean), math.radians(own.rests)
+    legs = LEGS * own.straight_legs
+
+    def pose(bent: Array, forward: Array) -> Pose:
+        way = 4 * bent * (1 - bent)
+        tilt = lean * way
+        hands = math.radians(3) + math.radians(own.thighs) * bent + 0.3 * tilt
+        found = _crouched(
+            subject,
+            own,
+            forward,
+            legs=legs + 0 * bent,
+            tilts=(0.7 * tilt + rests * bent, tilt + rests * bent + math.radians(2), 0.3 * tilt),
+            arms=(hands, np.radians(12 + (own.elbows - 12) * bent)),
+        )
+        level = (ANKLE + legs + ROOT - HIP - own.seat) * height
+        found.root[:, 2] += bent * (level - found.root[:, 2])
+        return found
+
     def poses(t: Array) -> Pose:
         bent = done(t)
-        way = standing(subject, lambda way: pose(bent, way), np.zeros(len(t)))
-        return restless(subject, t, pose(bent, way))
+        seated = np.full(len(t), -own.seat_behind * height)
+        # The feet carry until the seat does.
+        carried = smooth((bent - 0.55) / 0.45)
+        stood = standing(subject, partial(pose, np.minimum(bent, 1.0)), 0.4 * bent * seated)
+        return restless(subject, own, t, pose(bent, stood + carried * (seated - stood)))
 
     return poses
 
 
 def wave(duration_s: float, subject: Subject) -> PosesAt:
     """Stand and wave one hand, or both."""
-    drawn = subject.drawn
-    both = subject.style == "two_hands" or (not subject.style and drawn("both", 0.0, 1.0) > 0.6)
-    done = repetitions(
-        subject,
-        duration_s,
-        {"go": (0.7, 1.2), "stay": (6.0, 14.0), "back": (0.7, 1.2), "rest": (0.0, 0.4)},
-    )
-    rate = 2 * math.pi * drawn("rate", 0.8, 1.45) * subject.tempo
-    outward, forward = drawn("outward", 60.0, 125.0), drawn("forward", -5.0, 35.0)
-    elbow, swing = drawn("elbow", 45.0, 85.0), drawn("swing", 10.0, 27.0) * subject.amplitude
-    shoulder, begun = drawn("shoulder", 1.0, 8.0), drawn("begun", 0.0, 2 * math.pi)
-    mirrored = drawn("mirrored", 0.0, 1.0) > 0.5
+    own = subject.traits("wave")
+    both = subject.style == "two_hands" or (not subject.style and own.both > 0.6)
+    done = repetitions(subject, own, duration_s)
+    rate, swing = 2 * math.pi * own.rate * subject.tempo, own.swing * subject.amplitude
 
     def poses(t: Array) -> Pose:
         body = stand(subject, t)
@@ -192,16 +200,130 @@ def wave(duration_s: float, subject: Subject) -> PosesAt:
         for side, sign in SIDES.items():
             if not both and side != subject.side:
                 continue
-            turn = 0.0 if mirrored or side == subject.side else math.pi
+            turn = 0.0 if own.mirrored > 0.5 or side == subject.side else math.pi
             # The rate drifts, and the hand follows the forearm.
-            beat = rate * t + begun + turn + 0.3 * np.sin(0.37 * rate * t + begun)
+            beat = rate * t + own.begun + turn + 0.3 * np.sin(0.37 * rate * t + own.begun)
             upper = body.thorax * about(
-                x=sign * np.radians(8 + up * (outward - 8 + shoulder * np.sin(beat))),
-                y=-np.radians(4 + (forward - 4) * up),
+                x=sign * np.radians(8 + up * (own.outward - 8 + own.shoulder * np.sin(beat))),
+                y=-np.radians(4 + (own.forward - 4) * up),
             )
-            fore = upper * about(x=sign * np.radians(up * (elbow + swing * np.sin(beat - 0.3))))
+            fore = upper * about(x=sign * np.radians(up * (own.elbow + swing * np.sin(beat - 0.3))))
             hand = fore * about(x=sign * np.radians(up * 0.5 * swing * np.sin(beat - 0.9)))
             arms[side] = Arm(upper, fore, hand)
-        return restless(subject, t, replace(body, arms=arms))
+        return restless(subject, own, t, replace(body, arms=arms))
 
     return poses
+
+
+# -- falls -----------------------------------------------------------------------------------------
+
+
+def _angle(done: Array, first_deg: float, middle_deg: float, last_deg: float) -> Array:
+    """Angle (n,) [rad] along the parabola through three values, at 0, 1/2 and 1."""
+    before, between, after = (
+        (2 * done - 1) * (done - 1),
+        4 * done * (1 - done),
+        done * (2 * done - 1),
+    )
+    return np.radians(first_deg * before + middle_deg * between + last_deg * after)
+
+
+def fall(duration_s: float, subject: Subject) -> PosesAt:
+    """Fall to the floor, lie and get up, again and again."""
+    style = subject.style or STYLES["fall"][int(subject.drawn("style of fall", 0.0, 1.0) > 0.5)]
+    own = subject.traits(f"fall_{style}")
+    # Gravity gives the pace.
+    subject = replace(subject, tempo=math.sqrt(1.75 / subject.height_m))
+    done = repetitions(subject, own, duration_s, sudden=_SUDDEN, extent=0.0)
+    falling = {"backward": _backward, "forward": _forward}[style]
+
+    def poses(t: Array) -> Pose:
+        # What is above the hips follows them.
+        return falling(subject, own, done(t), done(t - own.late / subject.tempo))
+
+    return poses
+
+
+def _arms(
+    subject: Subject,
+    thorax: Rotation,
+    follows: Array,
+    *,
+    forward: tuple[float, float],
+    outward: tuple[float, float],
+    elbow: tuple[float, float],
+) -> dict[str, Arm]:
+    """Arms that hang at first, with angles in the middle of a fall and on the floor [deg]."""
+    return {
+        side: swing_arm(
+            thorax,
+            side,
+            forward=_angle(follows, 4, forward[0] * subject.uneven[side], forward[1]),
+            outward=_angle(follows, 9, *outward),
+            elbow=_angle(follows, 14, *elbow),
+            wrist=0.0,
+        )
+        for side in SIDES
+    }
+
+
+def _backward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array) -> Pose:
+    height = subject.height_m
+    feet = soles(subject, len(down), own.feet, own.toes)
+    root = height * xyz(
+        AHEAD - 0.012 - (own.behind + AHEAD) * down,
+        0.0,
+        ROOT - 0.006 + (own.lying - ROOT + 0.006) * down,
+    )
+    twist = math.radians(own.twisted) * 4 * follows * (1 - follows)
+    pelvis = about(z=0.4 * twist, y=_angle(follows, 1, 0.6 * own.crouched - 20, -84))
+    thorax = about(z=twist, y=_angle(follows, 2, own.crouched - 12, -87))
+    arms = _arms(
+        subject,
+        thorax,
+        follows,
+        forward=(own.raised, 3),
+        outward=(0.7 * own.spread, own.spread),
+        elbow=(38, own.elbow),
+    )
+    head = about(z=twist, y=_angle(follows, 3, 10, own.head))
+    return replace(feet, root=root, pelvis=pelvis, thorax=thorax, head=head, arms=arms)
+
+
+def _forward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array) -> Pose:
+    height = subject.height_m
+    feet = soles(subject, len(down), own.feet, 0.0)
+    # The heels lift over the toes, which stay; then shanks and thighs, each by its angle.
+    pitch = np.radians(own.heels) * down
+    ankle = rolled(pitch, height)
+    lying = ANKLE + rolled(np.radians([own.heels]), 1.0)[0, 2]
+    shank = _angle(down, 6, 48, math.degrees(math.acos((0.035 - lying) / SHANK)))
+    thigh = _angle(down, -6, -own.sits_back, 0) + _angle(follows, 0, 40, 80)
+    pelvis = about(y=_angle(follows, 1, own.hips, 87))
+    thorax = about(y=_angle(follows, 2, own.chest, 86))
+    hips = ankle + height * (
+        xyz(0.0, 0.0, ANKLE + 0 * down)
+        + SHANK * xyz(np.sin(shank), 0.0, np.cos(shank))
+        + THIGH * xyz(np.sin(thigh), 0.0, np.cos(thigh))
+    )
+    root = hips + pelvis.apply([0.0, 0.0, (ROOT - HIP) * height])
+    head = about(y=_angle(follows, 3, 14, own.head))
+    arms = _arms(
+        subject,
+        thorax,
+        follows,
+        forward=(own.reach, -4),
+        outward=(0.55 * own.spread, own.spread),
+        elbow=(26, 0),
+    )
+    ankles = {side: feet.ankles[side] + ankle for side in SIDES}
+    return replace(
+        feet,
+        root=root,
+        pelvis=pelvis,
+        thorax=thorax,
+        head=head,
+        ankles=ankles,
+        feet={side: about(y=pitch) for side in SIDES},
+        arms=arms,
+    )

@@ -21,6 +21,7 @@ from rtradar.motion.synthetic.figure import (
     HIP,
     HIP_Y,
     LEFT,
+    OTHER,
     ROOT,
     SHANK,
     SIDES,
@@ -204,7 +205,7 @@ class Fighter:
     @property
     def rear(self) -> str:
         """The side of the foot behind."""
-        return "r" if self.lead == "l" else "l"
+        return OTHER[self.lead]
 
     # -- plans -------------------------------------------------------------------------------------
 

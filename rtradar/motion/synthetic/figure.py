@@ -13,11 +13,14 @@ above the sole.
 from __future__ import annotations
 
 import operator
+import tomllib
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import reduce
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cache, reduce
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +34,8 @@ Array = NDArray[np.float64]
 
 SIDES: Mapping[str, float] = {"l": 1.0, "r": -1.0}
 """Sign of y on each side."""
+
+OTHER: Mapping[str, str] = {"l": "r", "r": "l"}
 
 LEFT = np.array([0.0, 1.0, 0.0])
 UP = np.array([0.0, 0.0, 1.0])
@@ -47,6 +52,23 @@ MAXIMUM_REACH = 0.9985
 """Largest extension of a leg relative to its length: at 1 the knee would rotate infinitely fast."""
 
 
+@cache
+def _tables() -> dict[str, dict[str, Any]]:
+    return tomllib.loads(Path(__file__).with_name("traits.toml").read_text(encoding="utf-8"))
+
+
+def table_of(name: str) -> dict[str, Any]:
+    """One table of ``traits.toml``, with what it takes from the table that it is like."""
+    own = dict(_tables()[name])
+    return (table_of(own.pop("like")) if "like" in own else {}) | own
+
+
+STYLES: Mapping[str, tuple[str, ...]] = {
+    activity: tuple(styles) for activity, styles in table_of("styles").items()
+}
+"""Ways to do an activity, by its name; without a style a subject has a way of its own."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Subject:
     """A person's size and way of moving, relative to the nominal actor.
@@ -54,7 +76,7 @@ class Subject:
     The leg or hand of the ``side``, "l" or "r", acts or steps first. ``phase`` is the fraction of a
     step, or of the first rest, at which the movement begins; ``uneven`` is the strength by side.
     ``style`` is one of the activity's own, or empty. ``manner`` is the seed of all else in which
-    people differ; `drawn` gives it by name.
+    people differ; `traits` gives it by name.
     """
 
     height_m: float
@@ -71,10 +93,21 @@ class Subject:
         rng = np.random.default_rng([self.manner, zlib.crc32(trait.encode())])
         return float(rng.uniform(low, high))
 
+    def traits(self, table: str) -> SimpleNamespace:
+        """All traits of a table of ``traits.toml``, drawn where they are ranges."""
+        return SimpleNamespace(
+            **{
+                name.replace(" ", "_"): self.drawn(name, *value)
+                if isinstance(value, list) and len(value) == 2
+                else value
+                for name, value in table_of(table).items()
+            }
+        )
+
     @property
     def other(self) -> str:
         """The side that does not act."""
-        return "r" if self.side == "l" else "l"
+        return OTHER[self.side]
 
 
 def draw_subject(

@@ -1,6 +1,6 @@
 """A synthetic walk: footprints first, then feet that roll over them, then the body that follows.
 
-`rtradar.motion.synthetic.gait_styles` says how walkers differ.
+``traits.toml`` says how walkers differ.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import itertools
 import math
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ from rtradar.motion.synthetic.figure import (
     HEEL_X,
     LEFT,
     NECK_BASE,
+    OTHER,
     ROOT,
     SIDES,
     UP,
@@ -34,12 +36,31 @@ from rtradar.motion.synthetic.figure import (
     swing_arm,
     xyz,
 )
-from rtradar.motion.synthetic.gait_styles import Gait, gait_of
 
 HALF_TRACK_M, STRAIGHT_M = 1.5, 4.2
 """Distance from the middle at which long walks turn round, and the length of straight walks [m]."""
 
 _TURN_STEPS = 4
+
+
+class Gait(SimpleNamespace):
+    """How somebody walks: the traits of a table, and what follows from them."""
+
+    def stance_of(self, lame: float) -> float:
+        """Part of the cycle for which a foot stands, that of the lame side with ``lame`` = 1."""
+        return self.stance + lame * self.lame_stance
+
+    def midstance(self, lame: float = 0.0) -> float:
+        """Part of the cycle from landing until the body is over the foot, later in long stances."""
+        return 0.7 * self.stance_of(lame) ** 2
+
+    def cycle_of(self, subject: Subject) -> float:
+        """Duration of two steps [s]; it grows with the root of the height."""
+        return self.cycle_s * math.sqrt(subject.height_m / 1.75 / subject.tempo)
+
+    def step_of(self, subject: Subject) -> float:
+        """Length of one step [m]; who walks faster takes longer and quicker steps alike."""
+        return self.step * subject.height_m * subject.amplitude * math.sqrt(subject.tempo)
 
 
 class Step(NamedTuple):
@@ -79,7 +100,7 @@ def footprints(subject: Subject, gait: Gait, duration_s: float) -> list[Step]:
         heading += turning
         x += advance * math.cos(heading)
         steps.append(Step(side, time, np.array([x, 0.0]), heading, min(advance / step_m, 1.0)))
-        side = "r" if side == "l" else "l"
+        side = OTHER[side]
         # The foot of the other side lands next.
         time += half_cycle * (late - lame * gait.lame_late)
     return steps
@@ -179,15 +200,16 @@ def _body(steps: list[Step], subject: Subject, gait: Gait) -> _Body:
 
 def walk(duration_s: float, subject: Subject) -> PosesAt:
     """A walk, facing and starting along +x."""
-    return _steps(duration_s, subject, gait_of(subject, in_place=False))
+    return _steps(duration_s, subject, f"walk_{subject.style or 'normal'}")
 
 
 def walk_in_place(duration_s: float, subject: Subject) -> PosesAt:
     """Steps on the spot, facing +x."""
-    return _steps(duration_s, subject, gait_of(subject, in_place=True))
+    return _steps(duration_s, subject, "walk_in_place")
 
 
-def _steps(duration_s: float, subject: Subject, gait: Gait) -> PosesAt:
+def _steps(duration_s: float, subject: Subject, table: str) -> PosesAt:
+    gait = Gait(**vars(subject.traits(table)))
     steps = footprints(subject, gait, duration_s)
     body = _body(steps, subject, gait)
     foot_at = {

@@ -7,10 +7,10 @@ the legs are stretched, so that the knees bend on the floor.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -48,141 +48,6 @@ DEEPEST = 0.2
 """How far the root comes down between hops at most, where they are far apart, in heights."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Manner:
-    """How somebody does jacks; lengths are fractions of the height, angles in degrees."""
-
-    hop_s: float
-    """Time from take-off to take-off at tempo 1."""
-    flight_s: float
-    jacks: float
-    """Number of jacks, or of pairs of jumps, between rests."""
-    rest_s: float
-    uneven: float
-    """Deviation of the times of single hops, in hops."""
-    lopsided: float
-    """Cube root of how much longer than usual the feet stay apart, in fifths of a hop."""
-    wide: float
-    """Feet beyond the hip joints, where they are apart."""
-    close: float
-    """Feet relative to the hip joints, where they are together."""
-    toes_out: float
-    knees_out: float
-    """How far the knees point outward; toes do where the feet are apart."""
-    stretched: float
-    """How long the legs are at take-off and landing, relative to straight ones."""
-    scatter: float
-    """Deviation of the places where the feet land, forward."""
-    astride: float
-    """How far one foot lands before the other where they are apart."""
-    heels: float
-    """Pitch of the feet at take-off and landing."""
-    point: float
-    """Height of the heels over the toes in the middle of a flight, relative to take-off."""
-    follow: float
-    """Speed of the ankles at take-off and landing, relative to the hips."""
-    trail: float
-    """How far the feet fall behind while they are off the floor."""
-    sway: float
-    """How far the hips go forward with each hop."""
-    rock: float
-    """The same with every second hop, while the feet are apart."""
-    highest: float
-    lowest: float
-    vary: float
-    """Deviation of what the arms reach in single hops."""
-    late_s: float
-    """How much longer the arms move than in one hop; so they rest at no end of their way."""
-    behind: float
-    """By which part of a contact the arms are behind the feet, or before them."""
-    elbow: float
-    elbow_swing: float
-    overhead: float
-    """How far the elbows bend to bring the hands together over the head."""
-    forward: float
-    lean: float
-    crouch: float
-    """Further lean where the root is a tenth of the height lower than in standing."""
-    turn: float
-    nod: float
-    """How far the trunk leans back and forth, whatever the hops."""
-    shrug: float
-    swing: float = 0.0
-    """How far both arms swing forward with each hop."""
-    back: float = 0.0
-    """The same back, before take-off."""
-
-
-_RANGES = {
-    "hop_s": (0.47, 0.62),
-    "flight_s": (0.16, 0.26),
-    "jacks": (6.0, 20.0),
-    "rest_s": (0.05, 0.3),
-    "uneven": (0.006, 0.02),
-    "lopsided": (-1.0, 1.0),
-    "wide": (0.07, 0.215),
-    "close": (0.75, 1.3),
-    "toes_out": (4.0, 20.0),
-    "knees_out": (8.0, 40.0),
-    "stretched": (0.974, 0.99),
-    "scatter": (0.002, 0.012),
-    "astride": (-0.06, 0.06),
-    "heels": (17.0, 31.0),
-    "point": (0.9, 1.12),
-    "follow": (0.85, 1.0),
-    "trail": (-0.004, 0.006),
-    "sway": (-0.004, 0.012),
-    "rock": (-0.014, 0.014),
-    "highest": (122.0, 168.0),
-    "lowest": (4.0, 17.0),
-    "vary": (1.0, 5.0),
-    "late_s": (0.1, 0.26),
-    "behind": (-0.4, 0.5),
-    "elbow": (4.0, 28.0),
-    "elbow_swing": (-4.0, 34.0),
-    "overhead": (0.0, 80.0),
-    "forward": (-5.0, 20.0),
-    "lean": (1.0, 13.0),
-    "crouch": (0.0, 6.0),
-    "turn": (2.0, 10.0),
-    "nod": (0.5, 4.0),
-    "shrug": (12.0, 26.0),
-}
-"""Ranges of jumping jacks."""
-
-_JUMPS = _RANGES | {
-    "hop_s": (0.56, 0.95),
-    "flight_s": (0.24, 0.46),
-    "jacks": (2.0, 5.0),
-    "rest_s": (0.1, 1.2),
-    "uneven": (0.01, 0.03),
-    "lopsided": (0.0, 0.0),
-    "close": (0.8, 1.9),
-    "toes_out": (0.0, 0.0),
-    "knees_out": (0.0, 0.0),
-    "stretched": (0.97, 0.97),
-    "scatter": (0.0, 0.0),
-    "astride": (0.0, 0.0),
-    "vary": (0.0, 0.0),
-    "late_s": (0.04, 0.16),
-    "behind": (0.0, 0.0),
-    "heels": (18.0, 26.0),
-    "point": (0.9, 1.1),
-    "follow": (0.95, 1.05),
-    "trail": (0.0, 0.0),
-    "sway": (0.015, 0.015),
-    "rock": (0.0, 0.0),
-    "elbow": (15.0, 60.0),
-    "forward": (0.0, 10.0),
-    "lean": (0.0, 6.0),
-    "crouch": (2.0, 14.0),
-    "nod": (0.0, 0.0),
-    "swing": (5.0, 50.0),
-    "back": (0.0, 20.0),
-}
-"""Ranges of jumps with both legs, where they are not those of jumping jacks."""
-
-
 class _Flight(NamedTuple):
     """One hop: when, and whether the feet are apart afterwards."""
 
@@ -198,7 +63,9 @@ class _Flight(NamedTuple):
         return self.end - self.begin
 
 
-def _sets(subject: Subject, manner: _Manner, until_s: float, *, apart: bool) -> list[list[_Flight]]:
+def _sets(
+    subject: Subject, manner: SimpleNamespace, until_s: float, *, apart: bool
+) -> list[list[_Flight]]:
     """Sets of flights; each set begins and ends standing, the first one before 0."""
     hop = manner.hop_s / subject.tempo
     # A hop of the same height takes as long at any tempo; only where contact would get too short it
@@ -315,7 +182,7 @@ def _rise(
     sets: list[list[_Flight]],
     longest_s: float,
     levels: tuple[float, ...],
-    manner: _Manner,
+    manner: SimpleNamespace,
     drop: float,
 ) -> tuple[Array, Array]:
     """How much higher the ankles are than in standing, and of that, over the toes (n,) each [m].
@@ -358,18 +225,16 @@ def _rise(
 
 def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
     """Jumping jacks, facing +x."""
-    return _hopping(duration_s, subject, _RANGES, apart=True)
+    return _hopping(duration_s, subject, "jumping_jack")
 
 
 def jump(duration_s: float, subject: Subject) -> PosesAt:
     """Jumps with both legs on the spot, facing +x."""
-    return _hopping(duration_s, subject, _JUMPS, apart=False)
+    return _hopping(duration_s, subject, "jump")
 
 
-def _hopping(
-    duration_s: float, subject: Subject, ranges: Mapping[str, tuple[float, float]], *, apart: bool
-) -> PosesAt:
-    manner = _Manner(**{name: subject.drawn(name, *some) for name, some in ranges.items()})
+def _hopping(duration_s: float, subject: Subject, activity: str) -> PosesAt:
+    manner, apart = subject.traits(activity), activity == "jumping_jack"
     return partial(_hops, subject, manner, _sets(subject, manner, duration_s, apart=apart))
 
 
@@ -394,7 +259,7 @@ def _pitch(rise: Array) -> Array:
     return np.arcsin((rise + below) / math.hypot(TOE_X, below)) - math.atan2(below, TOE_X)
 
 
-def _wavering(subject: Subject, manner: _Manner, t: Array, what: str) -> Array:
+def _wavering(subject: Subject, manner: SimpleNamespace, t: Array, what: str) -> Array:
     """Slow swings (n,) from -1 to 1 of ``what``: nobody does the same all the time."""
     rates = {f"{what} of a jack": 0.5, f"slow {what}": 0.31}
     swings = [
@@ -408,7 +273,7 @@ def _wavering(subject: Subject, manner: _Manner, t: Array, what: str) -> Array:
 
 def _arms(
     subject: Subject,
-    manner: _Manner,
+    manner: SimpleNamespace,
     thorax: Rotation,
     raised: Array,
     ends: tuple[float, float],
@@ -430,7 +295,9 @@ def _arms(
     return arms
 
 
-def _hops(subject: Subject, manner: _Manner, all_sets: list[list[_Flight]], t: Array) -> Pose:
+def _hops(
+    subject: Subject, manner: SimpleNamespace, all_sets: list[list[_Flight]], t: Array
+) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
     hop_s = manner.hop_s / subject.tempo
     # A jumper does not move before the first hop of a set and after the last: further sets do not

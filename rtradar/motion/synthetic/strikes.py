@@ -1,0 +1,376 @@
+"""Kicks and punches: of one kind or of several, alone, one after the other, and in boxing.
+
+A kicker steps in, brings the knee up, extends the leg, draws it back and returns to the stance. Of
+punches, the hips lead, the shoulders follow, the hand arrives last and comes back; the foot behind
+pivots, steps are short and bring the other foot after. What differs between people is drawn for
+each subject (``traits.toml``), what differs between strikes of one person for each strike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import SimpleNamespace
+
+import numpy as np
+
+from rtradar.motion.synthetic.fighter import Bearing, Fighter
+from rtradar.motion.synthetic.figure import (
+    OTHER,
+    SIDES,
+    STYLES,
+    TOE_X,
+    Array,
+    PosesAt,
+    Subject,
+    about,
+    table_of,
+)
+
+_BOXERS = (0.25, 0.25, 0.5)
+"""Probabilities of the styles; the people of Berkeley MHAD, asked to box, do so steadily."""
+
+
+def _kinds(activity: str) -> Mapping[str, SimpleNamespace]:
+    """All kinds of kicks, or of punches."""
+    return {style: SimpleNamespace(**table_of(f"{activity}_{style}")) for style in STYLES[activity]}
+
+
+KICKS, PUNCHES = _kinds("kick"), _kinds("punch")
+
+
+def _only(style: str, kinds: Mapping[str, SimpleNamespace]) -> Array:
+    return np.array([float(kind == style) for kind in kinds])
+
+
+def _bearing(
+    own: SimpleNamespace, *, lead: str, stagger: float, depth: float, lean: float
+) -> Bearing:
+    return Bearing(
+        lead=lead,
+        stagger=stagger,
+        spread=own.spread,
+        bladed=math.radians(own.bladed),
+        depth=depth,
+        lean=math.radians(lean),
+        heel=math.radians(max(own.heel, 0.0)),
+        guard=(own.ahead, own.inward, own.up),
+        elbow=math.radians(own.elbow),
+        bounce=own.bounce,
+        pulse_hz=own.pulse,
+        sway=own.sway,
+        restless=own.restless,
+    )
+
+
+# -- kicks -----------------------------------------------------------------------------------------
+
+
+def kick(duration_s: float, subject: Subject) -> PosesAt:
+    """Kicks of any kind, facing +x."""
+    own = subject.traits("kick")
+    fighter = Fighter(
+        subject,
+        _bearing(
+            own,
+            lead=subject.other if own.behind < 0.7 else subject.side,
+            stagger=0.04 + 0.10 * own.stagger + 0.12 * own.depth**3,
+            depth=0.018 + 0.03 * own.depth + 0.15 * own.depth**3,
+            lean=own.lean,
+        ),
+    )
+    own.step *= min(subject.amplitude, 1.0)
+    own.height += 30 * (subject.amplitude - 1)
+    own.load = -0.01 + 0.12 * own.load + 0.12 * own.load**4
+    own.pace *= subject.tempo
+    # Each has one or two favourites; spins are rare.
+    rng = np.random.default_rng([subject.manner, 1])
+    shares = (
+        _only(subject.style, KICKS) if subject.style else rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
+    )
+    rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
+    leg, t = subject.side, -1.6 * subject.phase
+    while t < duration_s + 0.5:
+        kind = KICKS[STYLES["kick"][int(rng.choice(len(KICKS), p=shares))]]
+        t = _kick(fighter, own, kind, leg, t, rng)
+        t += float(rng.uniform(0.03, own.rest)) / subject.tempo
+        if rng.random() < own.alternating:
+            leg = OTHER[leg]
+    return fighter.poses
+
+
+def _kick(
+    fighter: Fighter,
+    habits: SimpleNamespace,
+    kind: SimpleNamespace,
+    leg: str,
+    t: float,
+    rng: np.random.Generator,
+) -> float:
+    """Plan one kick that begins at a time [s], and return when the kicker stands again."""
+    own, sign = fighter.bearing, SIDES[leg]
+    support = OTHER[leg]
+    pace = habits.pace * float(rng.uniform(0.92, 1.08))
+
+    def at(seconds: float) -> float:
+        return t + seconds / pace
+
+    # The support foot steps in, and the weight comes over it.
+    x, y = fighter.ankle(support)
+    step = habits.step * float(rng.uniform(0.3, 1.3)) * (1.0 if x < 0.25 else 0.3)
+    step = min(step, 0.52 - abs(x - fighter.ankle(leg)[0]))
+    turned = fighter.facing - sign * math.radians(0.25 * kind.pivot)
+    spinning = kind.turn < -120
+    begin = 0.0
+    if step > 0.03:
+        to = x + step + TOE_X * math.cos(turned), 0.4 * y + TOE_X * math.sin(turned), turned
+        fighter.step(support, at(0.0), at(0.30), to, 0.02 + 0.12 * step)
+        begin = 0.16
+    fighter.depth.move(at(0.0), at(0.24), own.depth + habits.load)
+    x, y = fighter.ankle(support)
+    fighter.root.move(at(0.0), at(begin + 0.42), x - 0.01, 0.85 * y)
+
+    # Knee up, leg out, leg back.
+    lift = max(begin + 0.20, (fighter.stepped - t) * pace + 0.03)
+    chambered = lift + 0.26
+    out = chambered + kind.out_s * float(rng.uniform(0.85, 1.2))
+    back = out + float(rng.uniform(0.16, 0.30))
+    land = back + float(rng.uniform(0.26, 0.40))
+    raised = habits.height + float(rng.normal(0, 4))
+    foot = fighter.feet[leg]
+
+    def leg_to(
+        key: tuple[float, float, float], share: float, roll: float = 1.0
+    ) -> tuple[float, ...]:
+        azimuth, elevation, reach = key
+        # Beyond straight down, backward, it goes up as the elevation falls.
+        higher = share * raised * (1 if elevation > -90 else -1)
+        angles = np.radians([sign * azimuth, elevation + higher, roll * kind.roll, kind.flexion])
+        return fighter.facing + angles[0], angles[1], reach, angles[2], angles[3]
+
+    low = (0.0, -105.0 if spinning else -75.0, 0.93)
+    foot.leg.move(at(lift) - 0.1, at(lift), *leg_to(low, 0.0, 0.0))
+    foot.leg.move(at(lift), at(chambered), *leg_to(kind.chamber, 0.35))
+    foot.leg.move(at(chambered - 0.02), at(out), *leg_to(kind.impact, 1.0))
+    foot.leg.move(at(out + 0.01), at(back), *leg_to(kind.recoil, 0.35))
+    foot.air.move(at(lift), at(chambered - 0.04), 1.0)
+    foot.free.move(at(lift), at(chambered), 0.5)
+    foot.heel.move(at(lift - 0.18), at(lift + 0.04), math.radians(40))
+
+    # Hips and support foot turn with it, the trunk leans away.
+    turn = -sign * math.radians(kind.turn) * (1.0 if spinning else habits.turn)
+    turn, away = fighter.facing + turn, math.radians(kind.away) * habits.tilt
+    away *= 0.6 + 0.4 * math.sin(math.radians(max(60.0 + raised, 0.0)))
+    aside = sign * math.radians(kind.aside) * habits.tilt
+    fighter.pivot(support, at(lift), at(out), fighter.facing - sign * math.radians(kind.pivot))
+    (x, y), (toe_x, toe_y) = fighter.ankle(support), fighter.feet[support].toe.last
+    over = 0.6 * x + 0.4 * toe_x - 0.02, 0.6 * y + 0.4 * toe_y
+    fighter.root.move(at(begin + 0.42), at(out), *over)
+    fighter.pelvis.move(at(lift - 0.06), at(out - 0.02), turn, -0.6 * away, 0.6 * aside)
+    shoulders = fighter.facing + 0.8 * (turn - fighter.facing)
+    fighter.thorax.move(at(lift - 0.02), at(out + 0.02), shoulders, -away, aside)
+    foot.yaw.move(at(lift), at(chambered), fighter.facing + 0.7 * (turn - fighter.facing))
+    fighter.depth.move(at(lift), at(out), 0.006 + 0.2 * own.depth)
+    _swing(fighter, habits, leg, (at(lift), at(out), at(back)), rng)
+
+    # The leg lands behind or in front, and the stance follows.
+    if spinning:
+        fighter.facing += sign * 2 * math.pi
+    ahead = rng.random() < habits.forward and x < 0.3
+    fighter.lead = leg if ahead else support
+    middle = float(rng.uniform(-0.04, 0.04)) - habits.recoil
+    middle += (x if ahead else x - step) * 0.8
+    reach = 0.36 - own.stagger / 2
+    middle = float(np.clip(middle, x - reach, x + reach))
+    place = fighter.place(leg, middle, 0.0)
+    fighter.turn_home(at(out + 0.06), at(land + 0.08))
+    if spinning:
+        fighter.pivot(support, at(back - 0.05), at(land), fighter.place(support, 0.0, 0.0)[2])
+    foot.toe.move(at(out), at(out) + 0.05, *place[:2])
+    foot.yaw.move(at(back - 0.05), at(land), place[2])
+    foot.leg.move(at(back), at(land), *leg_to((0.0, -72.0, 0.94), 0.0, 0.0))
+    foot.air.move(at(land - 0.24), at(land), 0.0)
+    foot.free.move(at(back - 0.1), at(land - 0.02), 0.0)
+    foot.heel.move(at(back), at(land), 0.0 if ahead else own.heel)
+    fighter.stepped = at(land)
+    fighter.root.move(at(land - 0.22), at(land + 0.12), *fighter.middle())
+    return fighter.into_stance(at(land + 0.02), at(land + 0.5), middle, 0.0, 0.035)
+
+
+def _swing(
+    fighter: Fighter,
+    habits: SimpleNamespace,
+    leg: str,
+    times: tuple[float, float, float],
+    rng: np.random.Generator,
+) -> None:
+    """Swing the arm of the kicking side down and back, and the other forward and aside."""
+    for side, sign in SIDES.items():
+        down = (-0.15, 0.35 * sign, -0.78) if side == leg else (0.42, 0.42 * sign, -0.05)
+        size = habits.swing * float(rng.uniform(0.6, 1.15))
+        guard = np.array(fighter.guard(side))
+        place = guard + min(size, 1.0) * (np.array(down) - guard)
+        fighter.wrists[side].move(times[0], times[1] + 0.02, *place.tolist())
+
+
+# -- punches ---------------------------------------------------------------------------------------
+
+
+def punch(duration_s: float, subject: Subject) -> PosesAt:
+    """Punches of any kind, alone or a few in a row, facing +x."""
+    return _combinations(duration_s, subject, boxing=False)
+
+
+def boxing(duration_s: float, subject: Subject) -> PosesAt:
+    """Shadow boxing: combinations, steps between them, and a trunk that weaves, facing +x."""
+    return _combinations(duration_s, subject, boxing=True)
+
+
+def _habits(subject: Subject, *, boxing: bool) -> SimpleNamespace:
+    """How a subject punches; ``shares`` are the probabilities of the kinds."""
+    style, rng = subject.style, np.random.default_rng([subject.manner, 2])
+    if boxing and not style:
+        style = STYLES["boxing"][int(rng.choice(len(_BOXERS), p=_BOXERS))]
+    own = subject.traits(f"boxing_{style}" if boxing else "punch")
+    own.shares = (
+        _only(style, PUNCHES)
+        if style in PUNCHES
+        else rng.dirichlet(np.array(own.favourites) + 1e-3)
+    )
+    own.in_turn = style == "steady"
+    if own.in_turn:
+        own.most, own.stepping, own.weaving, own.bow = int(own.many), 0.0, 0.0, 0.0
+        own.turn, own.lean, own.pace = own.slight_turn, own.slight_lean, own.slow
+    else:
+        own.most = int(own.most) + boxing
+        own.stepping = 0.9 if boxing else own.stepping**2
+        own.bow = math.radians(own.bow**3 * 25)
+    own.reach *= min(subject.amplitude, 1.0)
+    own.pace *= subject.tempo
+    return own
+
+
+def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> PosesAt:
+    own = _habits(subject, boxing=boxing)
+    fighter = Fighter(
+        subject,
+        _bearing(
+            own,
+            lead=subject.other,
+            stagger=0.06 + 0.10 * own.stagger + 0.06 * own.low**2,
+            depth=0.015 + 0.05 * own.low,
+            lean=2 + 36 * own.upright**2,
+        ),
+    )
+    rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
+    t = -1.2 * subject.phase
+    while t < duration_s + 0.5:
+        x, _ = fighter.middle()
+        middle_x, middle_y = 0.4 * x, 0.0
+        if rng.random() < own.stepping:
+            ahead = float(rng.uniform(0.3, 1.0)) * own.step * (1 if rng.random() < 0.75 else -1)
+            middle_x += ahead
+            middle_y = 0.4 * own.step * float(rng.uniform(-1, 1))
+            t = max(t, _step_in(fighter, own, t, middle_x, middle_y))
+        hand = subject.side if rng.random() < 0.55 else subject.other
+        for _ in range(int(rng.integers(1, own.most + 1))):
+            kind = PUNCHES[STYLES["punch"][int(rng.choice(len(PUNCHES), p=own.shares))]]
+            if kind.hand != "either" and own.in_turn:
+                kind = PUNCHES["jab" if hand == fighter.lead else "cross"]
+            elif kind.hand != "either":
+                hand = fighter.lead if kind.hand == "front" else fighter.rear
+            t = _punch(fighter, own, kind, hand, t, rng)
+            hand = OTHER[hand]
+        if rng.random() < own.weaving:
+            t = _weave(fighter, t, rng)
+        length = float(rng.uniform(0.34, 0.6)) / max(own.pace, 0.6)
+        t = fighter.into_stance(t, t + length, 0.5 * middle_x, 0.5 * middle_y, 0.03)
+        t += float(rng.uniform(0.03, own.rest)) / subject.tempo
+    return fighter.poses
+
+
+def _step_in(fighter: Fighter, habits: SimpleNamespace, t: float, x: float, y: float) -> float:
+    """Step toward (x, y) with one foot, in front or behind; return when to strike."""
+    forward = x > fighter.middle()[0]
+    side = fighter.lead if forward else fighter.rear
+    to = fighter.place(side, x, y)
+    gap = to[0] - fighter.feet[OTHER[side]].toe.last[0]
+    to = float(to[0] + np.clip(gap, -0.34, 0.34) - gap), to[1], to[2]
+    end = fighter.step(side, t, t + 0.26 / max(habits.pace, 0.7), to, 0.03)
+    fighter.root.move(end - 0.3, end + 0.2, *fighter.middle())
+    return end - 0.06
+
+
+def _punch(
+    fighter: Fighter,
+    habits: SimpleNamespace,
+    kind: SimpleNamespace,
+    hand: str,
+    t: float,
+    rng: np.random.Generator,
+) -> float:
+    """Plan one punch that begins at a time [s], and return when the next may begin."""
+    own, sign, other = fighter.bearing, SIDES[hand], OTHER[hand]
+    pace = habits.pace * float(rng.uniform(0.85, 1.15))
+    wrist = fighter.wrists[hand]
+    t = max(t, wrist.end - 0.02)
+    out = t + kind.out_s / pace
+    back = out + float(rng.uniform(0.18, 0.30)) / pace
+    vary = float(rng.uniform(0.85, 1.15))
+
+    turn = math.radians(kind.turn) * habits.turn * vary
+    turn = -sign * (turn + 0.5 * own.bladed * (hand == fighter.lead))
+    lean = own.lean + math.radians(kind.lean) * habits.lean + habits.bow * float(rng.uniform(0, 1))
+    aside = sign * math.radians(kind.aside) * habits.lean * vary
+    fighter.pelvis.move(t, out - 0.02, 0.75 * turn, 0.6 * lean, 0.5 * aside)
+    fighter.thorax.move(t + 0.02, out, turn, lean, aside)
+    x, y = fighter.middle()
+    fighter.root.move(t, out, x + 0.015 * habits.lean * vary, y - 0.15 * sign * own.spread)
+    fighter.depth.move(t, out, own.depth + kind.dip * vary)
+    foot = fighter.feet[hand]
+    if hand == fighter.rear and abs(foot.yaw.last[0]) > 0.2:
+        fighter.pivot(hand, t, out, 0.3 * foot.yaw.last[0])
+    # Both heels help, most that of the hand.
+    for side, most in ((hand, 22.0), (other, 9.0)):
+        raised = own.heel * (side != fighter.lead) + math.radians(most * float(rng.random()))
+        fighter.feet[side].heel.move(t, out, raised)
+
+    def from_shoulder(place: tuple[float, float, float], share: float) -> list[float]:
+        ahead, inward, up = place
+        aimed = np.array([ahead, -sign * inward, up + 0.05 * float(rng.normal())])
+        body = about(y=share * lean, x=share * aside, z=share * turn)
+        moved = np.asarray(body.inv().apply(aimed)).reshape(3)
+        return (moved * min(1.0, 0.955 / float(np.linalg.norm(moved)))).tolist()
+
+    begin = t + 0.12 * (out - t)
+    if kind.load:
+        wrist.move(t, t + 0.52 * (out - t), *from_shoulder(kind.load, 0.3))
+        begin = wrist.end
+    guard = np.array(fighter.guard(hand))
+    impact = np.array(from_shoulder(kind.impact, 1.0))
+    wrist.move(begin, out, *(guard + habits.reach * (impact - guard)).tolist())
+    fighter.elbows[hand].move(t, out - 0.03, math.radians(kind.elbow))
+    wrist.move(out + 0.02, back, *(guard + 0.06 * rng.normal(size=3)).tolist())
+    fighter.elbows[hand].move(out + 0.02, back, own.elbow)
+
+    # The other hand covers, or goes to the hip.
+    cover = np.array(fighter.guard(other))
+    cover += min(habits.helping, 1.0) * (np.array(kind.pulled) - cover)
+    helper = fighter.wrists[other]
+    if helper.end < out - 0.12:
+        helper.move(max(helper.end, t), out + 0.03, *(cover + 0.05 * rng.normal(size=3)).tolist())
+    return out + float(rng.uniform(0.02, 0.10)) / pace
+
+
+def _weave(fighter: Fighter, t: float, rng: np.random.Generator) -> float:
+    """Plan a lean aside and forward, low, as if under a punch; return when it is over."""
+    own, aside = (
+        fighter.bearing,
+        math.radians(float(rng.uniform(8, 24))) * float(rng.choice([-1.0, 1.0])),
+    )
+    end = t + float(rng.uniform(0.28, 0.45)) / fighter.subject.tempo
+    lean, turned = own.lean + math.radians(float(rng.uniform(4, 22))), fighter.thorax.last[0]
+    fighter.pelvis.move(t, end, fighter.pelvis.last[0], 0.6 * lean, 0.5 * aside)
+    fighter.thorax.move(t, end, turned, lean, aside)
+    fighter.depth.move(t, end, own.depth + float(rng.uniform(0.01, 0.06)))
+    return end + 0.03
