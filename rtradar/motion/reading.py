@@ -17,6 +17,7 @@ from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.motion import Motion
@@ -122,20 +123,19 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
     )
 
 
-def settled_unit(
-    where: str, stature: float, unit_m: float | None, by: str = "given"
+def _settled_unit(
+    where: str, stature: float, unit_m: float | None, by: str
 ) -> tuple[float, Finding]:
     """Find the unit, or check one that is given: a warning says where it makes nobody's stature."""
     how = f"unit: {unit_m:.4g} m, as {by}" if unit_m is not None else ""
     if unit_m is None:
         unit_m, how = found_unit(where, stature)
     stature_m = stature * unit_m
+    text = f"{where}: with a unit of {unit_m:g} m the person is {stature_m:.3g} m tall"
+    if not 0.1 * STATURE_M[0] <= stature_m <= 10 * STATURE_M[1]:
+        raise InputError(f"{text}; give the unit (unit, --unit), or mend the file")
     if not STATURE_M[0] <= stature_m <= STATURE_M[1]:
-        warnings.warn(
-            f"{where}: with a unit of {unit_m:g} m the person is {stature_m:.3g} m tall",
-            ValidityWarning,
-            stacklevel=4,
-        )
+        warnings.warn(text, ValidityWarning, stacklevel=5)
     return unit_m, Finding("unit_m", unit_m, how)
 
 
@@ -263,6 +263,21 @@ def _up_of_format(
     text = f"up: {best.up}, not {own.up} as the format has it, for along it the person stands"
     warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=4)
     return best.up, text
+
+
+def settled_nodes(
+    where: str,
+    nodes: Array,
+    *,
+    unit_m: float | None,
+    up: str,
+    usual: str,
+    unit_by: str = "given",
+) -> tuple[Array, float, list[Finding]]:
+    """Find the rotation (3, 3) to the world of nodes (frame, node, 3), and their unit [m]."""
+    unit_m, unit = _settled_unit(where, stature_of(nodes), unit_m, unit_by)
+    upward, how = found_up(where, nodes, given=up, usual=usual)
+    return to_world_from(upward), unit_m, [unit, Finding("up", upward, how)]
 
 
 def to_world_from(up: str) -> Array:
@@ -398,12 +413,14 @@ def settled(
         nodes = to_nodes(some.scaled(_NOMINAL_STATURE_M / about)).positions
     except InputError:  # its names are not known: whoever needs its nodes is told which lack
         unit_m = found_unit(where, about)[0] if unit_m is None else unit_m
-        return replace(turned_up(motion.scaled(unit_m), up or "y"), girth=motion.girth)
-    size = stature_of(nodes) * about / _NOMINAL_STATURE_M
-    unit_m, unit = settled_unit(where, size, unit_m, unit_by)
-    upward, how = found_up(where, nodes @ to_world_from("y"), given=up or "", usual="y")
-    found = [unit, tall(size * unit_m), Finding("up", upward, how), rate_of(motion.rate_hz)]
-    made = turned_up(motion if unit_m == 1 else motion.scaled(unit_m), upward)
+        made = _turned_up(motion.scaled(unit_m), to_world_from(up or "y"))
+        return replace(made, girth=motion.girth)
+    nodes = about / _NOMINAL_STATURE_M * nodes @ to_world_from("y")
+    to_world, unit_m, (unit, upward) = settled_nodes(
+        where, nodes, unit_m=unit_m, unit_by=unit_by, up=up or "", usual="y"
+    )
+    found = [unit, tall(stature_of(nodes) * unit_m), upward, rate_of(motion.rate_hz)]
+    made = _turned_up(motion if unit_m == 1 else motion.scaled(unit_m), to_world)
     first = slice(round(2 * _LONGEST_POSE_S * made.rate_hz))
     dropped = leading_t_pose(to_nodes(_of_frames(made, itemgetter(first))).positions, made.rate_hz)
     if dropped:
@@ -417,12 +434,12 @@ def settled(
     return replace(made, girth=motion.girth, findings=tuple(found))
 
 
-def turned_up(motion: Motion, up: str) -> Motion:
+def _turned_up(motion: Motion, to_world: Array) -> Motion:
     """Turn a motion that was read as if y were up, where another axis is."""
-    turn = to_world_from(up) @ to_world_from("y").T
+    turn = to_world @ to_world_from("y").T
     if (turn == np.eye(3)).all():
         return motion
-    half = _quaternion(turn)
+    half = Rotation.from_matrix(turn).as_quat()
     return replace(
         motion,
         root_positions=file_backed(roots @ turn.T for (roots,) in in_blocks(motion.root_positions)),
@@ -431,12 +448,6 @@ def turned_up(motion: Motion, up: str) -> Motion:
             for (rows,) in in_blocks(motion.rotations)
         ),
     )
-
-
-def _quaternion(rotation: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(rotation).as_quat())
 
 
 def _of_frames(motion: Motion, take: Callable[[Array], Array]) -> Motion:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rtradar.motion import Motion
-from rtradar.motion.formats import acclaim, bvh
+from rtradar.motion.formats import skeletons
 from rtradar.system import row_files
 
 ASF = """# a comment
@@ -78,8 +78,7 @@ def in_pieces(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     def cut() -> None:
         monkeypatch.setattr(row_files, "_MOST_IN_MEMORY", 0)
         monkeypatch.setattr(row_files, "_ROWS_AT_ONCE", 3)
-        for reader in (acclaim, bvh):
-            monkeypatch.setattr(reader, "FRAMES_AT_ONCE", 4)
+        monkeypatch.setattr(skeletons, "FRAMES_AT_ONCE", 4)
 
     return cut
 

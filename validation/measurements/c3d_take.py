@@ -19,7 +19,6 @@ kick, in bins, beside that of two samplings of one of them.
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import warnings
 from pathlib import Path
@@ -35,6 +34,8 @@ from rtradar.pipeline.compare import chamfer
 from rtradar.validate.rows import Row, judged, main, reported
 
 LIMIT_CM = 6.0
+
+MM = 1e-3  # unit of the take, whose axes are those of the world
 
 # Three markers of the segment to which a joint belongs; on the left side where there are two.
 SEGMENTS = {
@@ -86,7 +87,7 @@ def segment_of(node: str) -> list[str]:
 def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     half = len(c3d.root_positions) // 2
     names = tuple(sorted({marker for node in NODES for marker in segment_of(node)}))
-    seen = read_markers(take, names).positions[half:]
+    seen = read_markers(take, names).positions[half:] * MM
     marker = {name: seen[:, k] for k, name in enumerate(names)}
     apart = np.linalg.norm(c3d.positions - amc.positions, axis=2)[half:] * 100
     rows = []
@@ -115,7 +116,7 @@ def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
 
 def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     half = len(c3d.root_positions) // 2
-    knuckles = read_markers(take, ("LFIN", "RFIN")).positions[half:]
+    knuckles = read_markers(take, ("LFIN", "RFIN")).positions[half:] * MM
     rows = []
     for side, key in enumerate("lr"):
         hip, knee, ankle, hand = (
@@ -168,8 +169,8 @@ def gaps(take: Path) -> list[Row]:
         for begin in begins:
             lost[begin : begin + longest] = np.nan
         hidden = np.isnan(lost[:, 0, 0])
-        filled = bridged(dataclasses.replace(seen, names=(seen.names[k],), positions=lost))
-        errors.append(np.linalg.norm(filled[hidden, 0] - seen.positions[hidden, k], axis=1) * 1000)
+        filled = bridged(seen._replace(names=(seen.names[k],), positions=lost))
+        errors.append(np.linalg.norm(filled[hidden, 0] - seen.positions[hidden, k], axis=1))
     off = np.concatenate(errors)
     worst = seen.names[int(np.argmax([error.max() for error in errors]))]
     label = f"a marker lost for {LONGEST_GAP_S} s"

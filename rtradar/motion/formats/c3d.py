@@ -2,8 +2,8 @@
 
 The points are markers of CMU, HDM05 or Plug-in Gait, from which joints are found, or joints.
 
-Of C3D the world axes are those of the file: Vicon's z is up, and C3D (x, y, z) = AMC (z, x, y),
-which is the world's (x, y, z). A file whose POINT:Y_SCREEN says that y is up is rotated.
+The axes of C3D files are usually those of the world: Vicon's z is up, and C3D (x, y, z) = AMC
+(z, x, y). A file may say another axis in POINT:Y_SCREEN.
 """
 
 from __future__ import annotations
@@ -12,92 +12,55 @@ import io
 import math
 import os
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.joint_files import checked
+from rtradar.motion.formats.joint_files import check_places, checked
 from rtradar.motion.formats.joints import motion_of
 from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion, runs
 from rtradar.motion.formats.text_file import TextFile
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import OWN_NAMES, conventions, plain
-from rtradar.motion.reading import to_world_from, warn_of_speed
-from rtradar.recordings import UPWARD, Finding, rate_of
-from rtradar.system.checks import brief
+from rtradar.motion.reading import settled_nodes, warn_of_speed
+from rtradar.recordings import UNITS_M, UPWARD, rate_of
+from rtradar.system.checks import brief, check_number
 from rtradar.system.files import open_regular
-
-_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-"""Values of POINT:UNITS, and of Units of a TRC file."""
 
 LONGEST_GAP_S = 0.1
 """Longest gap of a marker that is bridged [s]."""
 
-_UPRIGHT_M = 0.5
-"""Least median height of the head above the ankles [m]; below, z is not up or the unit is wrong."""
 
-_SHANK_M = (0.2, 0.7)
-"""Limits of the distance of knee and ankle markers of people, children included [m]."""
+class Points(NamedTuple):
+    """Points (frame, point, 3) in the axes and the unit of a file, NaN where one was not seen.
 
-
-@dataclass(frozen=True)
-class Markers:
-    """Positions (frame, marker, 3) of some markers, world [m], NaN where one was not seen.
-
-    ``first_frame`` is the number of the first frame in the file, and ``says_up`` tells whether the
-    file, or the user, says which axis is up.
+    ``first_frame`` is the number of the first frame in the file, ``rate_key`` what the file calls
+    its rate, ``unit`` is in its words, and ``up`` the axis that is up, as the file or the format
+    says.
     """
 
     path: Path
     names: tuple[str, ...]
-    positions: NDArray[np.float64]
-    rate_hz: float
-    first_frame: int
-    says_up: bool
-    findings: tuple[Finding, ...] = ()
-
-
-class Points(NamedTuple):
-    """Content of a file: labels, points (frame, point, 4), and what the file says of them.
-
-    A point is three coordinates and a residual, negative where it was not seen. ``unit`` and
-    ``upward`` are in the words of the file, ``keys`` what it calls its unit and its rate; ``usual``
-    is the axis that is up where it says none.
-    """
-
-    labels: list[str]
-    points: NDArray[np.floating]
+    positions: NDArray[Any]
     rate_hz: float
     first_frame: int
     unit: str
-    upward: str
-    usual: str = "z"
-    keys: tuple[str, str] = ("POINT:UNITS", "POINT:RATE")
+    up: str
+    rate_key: str
 
 
-def load_c3d(
-    path: Path,
-    *,
-    skeleton: Path | None,
-    unit_m: float | None,
-    up: str | None,
-    rate_hz: float | None,
-) -> Motion:
+def load_c3d(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
     """Read a C3D file, and find the 22 joints of a rigid skeleton from its points.
 
     An `InputError` names the marker and the frames, by the file's numbers.
     """
-    if skeleton is not None:
-        raise InputError(
-            f"{path}: a C3D file holds markers, from which joints are found; leave {skeleton} out"
-        )
-    return _motion_of(path, _read_c3d(path), unit_m, up, rate_hz)
+    return _motion_of(_read_c3d(path), unit_m, up, rate_hz)
 
 
 def load_trc(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
@@ -105,51 +68,39 @@ def load_trc(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float
 
     An `InputError` names the line, or the marker and the frames.
     """
-    return _motion_of(path, _read_trc(path), unit_m, up, rate_hz)
+    return _motion_of(_read_trc(path), unit_m, up, rate_hz)
 
 
-def _motion_of(
-    path: Path, read: Points, unit_m: float | None, up: str | None, rate_hz: float | None
-) -> Motion:
+def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
+    path, where = read.path, str(read.path)
     if rate_hz is not None:
         read = read._replace(rate_hz=rate_hz)
-    there = {plain(label) for label in read.labels}
-    joints = min(conventions("joints"), key=lambda known: len(known.missing(there)))
-    if not joints.missing(there):
-        return _motion_of_joints(path, read, unit_m, up)
-    seen = _chosen(path, read, NEEDED, unit_m, up)
-    positions = bridged(seen)
-    markers = {name: positions[:, k] for k, name in enumerate(seen.names)}
-    _check_person(seen, markers)
-    centres, pelvis, thorax = joint_centres(markers)
-    motion = rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
-    speed = warn_of_speed(str(path), motion.joints, motion.positions, seen.rate_hz)
-    return replace(motion, findings=(*seen.findings, rate_of(seen.rate_hz), speed))
+    if not len(read.positions):
+        raise InputError(f"{path}: no frame of markers in this file; export it again")
+    check_number(where, f"{read.rate_key} [frames a second]", read.rate_hz, 1.0, 100_000.0)
+    by, unit_m = "given" if unit_m else "the file says", unit_m or UNITS_M.get(read.unit.lower())
+    there = {plain(label) for label in read.names}
+    known = min(conventions("joints"), key=lambda known: len(known.missing(there)))
+    if not known.missing(there):
+        names, rate = np.array([name.strip(" \0") for name in read.names]), np.array(read.rate_hz)
+        given = {"positions": read.positions, "joints": names, "rate_hz": rate}
+        return motion_of(replace(checked(path, given, None), usual=read.up), unit_m, up)
+    seen = chosen(read, NEEDED)
+    centres, pelvis, thorax = joint_centres(
+        dict(zip(NEEDED, np.moveaxis(bridged(seen), 1, 0), strict=True))
+    )
+    to_world, unit_m, found = settled_nodes(
+        where, centres, unit_m=unit_m, unit_by=by, up=up or "", usual=read.up
+    )
+    turned = unit_m * centres @ to_world.T, to_world @ pelvis, to_world @ thorax
+    motion = rigid_motion(path.stem, *turned, read.rate_hz)
+    speed = warn_of_speed(where, motion.joints, motion.positions, read.rate_hz)
+    return replace(motion, findings=(*found, rate_of(read.rate_hz), speed))
 
 
-def _motion_of_joints(path: Path, read: Points, unit_m: float | None, up: str | None) -> Motion:
-    """Read points that are joints, as archives and tables hold them."""
-    _check_frames(path, read)
-    points = read.points[..., :3].astype(np.float64)
-    points[read.points[..., 3] < 0] = np.nan
-    given = {
-        "positions": points,
-        "joints": np.array([label.strip(" \0") for label in read.labels]),
-        "rate_hz": np.array(read.rate_hz),
-    }
-    recording = replace(checked(path, given, None), usual=_upward(read, None))
-    return motion_of(recording, unit_m or _UNITS_M.get(read.unit.lower()), up)
-
-
-def _upward(read: Points, up: str | None) -> str:
-    return up or read.upward.lower().removeprefix("+") or read.usual
-
-
-def read_markers(
-    path: Path, names: tuple[str, ...], unit_m: float | None = None, up: str | None = None
-) -> Markers:
-    """Read some markers of a C3D file, gaps and all."""
-    return _chosen(path, _read_c3d(path), names, unit_m, up)
+def read_markers(path: Path, names: tuple[str, ...]) -> Points:
+    """Read some markers of a C3D file, gaps and all, in its axes and its unit."""
+    return chosen(_read_c3d(path), names)
 
 
 def _read_c3d(path: Path) -> Points:
@@ -159,7 +110,7 @@ def _read_c3d(path: Path) -> Points:
             warnings.catch_warnings(record=True) as caught,
         ):
             warnings.simplefilter("always")
-            read = _read(handle)
+            read = _read(path, handle)
     except OSError as error:
         raise InputError(
             f"{path}: cannot read this C3D file ({error.strerror or error}); check the path"
@@ -173,7 +124,7 @@ def _read_c3d(path: Path) -> Points:
         ) from None
     if any("end of file" in str(warning.message) for warning in caught):
         raise InputError(
-            f"{path}: ends after {len(read.points)} frames where its header promises more; the "
+            f"{path}: ends after {len(read.positions)} frames where its header promises more; the "
             "file is cut off"
         )
     return read
@@ -206,58 +157,18 @@ def _read_trc(path: Path) -> Points:
             text.check_size(len(labels), len(rows))
         (rate,) = text.numbers([said["DataRate"]], 3)
     places = np.array(rows).reshape(len(rows), len(labels), 3)
-    unseen = np.isnan(places).any(axis=2)
-    points = np.concatenate([np.nan_to_num(places), np.where(unseen, -1.0, 0.0)[..., None]], axis=2)
-    return Points(labels, points, rate, 1, said["Units"], "", "y", ("Units", "DataRate"))
+    return Points(path, tuple(labels), places, rate, 1, said["Units"], "y", "DataRate")
 
 
-def _check_frames(path: Path, read: Points) -> None:
-    """Refuse points without frames or a rate."""
-    if not len(read.points):
-        raise InputError(f"{path}: no frame of markers in this file; export it again")
-    if not 1.0 <= read.rate_hz <= 100_000.0:
-        raise InputError(
-            f"{path}: {read.keys[1]} is {read.rate_hz:g} frames a second; it must be 1 to 100000, "
-            "mend the file"
-        )
+def chosen(read: Points, names: tuple[str, ...]) -> Points:
+    """Choose some markers; one at the origin to the last bit was not seen."""
+    columns = [_column(read.path, read.names, name) for name in names]
+    return read._replace(names=names, positions=check_places(read.path, read.positions[:, columns]))
 
 
-def _chosen(
-    path: Path, read: Points, names: tuple[str, ...], unit_m: float | None, up: str | None
-) -> Markers:
-    """Choose some markers, in the world."""
-    scale = unit_m if unit_m is not None else _UNITS_M.get(read.unit.lower(), 0.0)
-    upward = _upward(read, up)
-    _check_frames(path, read)
-    if upward not in UPWARD:
-        raise InputError(
-            f"{path}: POINT:Y_SCREEN is {read.upward[:20]!r}, and no axis; give up, one of "
-            f"{', '.join(UPWARD)} (--up)"
-        )
-    if not 0 < scale < np.inf:
-        unit = f"{read.keys[0]} is {read.unit[:20]!r}" if unit_m is None else f"unit_m is {unit_m}"
-        raise InputError(
-            f"{path}: {unit}; {', '.join(_UNITS_M)} are understood, give the unit (unit, --unit)"
-        )
-    chosen = read.points[:, [_column(path, read.labels, name) for name in names]]
-    # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
-    unseen = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
-    places = chosen[..., :3].astype(np.float64) * scale
-    places = places @ to_world_from(upward).T
-    places[unseen] = np.nan
-    said = bool(up or read.upward)
-    by_unit = "given" if unit_m is not None else "the file says"
-    by_up = "given" if up else "the file says" if said else "usual"
-    findings = (
-        Finding("unit_m", scale, f"unit: {scale:g} m, as {by_unit}"),
-        Finding("up", upward, f"up: {upward}, as {by_up}"),
-    )
-    return Markers(path, names, places, read.rate_hz, read.first_frame, said, findings)
-
-
-def bridged(seen: Markers) -> NDArray[np.float64]:
+def bridged(seen: Points) -> NDArray[np.float64]:
     """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines."""
-    positions = seen.positions.copy()
+    positions = seen.positions.astype(np.float64)
     frames = np.arange(len(positions))
     for k, name in enumerate(seen.names):
         unseen = np.isnan(positions[:, k, 0])
@@ -288,7 +199,7 @@ class _Bounded(io.BufferedReader):
         )
 
 
-def _read(handle: object) -> Points:
+def _read(path: Path, handle: object) -> Points:
     import c3d  # not before a file asks for it
 
     reader = c3d.Reader(handle)
@@ -299,16 +210,23 @@ def _read(handle: object) -> Points:
         parameter = reader.get(key)
         return "" if parameter is None else str(parameter.string_value).strip(" \0")
 
-    labels = [str(label) for label in reader.point_labels]
     frames = [points for _, points, _ in reader.read_frames(copy=True)]
     points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
-    rate, first = float(reader.point_rate), int(reader.first_frame)
+    places = np.where(points[..., 3:4] < 0, np.float32(np.nan), points[..., :3])
+    up = text("POINT:Y_SCREEN").lower().removeprefix("+")
     return Points(
-        labels, points[..., :4], rate, first, text("POINT:UNITS"), text("POINT:Y_SCREEN").upper()
+        path,
+        tuple(str(label) for label in reader.point_labels),
+        places,
+        float(reader.point_rate),
+        int(reader.first_frame),
+        text("POINT:UNITS"),
+        up if up in UPWARD else "z",
+        "POINT:RATE",
     )
 
 
-def _column(path: Path, labels: list[str], name: str) -> int:
+def _column(path: Path, labels: tuple[str, ...], name: str) -> int:
     """Column of a marker, by its name in the set of CMU or by that of another set."""
     key = f"{name[0]}_{name[1:]}" if len(name) > 3 and name[0] in "LR" else name
     others = (known.joints.get(key.lower(), ()) for known in conventions("markers"))
@@ -326,22 +244,3 @@ def _column(path: Path, labels: list[str], name: str) -> int:
             f"{path}: marker {name} is there {there.count(found)} times; keep one person's markers"
         )
     return there.index(found)
-
-
-def _check_person(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
-    shanks = [
-        np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"
-    ]
-    shank = float(np.median(shanks))
-    if not _SHANK_M[0] <= shank <= _SHANK_M[1]:
-        raise InputError(
-            f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's "
-            f"{_SHANK_M[0]} to {_SHANK_M[1]} m; check POINT:UNITS and the markers' names"
-        )
-    ankles = (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2
-    above = float(np.median(markers["LFHD"][:, 2] - ankles))
-    if above < _UPRIGHT_M and not seen.says_up:
-        raise InputError(
-            f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to "
-            "tell what is up, give one who stands, or up (--up)"
-        )

@@ -183,16 +183,22 @@ def checked(
     for name in names:
         if known.count(plain(name)) > 1:
             raise InputError(f"{path}: joint {brief(name)} is there twice; keep one person's")
-    positions = given.astype(np.float64)
-    if (np.abs(positions) > _FARTHEST).any():  # NaN is not
-        raise InputError(f"{path}: positions reach beyond {_FARTHEST:g}; what is not seen is NaN")
-    positions[np.isnan(positions).any(axis=2) | ~positions.any(axis=2)] = np.nan
+    positions = check_places(path, given)
     up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
     if up and up not in UPWARD:
         raise InputError(f"{path}: up is {brief(up)}; it must be one of {', '.join(UPWARD)}")
     times = _times(path, arrays, len(given))
     kept = _apart(times)
     return JointRecording(path, names, positions[kept], times[kept], up, len(times) - kept.sum())
+
+
+def check_places(path: Path, places: NDArray[Any]) -> Array:
+    """Places (frame, joint, 3), NaN where one was not seen or is the origin to the last bit."""
+    positions = places.astype(np.float64)
+    if (np.abs(positions) > _FARTHEST).any():  # NaN is not
+        raise InputError(f"{path}: positions reach beyond {_FARTHEST:g}; what is not seen is NaN")
+    positions[np.isnan(positions).any(axis=2) | ~positions.any(axis=2)] = np.nan
+    return positions
 
 
 def _apart(times: Array) -> NDArray[np.bool_]:

@@ -38,11 +38,9 @@ from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
-    found_up,
     of_node,
-    settled_unit,
+    settled_nodes,
     stature_of,
-    to_world_from,
     warn_of_speed,
 )
 from rtradar.motion.skeleton import HEAD_OF_THIGH, MINIMUM_PART_M, NODE_PARENTS, NODES
@@ -99,17 +97,16 @@ def motion_of(
             f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
-    unit_m, unit = settled_unit(where, stature_of(nodes), unit_m)
-    usual = recording.usual or convention.up
-    upward, how = found_up(where, nodes, given=up or recording.up, usual=usual)
-    steps = np.diff(recording.times)
-    found = [
-        *recording.findings,
-        unit,
-        Finding("up", upward, how),
-        rate_of(round(1 / float(np.median(steps)), 3)),
-    ]
-    nodes = unit_m * nodes @ to_world_from(upward).T
+    to_world, unit_m, found = settled_nodes(
+        where,
+        nodes,
+        unit_m=unit_m,
+        up=up or recording.up,
+        usual=recording.usual or convention.up,
+    )
+    rate_hz = 1 / float(np.median(np.diff(recording.times)))
+    found = [*recording.findings, *found, rate_of(round(rate_hz, 3))]
+    nodes = unit_m * nodes @ to_world.T
     if convention.low_pass_hz:
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)

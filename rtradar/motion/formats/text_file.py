@@ -16,9 +16,6 @@ from tqdm import tqdm
 from rtradar.errors import InputError
 from rtradar.system.files import open_regular
 
-FRAMES_AT_ONCE = 512
-"""Number of frames kept as Python's numbers, which take four times the memory of an array's."""
-
 _MOST_BYTES, _MOST_CHARACTERS = 2_000_000_000, 1_000_000
 """Limits of the size of a file, some six hours at 120 Hz, and of the length of a line."""
 

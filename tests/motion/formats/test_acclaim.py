@@ -80,11 +80,6 @@ def test_bad_amc_says_where(
         ("length 0.45", "length 0", ["two.asf, line 6", "positive"]),
         ("axis 0 0 90 XYZ", "axis 0 0 90 XYY", ["two.asf, line 27", "permutation"]),
         (":hierarchy", ":nothing", ["two.asf", "cut off"]),
-        (
-            "name second\n    direction 1 0 0\n    length 5",
-            "name lfemur\n    direction 1 0 0\n    length 0",
-            ["line 22", "no length"],
-        ),
     ],
 )
 def test_bad_asf_says_where(

@@ -1,0 +1,125 @@
+"""Skeletons of files whose bones rotate, and the rigid motion that the values of frames make.
+
+A bone has channels, whose values follow each other in a frame: positions, and angles about the axes
+of the bone. It rotates with its parent, and on top of that by its own angles.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import quaternion_rotate, quaternions_to_world, to_world
+from rtradar.system.row_files import FileBackedRows, column, in_blocks
+
+Array = NDArray[np.float64]
+
+FRAMES_AT_ONCE = 512
+"""Number of frames kept as Python's numbers, which take four times the memory of an array's."""
+
+
+@dataclass
+class Bone:
+    """One bone as the file describes it.
+
+    ``channels`` are "tx" to "rz", and ``order`` is that in which the angles are applied, in
+    capitals about axes that rotate along. They are meant in axes that ``axis`` [deg] rotates, in
+    its own order. ``column`` is the index of the first channel among those of all bones; the
+    parent is -1 for the root.
+    """
+
+    name: str
+    line: int
+    parent: int = -1
+    offset: Array = field(default_factory=lambda: np.zeros(3))
+    length: float = 0.0
+    axis: Array = field(default_factory=lambda: np.zeros(3))
+    axis_order: str = "xyz"
+    channels: tuple[str, ...] = ()
+    order: str = ""
+    column: int = 0
+
+    def places(self, values: Array) -> Array:
+        """Positions relative to the parent, (frame, 3); (1, 3) without channels for it."""
+        moved = [k for k, name in enumerate(self.channels) if name[0] == "t"]
+        if not moved:
+            return self.offset[None]
+        places = np.tile(self.offset, (len(values), 1))
+        axes = ["xyz".index(self.channels[k][1]) for k in moved]
+        places[:, axes] = column(values, [self.column + k for k in moved])
+        return places
+
+
+def kept_rows(rows: Iterable[list[float]], bones: Sequence[Bone]) -> Array:
+    """Array (frame, channel) of rows, in a file where they are many; bones get their columns."""
+    width = 0
+    for bone in bones:
+        bone.column, width = width, width + len(bone.channels)
+    found, rest = FileBackedRows(), iter(rows)
+    while block := list(itertools.islice(rest, FRAMES_AT_ONCE)):
+        found.append(np.array(block).reshape(-1, width))
+    return found.rows()
+
+
+def chain_to(bones: Sequence[Bone], last: int) -> list[int]:
+    """Indices of the bones from the root to one of them."""
+    chain = [last]
+    while bones[chain[0]].parent >= 0:
+        chain.insert(0, bones[chain[0]].parent)
+    return chain
+
+
+def posed(
+    path: Path,
+    bones: Sequence[Bone],
+    values: Array,
+    joints: Sequence[tuple[int, int]],
+    offsets: Array,
+    rate_hz: float,
+) -> Motion:
+    """Make the motion of a rigid skeleton, as if y were up in the file.
+
+    ``joints`` are the indices of the bones that become joints, the root first, each with that of
+    the bone whose rotation it has, and ``offsets`` (joint, 3) theirs.
+    """
+    roots, rotations = FileBackedRows(), FileBackedRows()
+    for (frames,) in in_blocks(values):
+        turned = _rotations(bones, frames)
+        places = np.zeros((len(frames), 3))
+        for number in chain_to(bones, joints[0][0]):
+            parent, own = bones[number].parent, bones[number].places(frames)
+            places += own if parent < 0 else quaternion_rotate(turned[:, parent], own)
+        roots.append(to_world(places))
+        rotations.append(quaternions_to_world(turned[:, [carrier for _, carrier in joints]]))
+    index = {bone: joint for joint, (bone, _) in enumerate(joints)}
+    return Motion(
+        name=path.stem,
+        joints=tuple(bones[bone].name for bone in index),
+        parents=tuple(index.get(bones[bone].parent, -1) for bone in index),
+        offsets=to_world(offsets),
+        root_positions=roots.rows(),
+        rotations=rotations.rows(),
+        rate_hz=rate_hz,
+    )
+
+
+def _rotations(bones: Sequence[Bone], values: Array) -> Array:
+    """Rotations of all bones (frame, bone, 4) in the axes of the file."""
+    world: list[Rotation] = []
+    for bone in bones:
+        local = Rotation.identity(len(values))
+        if bone.order:
+            own = [bone.column + bone.channels.index("r" + axis) for axis in bone.order.lower()]
+            local = Rotation.from_euler(bone.order, values[:, own], degrees=True)
+        if bone.axis.any():
+            axes = Rotation.from_euler(bone.axis_order, bone.axis, degrees=True)
+            local = axes * local * axes.inv()
+        world.append(local if bone.parent < 0 else world[bone.parent] * local)
+    return np.stack([rotation.as_quat() for rotation in world], axis=1)
