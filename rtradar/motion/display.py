@@ -1,14 +1,17 @@
-"""What a motion shows of itself: who moves, for how long, how tall and where."""
+"""What a motion shows of itself: who moves, how long, how tall and where, and its picture."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+
     from rtradar.motion.motion import Motion
 
 
@@ -57,3 +60,95 @@ def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.fl
 def _span(least: float, most: float) -> str:
     low, high = (f"{round(value, 2) + 0.0:.2f}" for value in (least, most))  # never -0.00
     return low if low == high else f"{low} to {high}"
+
+
+# -- the picture ---------------------------------------------------------------------------------
+
+_POSES, _PATH_POSES = 6, 400
+"""Numbers of skeletons, and of points of the root's path."""
+
+
+def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
+    """Draw a motion from the side, and from above unless axes are given, as `Motion.plot` does."""
+    from rtradar.system.figure_style import (  # slow to import
+        STYLE,
+        axes_given,
+        dress,
+        figure_for,
+        theme_of,
+        write_heading,
+    )
+
+    _, ax = axes_given(None, ax)
+    _, path = poses(motion, _PATH_POSES)
+    joints = path.reshape(-1, 3)
+    span = np.ptp(joints, axis=0)
+    across = int(span[1] > span[0])  # the body is seen where it is wider
+    if ax is not None:
+        handles = _draw(ax, motion, path, (across, 2))
+        ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        dress(ax, title=motion.name)
+        return ax
+    wide, *tall = (float(span[axis]) + 0.4 for axis in (across, 2, 1 - across))
+    scale = min(5.2 / wide, *(3.0 / height for height in tall))  # [inch/m], the same in both views
+    heights = [max(scale * height, 0.9) for height in tall]
+    figure = figure_for(sum(heights) + 2.0)
+    side, above = figure.subplots(2, 1, height_ratios=heights)
+    handles = _draw(side, motion, path, (across, 2))
+    _draw(above, motion, path, (across, 1 - across))
+    dress(side, title="As the radar sees it" if across else "From the side")
+    dress(above, title="From above")
+    theme = theme_of(side)
+    style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
+    write_heading(figure, f"Motion {motion.name}")
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=_POSES, labelcolor=theme.text, **style
+    )
+    return side
+
+
+def picture_from_the_side(motion: Motion) -> bytes:
+    """Draw the view from the side as a PNG file, for a card."""
+    from rtradar.system.figure_style import new_figure, png_of  # slow to import
+
+    figure = new_figure(3.2)
+    plot_motion(motion, figure.add_subplot())
+    return png_of(figure)
+
+
+def _draw(
+    axes: Axes, motion: Motion, path: NDArray[np.float64], seen: tuple[int, int]
+) -> list[Line2D]:
+    """Draw skeletons and the root's ``path`` in two coordinates; return a line for each time.
+
+    ``path`` (pose, joint, 3) are the joints [m], of which the first is the root.
+    """
+    from matplotlib import colormaps  # slow to import
+    from matplotlib.collections import LineCollection
+    from matplotlib.lines import Line2D
+
+    from rtradar.system.figure_style import LIGHT, theme_of
+
+    theme, view = theme_of(axes), list(seen)
+    times, joints = poses(motion, _POSES)
+    children = [joint for joint, parent in enumerate(motion.parents) if parent >= 0]
+    parents = [motion.parents[joint] for joint in children]
+    bones = np.stack([joints[:, parents], joints[:, children]], axis=2)[..., view]
+    # The bright end of the colours is hard to see on white, the dark end on black.
+    ends = (0.0, 0.82) if theme is LIGHT else (0.25, 1.0)
+    colours = colormaps["viridis"](np.linspace(*ends, len(times)))
+    if seen[1] == 2:
+        axes.axhline(0.0, color=theme.wall, linewidth=1)
+    axes.plot(*path[:, 0, view].T, color=theme.faint, linewidth=1.2, linestyle="--")
+    for lines, colour in zip(bones, colours, strict=True):
+        axes.add_collection(LineCollection(list(lines), colors=[colour], linewidths=1.8))
+    axes.autoscale_view()
+    axes.margins(0.05)
+    axes.set(xlabel=f"{'xyz'[seen[0]]} [m]", ylabel=f"{'xyz'[seen[1]]} [m]")
+    if seen[0] == 1:  # y is at the left of the radar
+        axes.invert_xaxis()
+    axes.set_aspect("equal", adjustable="datalim")
+    return [
+        Line2D([], [], color=colour, label=f"{time:.2f} s")
+        for time, colour in zip(times, colours, strict=True)
+    ]

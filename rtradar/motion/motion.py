@@ -156,9 +156,7 @@ class Motion:
         return text_card("Motion", self.name, lines)
 
     def _repr_html_(self) -> str:
-        from rtradar.motion.picture import picture_from_the_side
-
-        picture = picture_from_the_side(self)
+        picture = display.picture_from_the_side(self)
         return html_card("Motion", self.name, {"": display.rows(self)}, picture=picture)
 
     def _refusal(self, why: str) -> InputError:
@@ -206,9 +204,7 @@ class Motion:
         >>> axes.get_ylabel()
         'z [m]'
         """
-        from rtradar.motion.picture import plot_motion
-
-        return plot_motion(self, ax)
+        return display.plot_motion(self, ax)
 
     # -- at any time -------------------------------------------------------------------------------
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief
+from rtradar.system.checks import brief, check_keys, read_toml, tables_at
 
 Array = NDArray[np.float64]
 
@@ -27,7 +26,7 @@ OWN_NAMES = "RTRADAR_NAMES"
 """Environment variable that names a table of one's own."""
 
 _Kind = Literal["skeletons", "joints", "markers"]
-_KEYS = {"name", "sides", "middle", "sided", "like", "complete", "low_pass_hz", "head_is_top", "up"}
+_KEYS = ("sides", "middle", "sided", "like", "complete", "low_pass_hz", "head_is_top", "up")
 
 
 @dataclass(frozen=True)
@@ -45,14 +44,20 @@ class Convention:
     head_is_top: bool = False
     up: str = ""
 
-    def missing(self, there: set[str]) -> list[str]:
+    def found(self, there: Container[str]) -> dict[str, str]:
+        """First alternative for each node whose joints are all there."""
+        known = {}
+        for node, choices in self.joints.items():
+            whole = [choice for choice in choices if all(one in there for one in _names(choice))]
+            if whole:
+                known[node] = whole[0]
+        return known
+
+    def missing(self, there: Container[str]) -> list[str]:
         """Names of the joints that are not there, where no alternative is."""
-        lacking = []
-        for choices in self.joints.values():
-            wanted = [_names(choice) for choice in choices]
-            if not any(there.issuperset(names) for names in wanted):
-                lacking += [name for name in wanted[-1] if name not in there]
-        return list(dict.fromkeys(lacking))
+        known = self.found(there)
+        last = [choices[-1] for node, choices in self.joints.items() if node not in known]
+        return list(dict.fromkeys(one for each in last for one in _names(each) if one not in there))
 
 
 def plain(name: str) -> str:
@@ -60,32 +65,17 @@ def plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|[Bb]ip\d+)", "", name).lower())
 
 
-def built_in(kind: _Kind) -> tuple[Convention, ...]:
-    """Every kind of skeleton, joints or markers that rtradar itself knows."""
-    return _read(Path(__file__).with_suffix(".toml"), kind)
-
-
 def conventions(kind: _Kind) -> tuple[Convention, ...]:
     """Every kind of skeleton, joints or markers that is understood; one's own come first."""
-    own = os.environ.get(OWN_NAMES, "")
-    return (*(_read(Path(own), kind) if own else ()), *built_in(kind))
+    own, known = os.environ.get(OWN_NAMES, ""), _read(Path(__file__).with_suffix(".toml"), kind)
+    return (*(_read(Path(own), kind) if own else ()), *known)
 
 
 @lru_cache(maxsize=4)
 def _read(path: Path, kind: str) -> tuple[Convention, ...]:
-    try:
-        with path.open("rb") as file:
-            tables = tomllib.load(file).get(kind, [])
-    except OSError as error:
-        raise InputError(f"{path}: cannot read the names of joints ({error.strerror})") from None
-    except ValueError as error:
-        raise InputError(f"{path}: not TOML ({brief(str(error))[1:-1]}); mend it") from None
     named = dict[str, Mapping[str, Any]]()
-    for number, table in enumerate(tables, start=1):
-        wrong = [key for key in table if key not in _KEYS]
-        if wrong or "name" not in table:
-            what = f"unknown key {wrong[0]!r}" if wrong else "name is missing"
-            raise InputError(f"{path}: [[{kind}]] {number}: {what}; allowed: {', '.join(_KEYS)}")
+    for where, table in tables_at(kind, read_toml(path, "names of joints", "check the path")):
+        check_keys(f"{path}: {where}", table, ("name",), _KEYS)
         named[table["name"]] = {**named.get(table.get("like", ""), {}), **table}
     return tuple(_convention(path, table) for table in named.values())
 
@@ -127,26 +117,23 @@ def _fraction(choice: str) -> float:
 
 def recognise(where: str, names: Sequence[str]) -> Convention:
     """Return the convention of joints by their names; an `InputError` names what is missing."""
-    there, known = {plain(name) for name in names}, conventions("joints")
-    lacking = [one.missing(there) for one in known]
-    best = min(range(len(known)), key=lambda k: len(lacking[k]))
-    if lacking[best]:
-        raise unknown(where, names, known, known[best], lacking[best])
-    return known[best]
+    there = {plain(name) for name in names}
+    tried = [(known, known.missing(there)) for known in conventions("joints")]
+    best, lacking = min(tried, key=lambda one: len(one[1]))
+    if lacking:
+        raise unknown(where, names, tried)
+    return best
 
 
 def unknown(
-    where: str,
-    names: Sequence[str],
-    known: Iterable[Convention],
-    nearest: Convention,
-    lacking: Sequence[str],
+    where: str, names: Sequence[str], tried: Sequence[tuple[Convention, Sequence[str]]]
 ) -> InputError:
-    """Return the error for names of joints that fit no convention."""
+    """Return the error for names of joints that fit no convention, of which these are lacking."""
+    nearest, lacking = min(tried, key=lambda one: len(one[1]))
     if len(lacking) > len(nearest.joints) / 2:
         return InputError(
             f"{where}: its joints ({', '.join(names[:4])}, ...) are named as in no set that is "
-            f"known: {'; '.join(one.name for one in known)}; rename them after one of these, or "
+            f"known: {'; '.join(one.name for one, _ in tried)}; rename them after one of these, or "
             f"name them in a table of your own ({OWN_NAMES})"
         )
     return InputError(
@@ -159,13 +146,11 @@ def node_positions(
 ) -> Array:
     """Positions (frame, node, 3) of the nodes from those of joints (frame, joint, 3)."""
     column = {plain(name): k for k, name in reversed(list(enumerate(names)))}
-    found = np.empty((len(positions), len(nodes), 3))
+    found, choices = np.empty((len(positions), len(nodes), 3)), convention.found(column)
     for k, node in enumerate(nodes):
-        choices = convention.joints[node]
-        choice = next(one for one in choices if set(_names(one)) <= column.keys())
         ends = [
             np.mean([positions[:, column[name]] for name in end.split("+")], axis=0)
-            for end in choice.partition(" ")[0].split(">")
+            for end in choices[node].partition(" ")[0].split(">")
         ]
-        found[:, k] = ends[0] + _fraction(choice) * (ends[-1] - ends[0])
+        found[:, k] = ends[0] + _fraction(choices[node]) * (ends[-1] - ends[0])
     return found

@@ -8,10 +8,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.system.checks import brief, is_real
+from rtradar.system.checks import check_number
 from rtradar.system.row_files import column
 
 MARGIN_FRAMES = 16
@@ -85,32 +84,14 @@ def keep_place(
 def _interval(
     motion: Motion, start_s: float, duration_s: float | None, heading_deg: float
 ) -> Motion:
-    _check(motion, start_s, duration_s, heading_deg)
+    where = f"{motion.name}, {motion.duration_s:.6g} s long"
+    start_s = check_number(where, "start_s", start_s, 0.0, motion.duration_s)
+    check_number(where, "heading_deg", heading_deg, -1e6, 1e6)
     rest = motion.duration_s - start_s
-    return cut(motion, start_s, rest if duration_s is None else min(duration_s, rest))
-
-
-def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg: float) -> None:
-    for what, value in (
-        ("start_s", start_s),
-        ("duration_s", duration_s),
-        ("heading_deg", heading_deg),
-    ):
-        if not (is_real(value) or (value is None and what == "duration_s")):
-            raise InputError(f"{motion.name}: {what} = {brief(value)}; it must be a number")
-    there = f"{motion.name} has {motion.duration_s:.6g} s"
-    if not 0 <= start_s <= motion.duration_s:
-        raise InputError(f"start {start_s:g} s is not inside the recording: {there}")
     if duration_s is not None:
-        if not (math.isfinite(duration_s) and duration_s > 0):
-            raise InputError(f"duration {duration_s:g} s; it must be positive ({there})")
-        if start_s + duration_s > motion.duration_s + 1e-6:
-            raise InputError(
-                f"start {start_s:g} s and duration {duration_s:g} s end past the recording: "
-                f"{there}, at most {motion.duration_s - start_s:.6g} s from there"
-            )
-    if not math.isfinite(heading_deg):
-        raise InputError(f"heading {heading_deg} degrees; it must be finite")
+        what = f"after {start_s:g} s, duration_s"
+        duration_s = check_number(where, what, duration_s, 1e-9, rest + 1e-6)
+    return cut(motion, start_s, rest if duration_s is None else min(duration_s, rest))
 
 
 def cut(motion: Motion, start_s: float, length_s: float) -> Motion:

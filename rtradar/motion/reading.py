@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_multiply
-from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.motion.skeleton import NODES, middle, of_node, to_nodes
 from rtradar.recordings import UNITS_M, UPWARD, Finding, rate_of, tall
 from rtradar.system.row_files import file_backed, in_blocks
 
@@ -65,9 +66,8 @@ _LONGEST_POSE_S, _T_POSE_M_S, _T_POSE_TIMES = 2.0, 10.0, 4.0
 and so many times as fast as they move in nearly all frames after it."""
 
 
-def of_node(nodes: Array, name: str) -> Array:
-    """Positions (frame, 3) of a node among all (frame, node, 3)."""
-    return nodes[:, NODES.index(name)]
+def _warn(text: str) -> None:
+    warnings.warn(text, ValidityWarning, stacklevel=6)
 
 
 def stature_of(nodes: Array) -> float:
@@ -76,16 +76,13 @@ def stature_of(nodes: Array) -> float:
     def span(first: Array, last: Array) -> float:
         return float(np.nanmedian(np.linalg.norm(first - last, axis=1)))
 
-    def middle(of: str) -> Array:
-        return (of_node(nodes, f"l_{of}") + of_node(nodes, f"r_{of}")) / 2
-
     legs = [
         span(of_node(nodes, f"{side}_{first}"), of_node(nodes, f"{side}_{last}"))
         for side in "lr"
         for first, last in (("hip", "knee"), ("knee", "ankle"))
     ]
-    trunk = span(middle("shoulder"), middle("hip"))
-    head = span(of_node(nodes, "head"), middle("shoulder"))
+    trunk = span(middle(nodes, "shoulder"), middle(nodes, "hip"))
+    head = span(of_node(nodes, "head"), middle(nodes, "shoulder"))
     return (sum(legs) / 2 + trunk + head) / (1 - _ANKLE_OF_STATURE)
 
 
@@ -135,54 +132,48 @@ def _settled_unit(
     if not 0.1 * STATURE_M[0] <= stature_m <= 10 * STATURE_M[1]:
         raise InputError(f"{text}; give the unit (unit, --unit), or mend the file")
     if not STATURE_M[0] <= stature_m <= STATURE_M[1]:
-        warnings.warn(text, ValidityWarning, stacklevel=5)
+        _warn(text)
     return unit_m, Finding("unit_m", unit_m, how)
 
 
 # -- up --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Stance:
-    """How a person stands if a direction is up: fractions of frames, and of the stature."""
+class _Stance(NamedTuple):
+    """How a person stands if a direction is up.
+
+    ``upright`` is a fraction of the frames; the lowest joint is ``steady``, on a floor, and that is
+    near zero; the pelvis is ``free``, as of nobody who lies, or ``travels``.
+    """
 
     up: str
     upright: float
-    sway: float
-    floor: float
+    steady: bool
+    on_zero: bool
     free: bool
     travels: bool
-
-    @property
-    def steady(self) -> bool:
-        return self.sway < _STEADY
-
-    @property
-    def on_zero(self) -> bool:
-        return self.floor < _ON_ZERO
 
 
 def _stances(nodes: Array) -> dict[str, _Stance]:
     size = stature_of(nodes)
-    ankles = (of_node(nodes, "l_ankle") + of_node(nodes, "r_ankle")) / 2
-    body = of_node(nodes, "head") - ankles
+    body = of_node(nodes, "head") - middle(nodes, "ankle")
     with np.errstate(invalid="ignore", divide="ignore"):
         body = body / np.linalg.norm(body, axis=1, keepdims=True)
     found = {}
     for up in UPWARD:
         axis, sign = "xyz".index(up[-1]), -1.0 if up[0] == "-" else 1.0
         low = np.nanmin(sign * nodes[..., axis], axis=1)
-        least, middle, most = np.nanquantile(low, (0.1, 0.5, 0.9))
+        least, median, most = np.nanquantile(low, (0.1, 0.5, 0.9)) / size
         level = np.delete(nodes[:, 0], axis, axis=1)
-        free = np.nanquantile(level, 0.95, axis=0) - np.nanquantile(level, 0.05, axis=0)
-        upright = float(np.nanmean(sign * body[:, axis] > _UPRIGHT))
+        free = np.subtract(*np.nanquantile(level, (0.95, 0.05), axis=0)) / size
+        travels = bool(free.max() > _TRAVELS)
         found[up] = _Stance(
             up,
-            upright,
-            float(most - least) / size,
-            abs(float(middle)) / size,
-            bool((free > _FREE * size).all() or free.max() > _TRAVELS * size),
-            bool(free.max() > _TRAVELS * size),
+            upright=float(np.nanmean(sign * body[:, axis] > _UPRIGHT)),
+            steady=bool(most - least < _STEADY),
+            on_zero=bool(abs(median) < _ON_ZERO),
+            free=travels or bool((free > _FREE).all()),
+            travels=travels,
         )
     return found
 
@@ -213,15 +204,13 @@ def found_up(where: str, nodes: Array, *, given: str = "", usual: str = "") -> t
         own = stances[given]
         sure = upright.upright > _MOSTLY and upright.steady and (upright.on_zero or upright.free)
         if own.upright < _SOMETIMES and sure and not own.steady:
-            warnings.warn(
+            _warn(
                 f"{where}: with {given} up, as given, the person lies and drifts; with "
-                f"{upright.up} up they stand on a floor",
-                ValidityWarning,
-                stacklevel=3,
+                f"{upright.up} up they stand on a floor"
             )
         return given, f"up: {given}, as given"
     if usual:
-        return _up_of_format(where, stances, upright, stances[usual])
+        return _up_of_format(where, upright, stances[usual])
     standing = [one for one in stances.values() if one.upright >= _SOMETIMES]
     for narrower in ("steady", "on_zero"):
         if len(standing) > 1:
@@ -235,9 +224,7 @@ def found_up(where: str, nodes: Array, *, given: str = "", usual: str = "") -> t
     )
 
 
-def _up_of_format(
-    where: str, stances: Mapping[str, _Stance], upright: _Stance, own: _Stance
-) -> tuple[str, str]:
+def _up_of_format(where: str, upright: _Stance, own: _Stance) -> tuple[str, str]:
     """Up where the format has an axis, which files of some programs do not keep to."""
     if own.upright >= _MOSTLY or upright.upright < _MOSTLY:
         return own.up, f"up: {own.up}, as the format has it"
@@ -253,15 +240,13 @@ def _up_of_format(
     (best,) = good
     if best is own:
         if own.upright < _SOMETIMES and own.travels and not own.on_zero:
-            warnings.warn(
+            _warn(
                 f"{where}: with {own.up} up, as the format has it, the person never stands, and "
-                "moves along above the floor; who walks needs another axis (--up)",
-                ValidityWarning,
-                stacklevel=4,
+                "moves along above the floor; who walks needs another axis (--up)"
             )
         return own.up, f"up: {own.up}, as the format has it; the person lies on a floor"
     text = f"up: {best.up}, not {own.up} as the format has it, for along it the person stands"
-    warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=4)
+    _warn(f"{where}: {text}")
     return best.up, text
 
 
@@ -325,11 +310,9 @@ def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: f
         before, first = rows[-1:], first + len(block)
     text = f"largest speed: {fastest:.3g} m/s, of {names[joint]} after frame {frame + 1}"
     if fastest > FASTEST_M_S:
-        warnings.warn(
+        _warn(
             f"{where}: {names[joint]} moves at {fastest:.3g} m/s after frame {frame + 1}, faster "
-            "than people do; cut or mend the recording, or check its rate and unit",
-            ValidityWarning,
-            stacklevel=3,
+            "than people do; cut or mend the recording, or check its rate and unit"
         )
     return Finding("largest_speed_mps", round(fastest, 3), text)
 
@@ -360,11 +343,9 @@ def warn_of_rate(where: str, nodes: Array, rate_hz: float) -> None:
     elif not aloft.any() and passes > max(_STEPS_HZ * duration_s, _LEAST_STEPS):
         says = f"{passes / duration_s:.1f} steps a second with a foot on the floor are too many"
     if says:
-        warnings.warn(
+        _warn(
             f"{where}: the rate of {rate_hz:g} frames a second may be wrong: {says}; give it "
-            "(rate_hz, --rate)",
-            ValidityWarning,
-            stacklevel=4,
+            "(rate_hz, --rate)"
         )
 
 
@@ -425,7 +406,7 @@ def settled(
     dropped = leading_t_pose(to_nodes(_of_frames(made, itemgetter(first))).positions, made.rate_hz)
     if dropped:
         text = f"frame 1 is a T-pose: {dropped} frame{'s' * (dropped > 1)} dropped at the beginning"
-        warnings.warn(f"{where}: {text}", ValidityWarning, stacklevel=3)
+        _warn(f"{where}: {text}")
         found.append(Finding("t_pose_frames", dropped, text))
         made = _of_frames(made, itemgetter(slice(dropped, None)))
     found.append(warn_of_speed(where, made.joints, made.positions, made.rate_hz))

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import OWN_NAMES, Convention, built_in, conventions, plain
+from rtradar.motion.names import Convention, conventions, plain, unknown
 from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, smallest_rotation
 from rtradar.system.row_files import FileBackedRows, in_blocks
 
@@ -58,8 +58,15 @@ NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PA
 """Index of the parent of each node, -1 for the root."""
 
 
-ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*built_in("skeletons")[0].joints.values()))
-"""HDM05 joints of the 22 nodes."""
+def of_node(places: Array, name: str) -> Array:
+    """Positions (..., 3) of a node among all (..., node, 3)."""
+    return places[..., NODES.index(name), :]
+
+
+def middle(places: Array, name: str) -> Array:
+    """Positions (..., 3) of the middle between both sides of a node."""
+    return (of_node(places, f"l_{name}") + of_node(places, f"r_{name}")) / 2
+
 
 MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""
@@ -128,14 +135,9 @@ def to_nodes(motion: Motion) -> Motion:
 def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     """The convention whose names fit, and the joint of each node it names."""
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
-    known = conventions("skeletons")
-    fewest, why = len(NODES), ""
-    for convention in known:
-        found = {
-            node: next(there[name] for name in names if name in there)
-            for node, names in convention.joints.items()
-            if any(name in there for name in names)
-        }
+    tried = []
+    for convention in conventions("skeletons"):
+        found = {node: there[name] for node, name in convention.found(there).items()}
         missing = [node for node in convention.joints if node not in found]
         if convention.open_ended:
             # No end site at all: the part starts and ends in one joint, and is extended from there.
@@ -148,19 +150,8 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
                 found["thorax"], missing = motion.parents[found["neck"]], []
         if not missing:
             return convention, found
-        if len(missing) < fewest:
-            wanted = " or ".join(convention.joints[missing[0]])
-            fewest = len(missing)
-            why = f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name}"
-    if fewest > len(NODES) / 2:
-        raise InputError(
-            f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no "
-            f"kind of skeleton that is known: {'; '.join(one.name for one in known)}; rename them "
-            f"after one of these, or name them in a table of your own ({OWN_NAMES})"
-        )
-    raise InputError(
-        f"{motion.name}: {why} skeleton; {len(NODES)} nodes are needed, rename or add the joint"
-    )
+        tried.append((convention, [" or ".join(convention.joints[node]) for node in missing]))
+    raise unknown(motion.name, motion.joints, tried)
 
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:

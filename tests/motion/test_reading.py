@@ -506,7 +506,7 @@ def test_names_of_ones_own_count_first(tmp_path: Path, monkeypatch: pytest.Monke
     assert (nodes_of(motion)["head"][:, 2] > 1.5).all()
     (tmp_path / "worse.toml").write_text('[[joints]]\nname = "Ours"\nside = 1\n')
     monkeypatch.setenv("RTRADAR_NAMES", str(tmp_path / "worse.toml"))
-    with pytest.raises(InputError, match=r"worse.toml: \[\[joints\]\] 1: unknown key 'side'"):
+    with pytest.raises(InputError, match=r"worse.toml: \[\[joints\]\] number 1 unknown key 'side'"):
         load_motion(path)
 
 

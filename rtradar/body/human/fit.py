@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rtradar.body.human.shape import KEYPOINTS, RestShapes, rest_shapes
 from rtradar.motion import Motion
-from rtradar.motion.quaternions import quaternion_rotate
-from rtradar.motion.skeleton import NODE_PARENTS, NODES
+from rtradar.motion.quaternions import smallest_rotation
+from rtradar.motion.skeleton import NODE_PARENTS, NODES, middle, of_node
 
 Array = NDArray[np.float64]
 
@@ -144,12 +144,12 @@ def fit_to(motion: Motion) -> Fit:
     stretch = _stretches(joints, lengths, pose, frames, scale, build)
     starts, turned_by = joints[list(NODE_PARENTS[1:])], np.arange(1, len(NODES))
     # The pelvis hangs on its hips, not on the root: skeletons differ in where that is.
-    hips = _middle(pose, "hip") - pose[0]
+    hips = middle(pose, "hip") - pose[0]
     for side in ("l_hip", "r_hip"):
         part = NODES.index(side) - 1
         turned_by[part] = 0
         below = np.linalg.solve(frames[part + 1] @ stretch[part], hips)
-        starts[part] = _middle(joints, "hip") - below
+        starts[part] = middle(joints, "hip") - below
     mounting = np.swapaxes(turns[turned_by], 1, 2) @ frames[1:]
     weights = _part_weights(shapes, vertices)
     hung = starts, stretch, mounting, turned_by
@@ -163,16 +163,12 @@ def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
     for side in "LR":
         for node, end in _LIMB_ENDS.items():
             joints[NODES.index(f"{side.lower()}_{node}")] = shapes.joints[end.format(side)][age]
-    hips, shoulders = (_middle(joints, node)[2] for node in ("hip", "shoulder"))
+    hips, shoulders = (middle(joints, node)[2] for node in ("hip", "shoulder"))
     spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _SPINE])
     for node in _TRUNK:
         z = hips + heights[node] * (shoulders - hips)
         joints[NODES.index(node)] = 0.0, np.interp(z, spine[:, 2], spine[:, 1]), z
     return joints
-
-
-def _middle(joints: Array, node: str) -> Array:
-    return np.asarray((joints[NODES.index(f"l_{node}")] + joints[NODES.index(f"r_{node}")]) / 2)
 
 
 def _trunk_heights(motion: Motion, pose: Array | None) -> dict[str, float]:
@@ -182,23 +178,20 @@ def _trunk_heights(motion: Motion, pose: Array | None) -> dict[str, float]:
     """
     if pose is None:
         lengths = np.linalg.norm(motion.offsets, axis=1)
-        steps = [0.4 * lengths[NODES.index("l_hip")]]
-        steps += [float(lengths[NODES.index(node)]) for node in _TRUNK[1:]]
-        places = np.cumsum(steps)
+        bones = [lengths[NODES.index(node)] for node in _TRUNK[1:]]
+        places = np.cumsum([0.4 * lengths[NODES.index("l_hip")], *bones])
         return dict(zip(_TRUNK, (places / places[3]).tolist(), strict=True))
-    up = _middle(pose, "shoulder") - _middle(pose, "hip")
-    along = (pose - _middle(pose, "hip")) @ up / (up @ up)
+    up = middle(pose, "shoulder") - middle(pose, "hip")
+    along = (pose - middle(pose, "hip")) @ up / (up @ up)
     return {node: float(along[NODES.index(node)]) for node in _TRUNK}
 
 
 def _size(joints: Array) -> float:
     """Sum of the lengths of both legs and arms, and twice that from hips to shoulders [m]."""
-    total = 2 * float(np.linalg.norm(_middle(joints, "shoulder") - _middle(joints, "hip")))
-    for side in "lr":
-        for node in _LIMBS:
-            number = NODES.index(f"{side}_{node}")
-            total += float(np.linalg.norm(joints[number] - joints[NODE_PARENTS[number]]))
-    return total
+    limbs = [NODES.index(f"{side}_{node}") for side in "lr" for node in _LIMBS]
+    bones = joints[limbs] - joints[[NODE_PARENTS[limb] for limb in limbs]]
+    trunk = 2 * float(np.linalg.norm(middle(joints, "shoulder") - middle(joints, "hip")))
+    return trunk + float(np.linalg.norm(bones, axis=1).sum())
 
 
 def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
@@ -211,38 +204,28 @@ def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
     frames = np.unique(np.linspace(0, count - 1, min(count, _CANDIDATES)).astype(np.int64))
     still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(NODES), 1))
     quaternions = np.concatenate([still, motion.rotations[frames]])
-    places = quaternion_rotate(quaternions, motion.offsets)
-    places[:, 0] = 0
-    for node, parent in enumerate(NODE_PARENTS[1:], start=1):
-        places[:, node] += places[:, parent]
-    best = int(np.argmin([_strain(joints, pose) for pose in places]))
+    roots = np.zeros((len(quaternions), 3))
+    poses = replace(
+        motion, root_positions=roots, rotations=quaternions, first_frame_s=0.0, length_s=None
+    ).positions
+    best = int(np.argmin([_strain(joints, pose) for pose in poses]))
     from scipy.spatial.transform import Rotation  # slow to import
 
-    turns: Any = Rotation.from_quat(quaternions[best]).as_matrix()
-    return places[best], np.asarray(turns, dtype=np.float64)
+    return poses[best], np.asarray(Rotation.from_quat(quaternions[best]).as_matrix())
 
 
-def _pelvis_frame(joints: Array) -> Array:
-    """Axes left, back and up of the pelvis, as columns; left is exact."""
-    up = joints[NODES.index("lowerback")] - _middle(joints, "hip")
-    left = _leftward(joints, "hip")
-    left, back = _units(left, np.cross(up, left))
-    return np.stack([left, back, np.cross(left, back)], axis=1)
+def _frame(joints: Array, sides: str) -> Array:
+    """Axes left, back and up, as columns, of the pelvis by its hips, or of the thorax by shoulders.
 
-
-def _chest_frame(joints: Array) -> Array:
-    """Axes left, back and up of the thorax, as columns; up, along its bone, is exact."""
-    up = joints[NODES.index("thorax")] - joints[NODES.index("upperback")]
-    up, back = _units(up, np.cross(up, _leftward(joints, "shoulder")))
-    return np.stack([np.cross(back, up), back, up], axis=1)
-
-
-def _leftward(joints: Array, node: str) -> Array:
-    return np.asarray(joints[NODES.index(f"l_{node}")] - joints[NODES.index(f"r_{node}")])
-
-
-def _units(first: Array, second: Array) -> tuple[Array, Array]:
-    return first / np.linalg.norm(first), second / np.linalg.norm(second)
+    Left is exact for the pelvis; up, along its bone, for the thorax.
+    """
+    hips = sides == "hip"
+    start = middle(joints, "hip") if hips else of_node(joints, "upperback")
+    up = of_node(joints, "lowerback" if hips else "thorax") - start
+    left = of_node(joints, f"l_{sides}") - of_node(joints, f"r_{sides}")
+    left, back, up = (way / np.linalg.norm(way) for way in (left, np.cross(up, left), up))
+    axes = [left, back, np.cross(left, back)] if hips else [np.cross(back, up), back, up]
+    return np.stack(axes, axis=1)
 
 
 def _directions(joints: Array) -> Array:
@@ -263,31 +246,21 @@ def _carried(joints: Array, pose: Array) -> Array:
 
     Hips and shoulders say how pelvis and thorax are turned about their bones.
     """
+    from scipy.spatial.transform import Rotation  # slow to import
+
     frames = np.empty((len(NODES), 3, 3))
-    frames[0] = _pelvis_frame(pose) @ _pelvis_frame(joints).T
-    for node, (way, wanted) in enumerate(
-        zip(_directions(joints), _directions(pose), strict=True), start=1
-    ):
-        parent = frames[NODE_PARENTS[node]]
-        if NODES[node].endswith("hip"):
-            frames[node] = parent
-        elif NODES[node] == "thorax":
-            frames[node] = _chest_frame(pose) @ _chest_frame(joints).T
+    frames[0] = _frame(pose, "hip") @ _frame(joints, "hip").T
+    ways = zip(NODES[1:], _directions(joints), _directions(pose), strict=True)
+    for number, (node, way, wanted) in enumerate(ways, start=1):
+        parent = frames[NODE_PARENTS[number]]
+        if node == "thorax":
+            frames[number] = _frame(pose, "shoulder") @ _frame(joints, "shoulder").T
+        elif node.endswith("hip"):
+            frames[number] = parent
         else:
-            frames[node] = _least_rotation(parent @ way, wanted) @ parent
+            least = Rotation.from_quat(smallest_rotation(parent @ way, wanted))
+            frames[number] = least.as_matrix() @ parent
     return frames
-
-
-def _least_rotation(first: Array, second: Array) -> Array:
-    """The least rotation from one unit vector to another (Rodrigues)."""
-    axis, cosine = np.cross(first, second), float(first @ second)
-    if cosine < -1 + 1e-9:
-        across = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
-        across /= np.linalg.norm(across)
-        return np.asarray(2 * np.outer(across, across) - np.eye(3))
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross / (1 + cosine))
 
 
 def _stretches(
@@ -312,15 +285,14 @@ def _stretches(
 
 def _pelvis_stretch(joints: Array, pose: Array, scale: float, build: float) -> Array:
     """Stretch of the pelvis, which takes its root and hips to the recording's, in its own axes."""
-    ratios = []
-    for first, second in (("l_hip", "r_hip"), ("root", None)):
-        sizes = []
-        for places in (pose, joints):
-            end = _middle(places, "hip") if second is None else places[NODES.index(second)]
-            sizes.append(float(np.linalg.norm(places[NODES.index(first)] - end)))
-        ratios.append(sizes[0] / np.maximum(sizes[1], 1e-3))
-    low, high = _PELVIS_STRETCH
-    wide, tall = (scale * float(np.clip(ratio / scale, low, high)) for ratio in ratios)
+
+    def sizes(places: Array) -> Array:
+        hips = middle(places, "hip")
+        across = of_node(places, "l_hip") - of_node(places, "r_hip")
+        return np.linalg.norm([across, places[0] - hips], axis=1)
+
+    ratios = sizes(pose) / np.maximum(sizes(joints), 1e-3)
+    wide, tall = scale * np.clip(ratios / scale, *_PELVIS_STRETCH)
     return np.diag([wide, scale * build, tall])
 
 

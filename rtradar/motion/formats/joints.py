@@ -38,12 +38,18 @@ from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
-    of_node,
     settled_nodes,
     stature_of,
     warn_of_speed,
 )
-from rtradar.motion.skeleton import HEAD_OF_THIGH, MINIMUM_PART_M, NODE_PARENTS, NODES
+from rtradar.motion.skeleton import (
+    HEAD_OF_THIGH,
+    MINIMUM_PART_M,
+    NODE_PARENTS,
+    NODES,
+    middle,
+    of_node,
+)
 from rtradar.recordings import Finding, rate_of, tall
 
 Array = NDArray[np.float64]
@@ -111,8 +117,7 @@ def motion_of(
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, convention)
-    hips, shoulders = (of_node(nodes, f"l_{at}") - of_node(nodes, f"r_{at}") for at in _SIDES)
-    pelvis, thorax = (_axes(where, left, _trunk(nodes)) for left in (hips, shoulders))
+    pelvis, thorax = (_axes(where, nodes, sides) for sides in ("hip", "shoulder"))
     _complete(nodes, pelvis, convention)
     _keep_directions(where, nodes)
     size = stature_of(nodes) / _NOMINAL_STATURE_M
@@ -127,17 +132,8 @@ def motion_of(
     return dataclasses.replace(motion, girth=size, findings=tuple(found))
 
 
-_SIDES = ("hip", "shoulder")
-
-
 def _length(nodes: Array, first: str, last: str) -> Array:
     return np.asarray(np.linalg.norm(of_node(nodes, first) - of_node(nodes, last), axis=1))
-
-
-def _trunk(nodes: Array) -> Array:
-    """Vectors (frame, 3) from the middle of the hips to that of the shoulders."""
-    hips, shoulders = (of_node(nodes, f"l_{at}") + of_node(nodes, f"r_{at}") for at in _SIDES)
-    return np.asarray((shoulders - hips) / 2)
 
 
 def _drop_lost(nodes: Array, times: Array) -> None:
@@ -223,7 +219,10 @@ def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
     direction is uncertain then, points more and more as the forearm or the trunk does.
     """
     thigh = float(np.median(_length(nodes, "l_knee", "l_hip")))
-    head, upward = of_node(nodes, "head") - of_node(nodes, "neck"), _directions(_trunk(nodes))
+    head, upward = (
+        of_node(nodes, "head") - of_node(nodes, "neck"),
+        _directions(middle(nodes, "shoulder") - middle(nodes, "hip")),
+    )
     head = _lengthened(head, upward, 0.5 * float(np.median(np.linalg.norm(head, axis=1))))
     if not convention.head_is_top:
         head = HEAD_OF_THIGH * thigh * _directions(head)
@@ -242,14 +241,14 @@ def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
         nodes[:, NODES.index(f"{side}_hand")] = wrist + hand
 
 
-def _axes(where: str, left: Array, upward: Array) -> Array:
-    """Axes (frame, 3, 3) with this left; where it is nearly upward, those before."""
+def _axes(where: str, nodes: Array, sides: str) -> Array:
+    """Axes (frame, 3, 3) with the left of hips or shoulders; where it is upward, those before."""
+    left = of_node(nodes, f"l_{sides}") - of_node(nodes, f"r_{sides}")
+    upward = middle(nodes, "shoulder") - middle(nodes, "hip")
     forward = np.cross(left, upward)
     kept = _last(np.linalg.norm(forward, axis=1) > MINIMUM_PART_M**2)
     if kept is None:
-        raise InputError(
-            f"{where}: hips, or shoulders, are in one place or in line with the trunk; mend them"
-        )
+        raise InputError(f"{where}: {sides}s are in one place or in line with the trunk; mend them")
     return level_axes(left[kept], forward[kept])
 
 
