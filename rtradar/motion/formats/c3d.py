@@ -9,7 +9,6 @@ The axes of C3D files are usually those of the world: Vicon's z is up, and C3D (
 from __future__ import annotations
 
 import io
-import math
 import os
 import warnings
 from dataclasses import replace
@@ -148,12 +147,7 @@ def _read_trc(path: Path) -> Points:
                 continue
             if len([cell for cell in cells[width:] if cell]) or len(cells) < 2:
                 raise text.fail(f"{len(cells)} cells where {len(labels)} markers have {width}")
-            cells = (cells + width * [""])[:width]
-            seen = [k for k in range(2, width) if cells[k].lower() not in ("", "nan")]
-            row = [math.nan] * (width - 2)
-            for k, value in zip(seen, text.numbers([cells[k] for k in seen]), strict=True):
-                row[k - 2] = value
-            rows.append(row)
+            rows.append(text.cells((cells + width * [""])[2:width]))
             text.check_size(len(labels), len(rows))
         (rate,) = text.numbers([said["DataRate"]], 3)
     places = np.array(rows).reshape(len(rows), len(labels), 3)

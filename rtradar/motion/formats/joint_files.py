@@ -4,12 +4,25 @@ Both hold ``positions (frame, joint, 3)``, the names of the ``joints``, which ax
 and ``rate_hz`` or ``time_s (frame,)``. In a table each coordinate of a joint has a column, such as
 ``HipLeft_x``; ``time_s``, ``rate_hz`` and ``up`` have one each. What is not seen is NaN, an empty
 cell, or the origin to the last bit.
+
+An archive may hold rotations of the body models SMPL, SMPL+H and SMPL-X instead, as AMASS has them:
+``trans`` (frame, 3) [m] and, about each joint of the tree, axis times angle [rad]: ``poses``
+(frame, 3 x joint), or ``root_orient``, ``pose_body`` and others. The 22 joints of the body come
+first and are the same in all of these models; ``body_models.toml`` has them. The joint at the root
+is at ``trans`` plus where it is in the rest pose. Shape (``betas``) and the files of the models,
+which have a licence of their own, are not read: the skeleton is that of the models' mean person.
+
+References
+----------
+M. Loper, N. Mahmood, J. Romero, G. Pons-Moll, M. J. Black, SMPL: A skinned multi-person linear
+model, ACM Transactions on Graphics 34, 2015. N. Mahmood, N. Ghorbani, N. F. Troje, G. Pons-Moll,
+M. J. Black, AMASS: Archive of motion capture as surface shapes, ICCV 2019.
 """
 
 from __future__ import annotations
 
-import math
 import re
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,9 +30,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
-from rtradar.motion.formats import body_models
 from rtradar.motion.formats.text_file import TextFile
 from rtradar.motion.names import plain
 from rtradar.recordings import UPWARD, Finding
@@ -34,6 +47,9 @@ LEAST_FRAMES = 5
 _NEEDED = "joint positions need positions, joints, up, and rate_hz or time_s"
 _MOST_JOINTS, _MOST_PLACES = 1000, 5_000_000
 _FARTHEST, _LEAST_STEP_S = 1e9, 1e-6
+
+_RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "rate_hz")
+"""Names of the rate in archives of rotations."""
 
 _LEAST_STEP = 0.1
 """Least step of time over the median; a spline through places that are nearer in time would swing
@@ -75,9 +91,9 @@ def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    if body_models.holds_rotations(arrays):
+    if _holds_rotations(arrays):
         text = "body: rotations on the skeleton of a mean person; betas are not read"
-        made = checked(path, body_models.as_positions(path, arrays), rate_hz)
+        made = checked(path, _as_positions(path, arrays), rate_hz)
         return replace(made, usual="z", findings=(Finding("body_model", "mean", text),))
     return checked(path, arrays, rate_hz)
 
@@ -99,10 +115,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
                 if rows and own != up:
                     raise text.fail(f"up is {brief(own)}, and was {brief(up)}; it must not change")
                 up, cells[columns["up"]] = own, ""
-            seen = [k for k, cell in enumerate(cells) if cell.lower() not in ("", "nan")]
-            row = [math.nan] * len(cells)
-            for k, value in zip(seen, text.numbers([cells[k] for k in seen]), strict=True):
-                row[k] = value
+            row = text.cells(cells)
             rate = columns.get("rate_hz", -1)
             if rate >= 0 and rows and row[rate] != rows[0][rate]:
                 raise text.fail(f"rate_hz is {row[rate]:g}, and was {rows[0][rate]:g}; give time_s")
@@ -122,15 +135,13 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
 
 def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Columns of what is not a coordinate, and three of each joint."""
-    others, joints = dict[str, int](), dict[str, list[int]]()
+    others, joints = dict[str, int](), dict[str, dict[str, int]]()
     for k, cell in enumerate(header):
+        if header.count(cell) > 1:
+            raise text.fail(f"column {brief(cell)} is there twice")
         found = re.fullmatch(r"(.+)[_. ]([xyz])", cell, re.IGNORECASE)
         if found:
-            place = joints.setdefault(found[1], [-1, -1, -1])
-            axis = "xyz".index(found[2].lower())
-            if place[axis] >= 0:
-                raise text.fail(f"column {brief(cell)} is there twice")
-            place[axis] = k
+            joints.setdefault(found[1], {})[found[2].lower()] = k
         elif cell in ("time_s", "rate_hz", "up", "frame"):
             others[cell] = k
         else:
@@ -139,12 +150,12 @@ def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[st
                 "and NAME_x, NAME_y, NAME_z of each joint"
             )
     for name, place in joints.items():
-        if min(place) < 0:
+        for axis in set("xyz") - place.keys():
             raise text.fail(
-                f"joint {brief(name)} has no column for {'xyz'[place.index(-1)]}; each joint needs "
-                "NAME_x, NAME_y, NAME_z"
+                f"joint {brief(name)} has no column for {axis}; each joint needs NAME_x, NAME_y, "
+                "NAME_z"
             )
-    return others, joints
+    return others, {name: [place[axis] for axis in "xyz"] for name, place in joints.items()}
 
 
 def checked(
@@ -158,25 +169,13 @@ def checked(
         if not any(name in arrays for name in needed.split(" or ")):
             raise InputError(f"{path}: {needed} is missing; {_NEEDED}")
     given, named = arrays["positions"], arrays["joints"]
-    if given.ndim != 3 or given.shape[2] != 3 or given.dtype.kind not in "fiu":
+    check_array(path, "positions", given, ("frame", "joint", 3))
+    check_array(path, "joints", named, given.shape[1:2], "U")
+    if len(given) < LEAST_FRAMES or given.shape[1] > _MOST_JOINTS or given.size > 3 * _MOST_PLACES:
         raise InputError(
-            f"{path}: positions are {given.dtype} of shape {given.shape}; they must be real "
-            "numbers of shape (frame, joint, 3)"
-        )
-    if named.shape != given.shape[1:2] or named.dtype.kind != "U":
-        raise InputError(
-            f"{path}: joints are {named.dtype} of shape {named.shape}; they must be "
-            f"{given.shape[1]} names, one for each of the positions"
-        )
-    if len(given) < LEAST_FRAMES or given.shape[1] > _MOST_JOINTS:
-        raise InputError(
-            f"{path}: {len(given)} frames of {given.shape[1]} joints; there must be at least "
-            f"{LEAST_FRAMES} frames, and at most {_MOST_JOINTS} joints"
-        )
-    if given.shape[0] * given.shape[1] > _MOST_PLACES:
-        raise InputError(
-            f"{path}: {given.shape[0]} frames of {given.shape[1]} joints; at most "
-            f"{_MOST_PLACES} places of joints are read: cut it into shorter ones"
+            f"{path}: {given.shape[0]} frames of {given.shape[1]} joints; there must be at least "
+            f"{LEAST_FRAMES} frames, and at most {_MOST_JOINTS} joints and {_MOST_PLACES} places "
+            "of joints: cut it into shorter ones"
         )
     names = tuple(map(str, named))
     known = [plain(name) for name in names]
@@ -190,6 +189,21 @@ def checked(
     times = _times(path, arrays, len(given))
     kept = _apart(times)
     return JointRecording(path, names, positions[kept], times[kept], up, len(times) - kept.sum())
+
+
+def check_array(
+    path: Path, name: str, array: NDArray[Any], shape: tuple[int | str, ...], kinds: str = "fiu"
+) -> None:
+    """Refuse an array of another shape or kind than a file must have; a name is any length."""
+    alike = len(shape) == array.ndim and all(
+        isinstance(wanted, str) or wanted == size
+        for wanted, size in zip(shape, array.shape, strict=True)
+    )
+    if not alike or array.dtype.kind not in kinds:
+        raise InputError(
+            f"{path}: {name} is {array.dtype} of shape {array.shape}; it must be "
+            f"{'names' if kinds == 'U' else 'real numbers'} of shape ({', '.join(map(str, shape))})"
+        )
 
 
 def check_places(path: Path, places: NDArray[Any]) -> Array:
@@ -218,11 +232,7 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
         number = rate.item() if rate.size == 1 else rate
         return np.arange(frames) / check_number(str(path), "rate_hz", number, 1.0, 100_000.0)
     times = arrays["time_s"]
-    if times.shape != (frames,) or times.dtype.kind not in "fiu":
-        raise InputError(
-            f"{path}: time_s is {times.dtype} of shape {times.shape}; it must be {frames} "
-            "numbers, one for each frame"
-        )
+    check_array(path, "time_s", times, (frames,))
     times = times.astype(np.float64)
     for frame in np.flatnonzero(~np.isfinite(times)):
         raise InputError(f"{path}: time_s is {times[frame]} in frame {frame + 1}; mend it")
@@ -234,3 +244,52 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
         )
     check_number(str(path), "frames a second by time_s", 1 / np.median(steps), 1.0, 100_000.0)
     return np.asarray(times - times[0])
+
+
+# -- rotations of body models ----------------------------------------------------------------------
+
+
+def _holds_rotations(arrays: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether an archive holds rotations of a body model."""
+    return "positions" not in arrays and bool({"poses", "root_orient", "pose_body"} & set(arrays))
+
+
+def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Positions (frame, joint, 3) of the joints, in the axes of the file [m], and the rate.
+
+    Under the keys that an archive of joint positions has.
+    """
+    with Path(__file__).with_name("body_models.toml").open("rb") as file:
+        person = tomllib.load(file)
+    joints = person["joints"]
+    turned = _rotations_of(path, arrays, len(joints))
+    if "trans" not in arrays:
+        raise InputError(f"{path}: trans is missing; rotations need it, as in AMASS")
+    trans = arrays["trans"]
+    check_array(path, "trans", trans, (len(turned), 3))
+    for name, values in (("trans", trans), ("rotations", turned)):
+        for frame in np.flatnonzero(~np.isfinite(values).all(axis=1)):
+            raise InputError(f"{path}: {name} are not finite in frame {frame + 1}; mend them")
+    kind = "smplx" if "x" in str(arrays.get("surface_model_type", "")) else "others"
+    places, world = dict[str, Array](), dict[str, Rotation]()
+    for number, (joint, own) in enumerate(joints.items()):
+        local, above = Rotation.from_rotvec(turned[:, 3 * number : 3 * number + 3]), own["parent"]
+        if above:
+            places[joint] = places[above] + world[above].apply(own["offset"])
+            world[joint] = world[above] * local
+        else:
+            places[joint], world[joint] = trans + np.array(person["pelvis"][kind]), local
+    found = {"positions": np.stack(list(places.values()), axis=1), "joints": np.array(list(joints))}
+    rates = [arrays[name] for name in _RATES if name in arrays]
+    return found | ({"rate_hz": rates[0]} if rates else {})
+
+
+def _rotations_of(path: Path, arrays: Mapping[str, NDArray[Any]], joints: int) -> Array:
+    """Axis times angle (frame, 3 a joint) of the joints of the body [rad]."""
+    given = arrays.get("poses", np.empty(0))
+    if "poses" not in arrays:
+        parts = [arrays.get(name, np.empty(0)) for name in ("root_orient", "pose_body")]
+        if all(part.ndim == 2 and len(part) == len(parts[0]) for part in parts):
+            given = np.concatenate(parts, axis=1)
+    check_array(path, "poses", given[..., : 3 * joints], ("frame", 3 * joints))
+    return given[:, : 3 * joints].astype(np.float64)

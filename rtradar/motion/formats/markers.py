@@ -23,7 +23,9 @@ HDM05, technical report CG-2007-2, Universitaet Bonn, 2007.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -46,8 +48,7 @@ Array = NDArray[np.float64]
 class Centre(NamedTuple):
     """Position of a joint's centre relative to the mean of its markers.
 
-    In the names of markers ``@`` stands for the side, L or R. The offset [m] is forward, to the
-    left (on the right side: to the right) and up in the axes of the segment.
+    ``markers.toml`` explains the fields.
     """
 
     markers: tuple[str, ...]
@@ -55,42 +56,19 @@ class Centre(NamedTuple):
     offset_m: tuple[float, float, float]
 
 
-SHANK_M = 0.436
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+
+SHANK_M: float = _TABLE["shank_m"]
 """Distance of knee and ankle markers of the person whom the offsets belong to."""
 
-_WAIST = ("LFWT", "RBWT", "RFWT", "LBWT")
-_HEAD = ("LFHD", "RBHD", "RFHD", "LBHD")
-_NECK = ("C7", "CLAV")
+NEEDED: tuple[str, ...] = tuple(_TABLE["needed"])
+"""The markers that must be there."""
 
-CENTRES: Mapping[str, Centre] = {
-    "root": Centre(_WAIST, "pelvis", (0.0, 0.0, -0.049)),
-    "lowerback": Centre(_WAIST, "pelvis", (0.017, 0.0, 0.068)),
-    "upperback": Centre(("T10", "STRN"), "thorax", (-0.005, 0.0, -0.037)),
-    "thorax": Centre(_NECK, "thorax", (0.011, 0.0, -0.187)),
-    "neck": Centre(_NECK, "thorax", (0.013, 0.0, -0.080)),
-    "head": Centre(_HEAD, "head", (-0.035, 0.0, -0.044)),
-    "hip": Centre(_WAIST, "pelvis", (0.050, 0.102, -0.140)),
-    "knee": Centre(("@KNE",), "shank", (0.019, -0.060, -0.007)),
-    "ankle": Centre(("@ANK",), "shank", (0.010, -0.047, 0.001)),
-    "toe": Centre(("@TOE",), "shank", (0.0, 0.0, 0.0)),
-    "shoulder": Centre(_NECK, "thorax", (0.014, 0.182, -0.102)),
-    "elbow": Centre(("@ELB",), "upper arm", (0.033, -0.066, -0.029)),
-    "wrist": Centre(("@WRA", "@WRB"), "forearm", (-0.016, -0.062, 0.004)),
-    "hand": Centre(("@FIN",), "forearm", (-0.028, -0.039, -0.016)),
+CENTRES = {
+    node: Centre(tuple(markers.split()), *place)
+    for node, (markers, *place) in _TABLE["centres"].items()
 }
 """Centre of each node; those of the limbs serve both sides."""
-
-_SIDED = ("SHO", "ELB", "WRA", "WRB", "FIN", "KNE", "ANK", "TOE")
-
-NEEDED: tuple[str, ...] = (
-    *_HEAD,
-    *_NECK,
-    "T10",
-    "STRN",
-    *_WAIST,
-    *(side + name for side in "LR" for name in _SIDED),
-)
-"""The markers that must be there."""
 
 _STRAIGHT = 0.15
 """Angle [rad] below which the plane of an arm's bend comes more and more from the shoulder.

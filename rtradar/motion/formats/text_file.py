@@ -62,6 +62,14 @@ class TextFile:
                 raise self.fail(complaint, line)
         return values
 
+    def cells(self, words: list[str]) -> list[float]:
+        """Numbers of a row of a table, NaN where a cell is empty."""
+        seen = [k for k, word in enumerate(words) if word.lower() not in ("", "nan")]
+        row = [math.nan] * len(words)
+        for k, value in zip(seen, self.numbers([words[k] for k in seen]), strict=True):
+            row[k] = value
+        return row
+
     def check_size(self, joints: int, frames: int = 1) -> None:
         """Refuse more than a person's motion has: 1000 joints, or 100 million poses of a joint."""
         if joints > _MOST_JOINTS:
