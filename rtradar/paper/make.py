@@ -13,15 +13,13 @@ from typing import Any
 
 from tqdm import tqdm
 
-from rtradar.paper.items import TEXTS, Item, load_items
+from rtradar.paper.items import Item, load_items
 from rtradar.paper.sources import Sources, find_recordings
 from rtradar.system.files import atomic_file, read_json
 from rtradar.system.output_folder import OutputFiles, resumable_folder
 
 PAPER_FILES = OutputFiles("paper.json", r"paper\.(html|json)|(figure|table|number)-[a-z0-9-]+\.png")
 """Files of the page."""
-
-_LABELS = dict(zip(TEXTS, ("The paper", "Ours", "Difference", "Why"), strict=True))
 
 
 def _parts() -> dict[str, Callable[[Sources], dict[str, Any]]]:
@@ -138,25 +136,21 @@ def _shown(folder: Path, item: Item) -> Item:
 
 
 def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> None:
-    from rtradar.report.pages.html import Titles, contents, picture, table, write_page
+    from rtradar.report.pages.html import write_page
 
-    items = [Item(**entry) for entry in content["items"]]
-    sections = []
-    for item in items:
-        # In the JSON names of files and options are marked as in Markdown.
-        rows = [(_LABELS[name], getattr(item, name).replace("`", "")) for name in TEXTS]
-        drawn = "" if item.picture is None else picture(item.title, folder / item.picture)
-        sections.append(
-            f'<section id="{item.id}"><h2>{item.title}</h2>'
-            f'<div class="item">{table(rows)}</div>{drawn}</section>\n'
-        )
     seconds = sum(part["wall_s"] for part in content["parts"].values())
     about = f"Who moves: {sources.named}. Measured in {seconds:.0f} s"
     about += ", quickly: with fewer cases of table 3 and 77 GHz." if sources.quick else "."
-    name = "4D radar simulator for human activity recognition"
-    titles = Titles("The paper beside rtradar", name, about)
-    links = {item.id: _link(item.title) for item in items}
-    write_page(folder / "paper.html", titles, contents(links), sections)
+    items = content["items"]
+    values = {
+        "kind": "The paper beside rtradar",
+        "heading": "4D radar simulator for human activity recognition",
+        "subtitle": about,
+        "folder": folder,
+        "items": items,
+        "links": {item["id"]: _link(item["title"]) for item in items},
+    }
+    write_page(folder / "paper.html", "paper.html", values)
 
 
 def _link(title: str) -> str:

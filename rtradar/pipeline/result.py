@@ -21,7 +21,7 @@ from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
 from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages.inline import InlinePage
+from rtradar.report.pages.html import InlinePage
 from rtradar.report.pages.labels import signal_to_noise
 from rtradar.scatter.link_budget import LinkBudget
 

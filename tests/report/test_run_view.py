@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +19,8 @@ from rtradar.report.view.run_view import (
     Levels,
     RunView,
     group_of_parts,
-    linked_views,
     view_data,
+    write_view,
 )
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import drawn_sphere, semi_axis_poses
@@ -178,7 +179,7 @@ def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
     assert data["figure"]["ranges"][0][1] == 2.5
 
 
-def test_people_and_objects_have_names_colours_and_truth() -> None:
+def test_people_and_objects_have_names_colours_and_truth(tmp_path: Path) -> None:
     view = linked([(0.1, 4.5, 0.5)])
     assert view.source_names == ["walk <1>", "fan", "room or noise"]
     assert len(set(view.source_colours)) == 3
@@ -187,7 +188,8 @@ def test_people_and_objects_have_names_colours_and_truth() -> None:
     assert data["rdt"]["source"] == [1]
     assert data["people"]["of_part"] == [0] * 21
     assert data["meshes"]["source"] == [1]
-    page = linked_views(view)
+    write_view(tmp_path / "view.html", view)
+    page = (tmp_path / "view.html").read_text(encoding="utf-8")
     assert "walk &lt;1&gt;" in page
     assert '<option value="person" selected>' in page
     # The fan, at 3.2 m, is inside of the axes.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from html import escape
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +12,7 @@ from numpy.typing import NDArray
 from rtradar.report.figures.canvas import FieldUnit, add_colour_bar, colour_limits, draw_levels
 from rtradar.report.figures.fitting import fitted_limits
 from rtradar.report.figures.maps import rdt_points
-from rtradar.report.pages.html import (
-    Titles,
-    contents,
-    mapping_table,
-    picture,
-    player,
-    table,
-    write_page,
-)
+from rtradar.report.pages.html import write_page
 from rtradar.report.pages.labels import stage_label
 from rtradar.report.view.run_view import RunView
 from rtradar.report.view.three_d import posed_figure
@@ -31,18 +22,6 @@ MOST_STEPS = 60
 """Largest number of moments that the page shows."""
 
 _STEPS_HZ = 20.0
-_NOTE = """<p class="note">Differences are to the reference, {}. Maps are compared in decibels:
-range-Doppler in the cells that either model detects, spectrograms in the cells 10 dB above the
-median of either. All models have the same noise, sample by sample. Echo power is of one chirp every
-10 ms, each from another Tx, which makes it saw.</p>"""
-_FOLDER_NOTE = """<p class="note">Differences are to the reference, {}, frame by frame from the
-start of both. Maps are compared in decibels: range-Doppler in the cells that either detects,
-spectrograms in the cells 10 dB above the median of either. Where the units of the samples differ,
-the mean difference is the factor between both, and root mean squares are about it.</p>"""
-_MAP_NOTE = """<p class="note">All maps have the same axes and colours. A difference is in decibels,
-the model less the reference, {}: red where the model is stronger. Below the floor of the colours
-nothing differs. The pointer shows range, velocity and level. Each model has a folder with its own
-report, and <code>rtradar view</code> of that folder shows its echoes.</p>"""
 
 
 def draw_power_over_time(
@@ -163,34 +142,33 @@ def write_comparison(
     measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts;
     ``views`` are the data of the maps of each model, the reference last.
     """
-    models, reference = summary["fidelities"], escape(summary["reference"])
-    columns = ["", *models]
-    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
-    parameters = {key: value for key, value in summary["parameters"].items() if key != "radar"}
-    sections = {
-        "side": ("Side by side", _panels(list(views)) + _MAP_NOTE.format(reference)),
-        "measures": ("What differs", _wide(table(rows[1:], rows[0])) + _NOTE.format(reference)),
-        "maps": ("Pictures", f'<div class="pictures">{drawn}</div>'),
-        "parts": (
-            "Mean echo power by part",
-            f'<p class="note">{escape(unit.label())}</p>'
-            + _wide(table(_parts(models, unit), columns)),
-        ),
-        "parameters": ("Settings of all runs", _wide(mapping_table(parameters))),
-        "cost": ("Cost: seconds for each stage", _wide(table(_times(models), columns))),
+    models, parameters = summary["fidelities"], summary["parameters"]
+    *others, reference = views
+    values = {
+        "heading": str(parameters["motion"]),
+        "subtitle": f"{parameters['radar']['name']}: {', '.join(models)}",
+        "sections": {
+            "side": "Side by side",
+            "measures": "What differs",
+            "maps": "Pictures",
+            "parts": "Mean echo power by part",
+            "parameters": "Settings of all runs",
+            "cost": "Cost: seconds for each stage",
+        },
+        "panels": {
+            "figure": "The body",
+            **{f"map-{k}": name for k, name in enumerate(others)},
+            f"map-{len(others)}": f"{reference} (reference)",
+            **{f"difference-{k}": f"{name} less {reference}" for k, name in enumerate(others)},
+        },
+        "parameters": {"": parameters},
+        "head": ["", *models],
+        "parts": _parts([*models.values()], unit),
+        "power_label": unit.label(),
+        "stages": _stages([*models.values()]),
     }
-    subtitle = f"{summary['parameters']['radar']['name']}: {', '.join(models)}"
-    write_page(
-        path,
-        Titles("rtradar compare", str(summary["parameters"]["motion"]), subtitle),
-        contents({name: title for name, (title, _) in sections.items()}),
-        (
-            f'<section id="{name}"><h2>{escape(title)}</h2>{text}</section>\n'
-            for name, (title, text) in sections.items()
-        ),
-        data=comparison_data(views),
-        scripts=("plots.js", "figure.js", "compare.js"),
-    )
+    scripts = ("plots.js", "figure.js", "compare.js")
+    _write(path, summary, rows, pictures, values, data=comparison_data(views), scripts=scripts)
 
 
 def write_folders(
@@ -200,37 +178,38 @@ def write_folders(
     pictures: Mapping[str, Path],
 ) -> None:
     """Write a comparison of folders as a page: what `write_comparison` writes, but for models."""
-    folders, reference = summary["folders"], escape(summary["reference"])
-    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
-    settings = "".join(
-        f"<h3>{escape(name)}</h3>"
-        + _wide(mapping_table({k: v for k, v in found["parameters"].items() if k != "radar"}))
-        for name, found in folders.items()
-    )
-    differ = [
-        (key, *(str(values.get(name, "")) for name in folders))
-        for key, values in summary["differ"].items()
-    ]
-    apart = _wide(table(differ, ("setting", *folders))) if differ else "<p>None differs.</p>"
-    sections = {
-        "measures": (
-            "What differs",
-            _wide(table(rows[1:], rows[0])) + _FOLDER_NOTE.format(reference),
-        ),
-        "settings": ("Settings that differ", apart),
-        "maps": ("Pictures", f'<div class="pictures">{drawn}</div>'),
-        "parameters": ("Settings", settings),
-    }
+    folders = summary["folders"]
     radar = folders[summary["reference"]]["parameters"]["radar"]["name"]
-    write_page(
-        path,
-        Titles("rtradar compare", " and ".join(folders), str(radar)),
-        contents({name: title for name, (title, _) in sections.items()}),
-        (
-            f'<section id="{name}"><h2>{escape(title)}</h2>{text}</section>\n'
-            for name, (title, text) in sections.items()
-        ),
-    )
+    values = {
+        "heading": " and ".join(folders),
+        "subtitle": str(radar),
+        "sections": {
+            "measures": "What differs",
+            "settings": "Settings that differ",
+            "maps": "Pictures",
+            "parameters": "Settings",
+        },
+        "parameters": {name: found["parameters"] for name, found in folders.items()},
+        "folders": folders,
+        "differ": [
+            (key, *(str(values.get(name, "")) for name in folders))
+            for key, values in summary["differ"].items()
+        ],
+    }
+    _write(path, summary, rows, pictures, values)
+
+
+def _write(
+    path: Path,
+    summary: Mapping[str, Any],
+    rows: Sequence[Sequence[str]],
+    pictures: Mapping[str, Path],
+    values: Mapping[str, Any],
+    **options: Any,
+) -> None:
+    shared = {"kind": "rtradar compare", "reference": summary["reference"]}
+    shared |= {"rows": rows, "pictures": pictures}
+    write_page(path, "compare.html", shared | dict(values), **options)
 
 
 def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
@@ -266,38 +245,14 @@ def _spread(one: NDArray[np.float64], other: NDArray[np.float64], floor_db: floa
     return float(np.percentile(differences, 95)) if len(differences) else 0.0
 
 
-def _panels(models: Sequence[str]) -> str:
-    *others, reference = map(escape, models)
-    titles = {"figure": "The body"}
-    maps = (*others, f"{reference} (reference)")
-    titles |= {f"map-{number}": name for number, name in enumerate(maps)}
-    titles |= {f"difference-{k}": f"{name} less {reference}" for k, name in enumerate(others)}
-    panels = "".join(
-        f'<section><h2>{title}</h2><div class="scene" id="scene-{name}"></div></section>'
-        for name, title in titles.items()
-    )
-    return f'{player()}<div class="linked even">{panels}</div>'
+def _parts(models: Sequence[Mapping[str, Any]], unit: FieldUnit) -> Iterator[list[str]]:
+    for part in models[0]["part_power_m2"]:
+        powers = [model["part_power_m2"][part] for model in models]
+        levels = (f"{unit.level(power):.1f}" if power > 0 else "occluded" for power in powers)
+        yield [part.capitalize(), *levels]
 
 
-def _parts(models: Mapping[str, Any], unit: FieldUnit) -> list[list[str]]:
-    rows = []
-    for part in next(iter(models.values()))["part_power_m2"]:
-        powers = np.array([model["part_power_m2"][part] for model in models.values()])
-        shown = zip(powers, unit.level(powers), strict=True)
-        levels = (f"{level:.1f}" if power > 0 else "occluded" for power, level in shown)
-        rows.append([part.capitalize(), *levels])
-    return rows
-
-
-def _times(models: Mapping[str, Any]) -> list[list[str]]:
-    stages = dict.fromkeys(stage for found in models.values() for stage in found["stages"])
-    rows = []
-    for stage in stages:
-        seconds = (model["stages"].get(stage) for model in models.values())
-        texts = ("-" if value is None else f"{value:.3f}" for value in seconds)
-        rows.append([stage_label(stage), *texts])
-    return rows
-
-
-def _wide(text: str) -> str:
-    return f'<div class="wide">{text}</div>'
+def _stages(models: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    for stage in dict.fromkeys(stage for found in models for stage in found["stages"]):
+        seconds = (model["stages"].get(stage) for model in models)
+        yield [stage_label(stage), *("-" if one is None else f"{one:.3f}" for one in seconds)]

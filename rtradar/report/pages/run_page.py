@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from html import escape
-from itertools import chain
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +13,20 @@ from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import field_unit
 from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages import html
-from rtradar.report.pages.html import mapping_table, picture, table, write_page
+from rtradar.report.pages.html import write_page
 from rtradar.report.pages.labels import grouped, minus, signal_to_noise
-from rtradar.report.pages.room_section import ROOM_PICTURES, room_section
 from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import rdt_data, spatial_data
 
-_MORE_VIEWS = """<p class="note">The same for every frame, on a page of its own:
-<code>rtradar view DIR</code>, where DIR is the folder of this page.</p>"""
+ROOM_PICTURES = ("plan.png", "range_azimuth_walls.png", "clutter_removal.png")
+"""Files of pictures that belong to a room, in the order of the section."""
+
+_COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
+_ELSEWHERE = (
+    *("parameters", "limits", "stages", "versions", "part_power_m2", "modelled", "room", "people"),
+    *(*_COSTS, "fidelity", "seed", "files"),
+)
+"""Keys of a summary that have a place of their own on the page."""
 
 
 def write_report(
@@ -65,67 +68,40 @@ def write_report(
         If a picture is missing or is not a PNG file, or ``rdt_points`` has a wrong shape or values
         that are not finite.
     """
-    parameters = summary.get("parameters", {})
+    parameters = dict(summary.get("parameters", {}))
     data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
     if spatial is not None:
         data["spatial"] = spatial_data(spatial, radar)
+    clouds = dict(data)
+    values = _summary(summary, radar) | _room(summary.get("room"), radar, pictures)
     scripts = ["plots.js"]
     if run_view is not None:
         data |= view_data(run_view) | {"name": Path(path).stem}
         scripts += ["figure.js", "linked.js"]
-    sections = _sections(summary, radar, data, pictures, run_view)
-    links = {name: title for name, title, _ in sections}
+        values |= linked_views(run_view)
+    shown = {
+        "figure": ("The moving body, its echoes and its maps", run_view),
+        "rdt": ("Range-Doppler-time cloud", run_view is None),
+        "spatial": ("Spatial cloud", spatial),
+        "maps": ("Maps", values["pictures"]),
+        "room": ("The room", values["room"]),
+        "limits": ("Limits of this result", True),
+        "parameters": ("Radar and settings", True),
+        "cost": ("Cost", values["costs"] or values["stages"] or values["versions"]),
+    }
     fidelity, scene = (str(summary.get("fidelity", "")), str(parameters.get("scene", "")))
     told = (f"radar {radar.name}", fidelity and f"fidelity {fidelity}", scene)
-    write_page(
-        path,
-        html.Titles(
-            "rtradar report",
-            str(parameters.get("motion", "Recording")),
-            ", ".join(filter(None, told)),
-        ),
-        html.tiles(_headline(summary, np.asarray(rdt_points, dtype=np.float64)))
-        + html.contents(links),
-        chain.from_iterable(
-            chain((f'<section id="{name}"><h2>{escape(title)}</h2>',), text, ("</section>\n",))
-            for name, title, text in sections
-        ),
-        data=data,
-        scripts=(*scripts, "report.js"),
-    )
-
-
-def _sections(
-    summary: Mapping[str, Any],
-    radar: Radar,
-    data: Mapping[str, Any],
-    pictures: Mapping[str, Path],
-    run_view: RunView | None,
-) -> list[tuple[str, str, Iterable[str]]]:
-    """Return identifier, title and HTML of the sections, in their order."""
-    room = summary.get("room")
-    of_room = {title: path for title, path in pictures.items() if Path(path).name in ROOM_PICTURES}
-    others = {title: path for title, path in pictures.items() if not (room and title in of_room)}
-    sections: list[tuple[str, str, Iterable[str]]] = []
-    if run_view is not None:
-        text = linked_views(run_view) + _MORE_VIEWS
-        sections.append(("figure", "The moving body, its echoes and its maps", (text,)))
-    else:
-        sections.append(("rdt", "Range-Doppler-time cloud", (_rdt(data),)))
-    if "spatial" in data:
-        sections.append(("spatial", "Spatial cloud", (_spatial(data["spatial"]),)))
-    if others:
-        sections.append(("maps", "Maps", _pictures(others)))
-    if room:
-        text = room_section(room, radar, of_room)
-        sections.append(("room", "The room", (text,)))
-    limits = html.limits_list(summary.get("limits", ()))
-    sections.append(("limits", "Limits of this result", (limits,)))
-    sections.append(("parameters", "Radar and settings", (_parameters(summary, radar),)))
-    cost = _cost(summary)
-    if cost:
-        sections.append(("cost", "Cost", (cost,)))
-    return sections
+    values |= {
+        "kind": "rtradar report",
+        "heading": str(parameters.get("motion", "Recording")),
+        "subtitle": ", ".join(filter(None, told)),
+        "headline": _headline(summary, np.asarray(rdt_points, dtype=np.float64)),
+        "sections": {name: title for name, (title, there) in shown.items() if there},
+        "radar": radar,
+        "clouds": clouds,
+        "shown_db": SHOWN_DB,
+    }
+    write_page(path, "report.html", values, data=data, scripts=(*scripts, "report.js"))
 
 
 def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:
@@ -151,119 +127,67 @@ def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterat
         yield f"{summary['capture_s']:.2f} s", "of radar"
 
 
-def _rdt(data: Mapping[str, Any]) -> str:
-    return _scene("rdt", data["rdt"], "The surface about the detections of all frames, sampled.")
-
-
-def _spatial(cloud: Mapping[str, Any]) -> str:
-    note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
-    measured = dict(zip("xyz", cloud["measured"], strict=True))
-    if not all(measured.values()):
-        angle = "azimuth" if measured["z"] else "elevation"
-        note += (
-            f" An array on one line does not measure {angle}: "
-            "x is the distance from that line, added to the radar's x."
-        )
-    return _scene("spatial", cloud, note)
-
-
-def _scene(name: str, cloud: Mapping[str, Any], note: str) -> str:
-    if not cloud["count"]:
-        return '<p class="empty">Nothing was detected.</p>'
-    if cloud["shown"] != cloud["count"]:
-        note += f" {cloud['shown']} of {cloud['count']} points are shown."
-    return f'<div class="scene" id="scene-{name}"></div><p class="note">{note}</p>'
-
-
-def _pictures(pictures: Mapping[str, Path]) -> Iterator[str]:
-    yield '<div class="pictures">'
-    for title, path in pictures.items():
-        yield picture(title, Path(path)) + "\n"
-    yield "</div>"
-
-
-def _parameters(summary: Mapping[str, Any], radar: Radar) -> str:
+def _summary(summary: Mapping[str, Any], radar: Radar) -> dict[str, Any]:
+    """Return the parts of a summary by their places on the page."""
     parameters = dict(summary.get("parameters", {}))
-    settings = parameters.pop("radar", {})
-    own = (
-        "parameters",
-        "limits",
-        "stages",
-        "versions",
-        "part_power_m2",
-        "modelled",
-        "room",
-        "people",
-    )
-    listed = (*own, *_COSTS, "fidelity", "seed", "files")
-    others = {key: value for key, value in summary.items() if key not in listed}
-    modelled = summary.get("modelled", {})
-    models = {**modelled.get("ways", {}), **modelled.get("why", {})}
     power = summary.get("part_power_m2", {})
-    total = sum(power.values()) or 1.0
-    # In the unit of the picture of the parts.
-    unit = field_unit(
-        radar,
-        spreading=parameters.get("spreading", True),
-        strongest_m2=max(power.values(), default=1.0),
-    )
-    powers = (
-        (name.capitalize(), f"{level:.1f}" if value else "-", f"{value / total:.1%}")
-        for (name, value), level in zip(power.items(), unit.level([*power.values()]), strict=True)
-    )
-    fractions = ((name, f"{value:.1%}") for name, value in models.items())
-    doubles = (
-        (one["first"].capitalize(), one["last"], f"{one['over_single_reflections_db']:.1f} dB")
-        for one in modelled.get("double_reflections", ())
-    )
-    if "seed" in summary:
-        parameters["seed"] = summary["seed"]
-    return _tables(
-        ("What the radar can measure", html.limits_table(radar)),
-        ("Settings of the run", mapping_table(parameters)),
-        ("Radar", mapping_table(settings)),
-        ("What was found", mapping_table(others)),
-        ("People", _people(summary.get("people", ()))),
-        ("How parts were modelled, of all parts and time", table(fractions)),
-        (
-            "Reflections from part to part",
-            table(doubles, ("First", "Last", "Power over all single reflections")),
+    strongest = max(power.values(), default=1.0)
+    return {
+        "summary": summary,
+        "own_radar": parameters.pop("radar", {}),
+        "settings": parameters | {key: summary[key] for key in ("seed",) if key in summary},
+        "found": {key: value for key, value in summary.items() if key not in _ELSEWHERE},
+        "powers": power,
+        # That of the picture of the parts.
+        "unit": field_unit(
+            radar, spreading=parameters.get("spreading", True), strongest_m2=strongest
         ),
-        ("Echo power by part", table(powers, ("", unit.label("mean"), "Of all"))),
-    )
+        "costs": {name: summary[name] for name in _COSTS if name in summary},
+        "stages": summary.get("stages", {}),
+        "versions": summary.get("versions", {}),
+    }
 
 
-def _people(people: Sequence[Mapping[str, Any]]) -> str:
-    """Make the table of who is where, and how strong their echoes are."""
-    rows = (
-        (
-            one["name"],
-            "({:g}, {:g}) m, {:g}°".format(*one["position_m"], one["heading_deg"]),
-            one["material"],
-            "-" if one["snr_db"] is None else f"{one['snr_db']:.1f} dB",
-        )
-        for one in people
-    )
-    return table(rows, ("", "Place, heading", "Material", "SNR"))
+def _room(
+    room: Mapping[str, Any] | None, radar: Radar, pictures: Mapping[str, Path]
+) -> dict[str, Any]:
+    """Return what the page tells about a room, and the pictures that are none of a room."""
+    if not room:
+        return {"room": None, "pictures": pictures}
+    own = {title: path for title, path in pictures.items() if Path(path).name in ROOM_PICTURES}
+    ghosts = sorted(room.get("ghosts", {}).get("paths", ()), key=lambda one: -one["power_m2"])
+    unit = field_unit(radar, range_m=np.array([ghost["range_m"] for ghost in ghosts]))
+    levels = unit.level([ghost["power_m2"] for ghost in ghosts])
+    clutter = room.get("clutter", {})
+    left_out: list[tuple[Any, ...]] = []
+    for path in room.get("paths", ()):
+        if lacking := len(path["dropped"]):
+            parts = f"{lacking} of {lacking + len(path['kept'])} parts"
+            left_out.append((path["path"], parts, path["why"]))
+    left_out += [(one["name"], one["kind"], one["reason"]) for one in clutter.get("dropped", ())]
+    faces = (face for face in room.get("faces", ()) if face["reason"])
+    left_out += [(face["name"], "ghosts over a face", face["reason"]) for face in faces]
+    return {
+        "room": room,
+        "room_pictures": dict(
+            sorted(own.items(), key=lambda one: ROOM_PICTURES.index(Path(one[1]).name))
+        ),
+        "pictures": {title: path for title, path in pictures.items() if title not in own},
+        "room_tiles": _room_tiles(room, clutter),
+        "ghosts": list(zip(ghosts, levels, strict=True)),
+        "ghost_unit": unit,
+        "left_out": left_out,
+    }
 
 
-_COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
-
-
-def _cost(summary: Mapping[str, Any]) -> str:
-    costs = {name: summary[name] for name in _COSTS if name in summary}
-    versions = ((name, str(value)) for name, value in summary.get("versions", {}).items())
-    return _tables(
-        ("Time and memory", mapping_table(costs)),
-        ("Time of each stage", html.stages_table(summary.get("stages", {}))),
-        ("Versions", table(versions)),
-    )
-
-
-def _tables(*found: tuple[str, str]) -> str:
-    shown = "".join(
-        f'<div class="wide"><h3>{title}</h3>{text}</div>\n'
-        for title, text in found
-        if "<tbody></tbody>" not in text
-    )
-    return f'<div class="tables">{shown}</div>\n' if shown else ""
+def _room_tiles(room: Mapping[str, Any], clutter: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what was found out about a room, as figures with captions."""
+    if (before := clutter.get("signal_to_clutter_db")) is not None:
+        yield minus(f"{before:.1f} dB"), "signal to clutter, as received"
+    if (after := clutter.get("after_removal_db")) is not None:
+        yield minus(f"\u2265 {after:.1f} dB"), "signal to clutter, after removal"
+    if paths := [path for path in room.get("paths", ()) if path["order"]]:
+        kept = sum(1 for path in paths if path["kept"])
+        yield f"{kept} of {len(paths)}", "paths over walls are above the noise"
+    if ghosts := room.get("ghosts"):
+        yield str(len(ghosts["paths"])), f"ghosts at {ghosts['time_s']:.2f} s"

@@ -9,10 +9,8 @@ import base64
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from itertools import cycle, islice
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages.html import Titles, player, write_page
+from rtradar.report.pages.html import write_page
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import (
     packed_floats,
@@ -40,21 +38,6 @@ VELOCITY_COLOURS = (
     (0.56, "#f0a184"), (0.75, "#d9371f"), (1.0, "#6b0f0f"),
 )  # fmt: skip
 """Colour scale from approaching to receding, in which slow motion differs clearly from rest."""
-
-_LINKED = """<div class="linked $style">
-<section><h2>Body and paths</h2><div class="scene" id="scene-figure"></div></section>
-<section><h2>Range-Doppler map of this window, and where echoes are</h2>
-<div class="scene" id="scene-map"></div></section>
-<section><h2>Range-Doppler-time cloud</h2>$cloud</section>
-<section><h2>Spectrogram</h2>$spectrogram</section>
-</div>
-<p class="note">$bodies Lines are paths from the middle of
-the array to the specular point of the part, and back; dots on the map are the same echoes,
-diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are occluded from
-the radar; grey points of the cloud are of the room or of noise.$objects A click on the spectrogram
-goes to its time; the pointer shows range, velocity and level of what is below it. World axes: x
-from the radar to the person, y to the left seen from the radar, z up.</p>
-"""
 
 GROUPS = {
     "head, neck": "#cc79a7",
@@ -257,48 +240,19 @@ class RunView:
         return found
 
 
-def _controls(run_view: RunView, colour: str) -> str:
-    chosen = {name: " selected" if name == colour else "" for name in COLOURS}
-    options = "".join(f'<option value="{n}"{mark}>{n}</option>' for n, mark in chosen.items())
-    style = '<span><i style="background:{}"></i>{}</span>'
-    legend = "".join(style.format(tint, name) for name, tint in GROUPS.items())
-    meshes, people = run_view.snapshots.mesh_source, len(run_view.snapshots.person_names)
-    who = "".join(
-        style.format(tint, f"{escape(name)}{mesh}<b></b>")
-        for number, (name, tint) in enumerate(
-            zip(run_view.source_names, run_view.source_colours, strict=True)
-        )
-        for mesh in [", a mesh" if number < people and number in meshes else ""]
-    )
-    return player(
-        f'<label>Colour by <select id="colour">{options}</select></label>'
-        '<label>Paths <select id="paths"><option value="all">all</option>'
-        '<option value="direct">direct</option><option value="none">none</option></select></label>'
-        '<button type="button" id="save">Save as PNG</button>'
-        f'<div class="groups" id="groups">{legend}</div><div class="groups" id="people">{who}</div>'
-    )
-
-
-def linked_views(run_view: RunView, colour: str | None = None, style: str = "") -> str:
-    """Return the HTML of the linked views with their controls, for a page with ``linked.js``.
+def linked_views(run_view: RunView, colour: str | None = None, layout: str = "") -> dict[str, Any]:
+    """Return the values of the template ``linked.html``, the linked views with their controls.
 
     Colours show ``colour``, one of `COLOURS`, until the reader chooses another, by default that of
-    the view; ``style`` is another class of the element for the page's style sheet.
+    the view; ``layout`` is another class of the element for the page's style sheet.
     """
-    cloud, spectrogram = (
-        f'<div class="scene" id="scene-{view}"></div>' for view in ("rdt", "spectrogram")
-    )
-    if not len(run_view.rdt_points):
-        cloud = '<p class="empty">Nothing was detected.</p>'
-    if not run_view.spectrogram.level.size:
-        spectrogram = '<p class="empty">The capture is too short for one.</p>'
-    parts = {"cloud": cloud, "spectrogram": spectrogram, "style": style}
-    drawn, objects = run_view.snapshots.drawn_parts, len(run_view.snapshots.object_names)
-    ellipsoids = "Each ellipsoid is a body part of the echo model." if drawn.any() else ""
-    mesh = "" if drawn.all() else " A body that is a mesh is drawn with fewer triangles."
-    parts["bodies"] = ellipsoids + mesh
-    parts["objects"] = " Echoes of objects have no marks and no lines." if objects else ""
-    return _controls(run_view, colour or run_view.colour) + Template(_LINKED).substitute(parts)
+    return {
+        "view": run_view,
+        "colours": COLOURS,
+        "colour": colour or run_view.colour,
+        "groups": GROUPS,
+        "layout": layout,
+    }
 
 
 def write_view(
@@ -309,11 +263,15 @@ def write_view(
     Pictures that the page saves are called ``name``. When it opens, colours show ``colour``, one of
     `COLOURS`, by default that of the view. InputError if the file cannot be written.
     """
+    titles = {
+        "kind": "rtradar view",
+        "heading": run_view.heading,
+        "subtitle": run_view.subtitle,
+    }
     write_page(
         path,
-        Titles("rtradar view", run_view.heading, run_view.subtitle),
-        "",
-        (linked_views(run_view, colour, style="whole"),),
+        "view.html",
+        titles | linked_views(run_view, colour, layout="whole"),
         data=view_data(run_view) | {"name": name},
         scripts=("plots.js", "figure.js", "linked.js", "view.js"),
     )
