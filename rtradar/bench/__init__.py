@@ -17,14 +17,13 @@ from rtradar.bench.report import draw, tables
 from rtradar.bench.runs import (
     IF_STAGE,
     MOTION,
-    Baseline,
     Run,
     RunError,
     Runner,
-    Spread,
     by_stage,
     measure_baseline,
     paired_ratio,
+    spread,
 )
 from rtradar.radar import Radar
 from rtradar.system.files import atomic_file, check_place, temporary_folder, write_json
@@ -114,11 +113,10 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         row[f"over_{CHEAPEST}"] = reference and paired_ratio(
             [run.to_cloud_s for run in own], [run.to_cloud_s for run in reference]
         )
-        baseline = baselines[case.radar]
-        row["paper_over"] = baseline and _paper_over(baseline, radars[case.radar], row)
+        row["paper_over"] = _paper_over(baselines[case.radar], radars[case.radar], row)
         found["models"].append(row)
     found["rates"] = {radars[name].name: own._asdict() for name, own in rates.items()}
-    known = {radars[name].name: asdict(own) for name, own in baselines.items() if own is not None}
+    known = {radars[name].name: own for name, own in baselines.items() if own is not None}
     missing = "there is no paper_numpy.py among the validation scripts; use a checkout, or install "
     found["paper"] = {"trouble": "" if known else missing + "rtradar again", "radars": known}
     found["growth"]["chirps"] = _chirp_rows(found["models"])
@@ -129,26 +127,24 @@ def _model_row(case: Case, runs: list[Run], radar: Radar, rates: Rates) -> Row:
     summary = runs[0].summary
     work = Work.of(radar, summary)
     least, none = floors(work, rates), {"floor": None, "rule": ""}
+    stages = by_stage([run.stages for run in runs])
     return {
         "radar": radar.name,
         "fidelity": case.fidelity,
         "capture_s": summary["capture_s"],
         "work": work._asdict(),
-        "process_s": asdict(Spread.of([run.process_s for run in runs])),
-        "warmup_s": asdict(Spread.of([run.summary["warmup_s"] for run in runs])),
+        "process_s": spread([run.process_s for run in runs]),
+        "warmup_s": spread([run.summary["warmup_s"] for run in runs]),
         **_costs(runs),
-        "stages": {
-            name: asdict(seconds) | least.get(name, none)
-            for name, seconds in by_stage([run.stages for run in runs]).items()
-        },
+        "stages": {name: seconds | least.get(name, none) for name, seconds in stages.items()},
     }
 
 
 def _costs(runs: list[Run]) -> Row:
     return {
-        "to_cloud_s": asdict(Spread.of([run.to_cloud_s for run in runs])),
-        "whole_s": asdict(Spread.of([run.whole_s for run in runs])),
-        "peak_memory_mb": max(run.peak_memory_mb for run in runs),
+        "to_cloud_s": spread([run.to_cloud_s for run in runs]),
+        "whole_s": spread([run.whole_s for run in runs]),
+        "peak_memory_mb": max(float(run.summary["peak_memory_mb"]) for run in runs),
     }
 
 
@@ -165,17 +161,19 @@ def _first_use(first: Run, runs: list[Run]) -> dict[str, float]:
     }
 
 
-def _paper_over(baseline: Baseline, radar: Radar, row: Row) -> dict[str, float]:
+def _paper_over(baseline: Row | None, radar: Radar, row: Row) -> dict[str, float] | None:
     """How many times longer the paper's method takes for the same chirps: medians.
 
     ``to_cloud`` is all of it, which ends at detections, over ours, which goes on to the cloud;
     ``if`` echoes and IF alone.
     """
+    if baseline is None:
+        return None
     frames = row["work"]["chirps"] / radar.chirps_per_frame
     ours_if = sum(row["stages"][name]["median"] for name in ("scatter", "signal"))
     return {
-        "to_cloud": frames * baseline.total.median / row["to_cloud_s"]["median"],
-        "if": frames * baseline.stages[IF_STAGE].median / ours_if,
+        "to_cloud": frames * baseline["total"]["median"] / row["to_cloud_s"]["median"],
+        "if": frames * baseline["stages"][IF_STAGE]["median"] / ours_if,
     }
 
 

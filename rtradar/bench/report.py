@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, BinaryIO
+
+import numpy as np
 
 from rtradar.bench.plan import CHEAPEST
 from rtradar.bench.runs import NOT_TO_CLOUD
+from rtradar.system.figure_style import dress, new_figure, save_figure
 
 Row = dict[str, Any]
 
@@ -33,7 +36,7 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
             f"{own['random_words'] / 1e6:.0f} million random words, "
             f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
         )
-        yield _models(models)
+        yield _filled(_MODELS, models)
         trouble = found["paper"]["trouble"]
         missing = f"the paper's method was not timed: {trouble}"
         yield missing if trouble else _paper(found["paper"]["radars"])
@@ -42,26 +45,44 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
     yield from _growth(found["growth"])
 
 
-def _models(models: Sequence[Row]) -> str:
-    head = ["radar", "model", "to the cloud: best", "median", "whole run", "first use adds"]
-    head += ["peak memory", f"over `{CHEAPEST}`", "paper's method over it"]
-    lines = [
-        [
-            row["radar"],
-            f"`{row['fidelity']}`",
-            f"{row['to_cloud_s']['best']:.2f} s",
-            _median(row["to_cloud_s"]),
-            _median(row["whole_s"]),
-            f"{row['first_use']['adds_s']:.1f} s" if row["first_use"] else "-",
-            _memory(row),
-            f"{row[f'over_{CHEAPEST}']:.2f}" if row[f"over_{CHEAPEST}"] else "-",
-            "{to_cloud:.3g} (IF {if:.3g})".format(**row["paper_over"])
-            if row["paper_over"]
-            else "-",
-        ]
-        for row in models
-    ]
-    return table(head, lines)
+_MODELS = {
+    "radar": "{radar}",
+    "model": "`{fidelity}`",
+    "to the cloud: best": "{to_cloud_s[best]:.2f} s",
+    "median": "{to_cloud_s[median]:.2f} s",
+    "whole run": "{whole_s[median]:.2f} s",
+    "first use adds": "{first_use[adds_s]:.1f} s",
+    "peak memory": "{peak_memory_mb:.0f} MB",
+    f"over `{CHEAPEST}`": f"{{over_{CHEAPEST}:.2f}}",
+    "paper's method over it": "{paper_over[to_cloud]:.3g} (IF {paper_over[if]:.3g})",
+}
+_CHIRPS = {
+    "radars": "{radar} / {of_radar}",
+    "model": "`{fidelity}`",
+    "chirps": "{chirps:.2f}",
+    "to the cloud": "{to_cloud:.2f}",
+    "peak memory": "{peak_memory:.2f}",
+}
+_DURATIONS = {
+    "to the cloud": "{to_cloud_s[median]:.2f} s",
+    "whole run": "{whole_s[median]:.2f} s",
+    "to the cloud a second, over the first": "{growth:.3f}",
+    "peak memory": "{peak_memory_mb:.0f} MB",
+}
+
+
+def _filled(columns: Mapping[str, str], rows: Sequence[Row]) -> str:
+    """Fill in the templates of the columns for each row, with a dash for what it lacks."""
+    lines = []
+    for row in rows:
+        cells = []
+        for template in columns.values():
+            try:
+                cells.append(template.format(**row))
+            except TypeError:  # None has no keys and no digits
+                cells.append("-")
+        lines.append(cells)
+    return table(list(columns), lines)
 
 
 def _paper(radars: dict[str, Any]) -> str:
@@ -69,7 +90,7 @@ def _paper(radars: dict[str, Any]) -> str:
     lines = []
     for radar, baseline in radars.items():
         stages = [f"{baseline['stages'][name]['median']:.3f} s" for name in names]
-        lines.append([radar, *stages, _median(baseline["total"])])
+        lines.append([radar, *stages, f"{baseline['total']['median']:.2f} s"])
     return table(["the paper's method in NumPy, one thread, a frame", *names, "all"], lines)
 
 
@@ -96,28 +117,14 @@ def _stages(radar: str, models: Sequence[Row]) -> str:
 
 
 def _growth(growth: dict[str, Any]) -> Iterator[str]:
-    lines = []
-    for row in growth["chirps"]:
-        times = [f"{row[name]:.2f}" for name in ("chirps", "to_cloud", "peak_memory")]
-        lines.append([f"{row['radar']} / {row['of_radar']}", f"`{row['fidelity']}`", *times])
-    if lines:
-        yield table(["radars", "model", "chirps", "to the cloud", "peak memory"], lines)
-    lines = []
-    seconds = [row["to_cloud_s"]["median"] / row["capture_s"] for row in growth["duration"]]
-    for row, own in zip(growth["duration"], seconds, strict=True):
-        times = [_median(row["to_cloud_s"]), _median(row["whole_s"]), f"{own / seconds[0]:.3f}"]
-        lines.append([f"{row['duration_s']:g} s", *times, _memory(row)])
-    if lines:
-        head = [f"recording, `{growth['fidelity']}`", "to the cloud", "whole run"]
-        yield table([*head, "to the cloud a second, over the first", "peak memory"], lines)
-
-
-def _median(spread: Row) -> str:
-    return f"{spread['median']:.2f} s"
-
-
-def _memory(row: Row) -> str:
-    return f"{row['peak_memory_mb']:.0f} MB"
+    if growth["chirps"]:
+        yield _filled(_CHIRPS, growth["chirps"])
+    rows = growth["duration"]
+    seconds = [row["to_cloud_s"]["median"] / row["capture_s"] for row in rows]
+    if rows:
+        head = {f"recording, `{growth['fidelity']}`": "{duration_s:g} s"}
+        grown = zip(rows, seconds, strict=True)
+        yield _filled(head | _DURATIONS, [row | {"growth": s / seconds[0]} for row, s in grown])
 
 
 def _over(seconds: float, floor: float | None) -> str:
@@ -141,56 +148,40 @@ def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
 def draw(found: dict[str, Any], file: BinaryIO) -> None:
     """Draw what `rtradar.bench.bench` found, as PNG."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
     models, growth = found["models"], found["growth"]
     radars = list(dict.fromkeys(row["radar"] for row in models))
     rows = max(1, len(radars) + bool(growth["duration"]))
-    figure = plt.figure(figsize=(11, 3.4 * rows), layout="constrained")
+    figure = new_figure(3.4 * rows, width_in=11)
     places = list(figure.subplots(rows, 1, squeeze=False)[:, 0])
     for axes, radar in zip(places, radars, strict=False):
         _bars(axes, [row for row in models if row["radar"] == radar], radar)
     if growth["duration"]:
         _growing(places[-1], growth["duration"], growth["fidelity"])
-    figure.savefig(file, format="png", dpi=110)
-    plt.close(figure)
+    save_figure(figure, file)
 
 
 def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
     """Stages side by side, hatched unless they lead to the cloud; bounds as black bars in them."""
-    import matplotlib as mpl
+    from matplotlib import colormaps
 
-    colours = mpl.colormaps["tab20"]
+    colours = colormaps["tab20"]
     names = list(dict.fromkeys(name for row in models for name in row["stages"]))
     names.sort(key=lambda name: name in NOT_TO_CLOUD)  # stays in order otherwise
-    for number, row in enumerate(models):
-        left = 0.0
-        for place, name in enumerate(names):
-            stage = row["stages"].get(name)
-            if stage is None:
-                continue
-            axes.barh(
-                number,
-                stage["median"],
-                left=left,
-                color=colours(place % colours.N),
-                hatch="//" if name in NOT_TO_CLOUD else None,
-                label=None if number else name,
-                height=0.7,
-            )
-            if stage["floor"]:
-                axes.barh(number, stage["floor"], left=left, color="black", height=0.15)
-            left += stage["median"]
+    rows, left = range(len(models)), np.zeros(len(models))
+    for place, name in enumerate(names):
+        own = [row["stages"].get(name, {"median": 0.0, "floor": 0.0}) for row in models]
+        style = {"color": colours(place % colours.N), "label": name}
+        style |= {"hatch": "//"} if name in NOT_TO_CLOUD else {}
+        axes.barh(rows, [stage["median"] for stage in own], 0.7, left, **style)
+        axes.barh(rows, [stage["floor"] or 0.0 for stage in own], 0.15, left, color="black")
+        left += [stage["median"] for stage in own]
     axes.barh([0], [0], color="black", label="floor")
-    axes.set_yticks(range(len(models)), [row["fidelity"] for row in models])
+    axes.set_yticks(rows, [row["fidelity"] for row in models])
     axes.invert_yaxis()
     capture_s = models[0]["capture_s"]
     axes.set(ylabel="model", xlabel=f"time of a run of {capture_s:.2f} s of radar, median [s]")
-    axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9, parse_math=False)
-    axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    dress(axes, title=f"{radar} (hatched: does not lead to the cloud)", grid=False)
 
 
 def _growing(axes: Any, rows: Sequence[Row], fidelity: str) -> None:
@@ -199,9 +190,8 @@ def _growing(axes: Any, rows: Sequence[Row], fidelity: str) -> None:
     for name, label in (("to_cloud_s", "to the cloud"), ("whole_s", "whole run")):
         axes.plot(x, [row[name]["median"] for row in rows], "o-", label=label)
     axes.set(xlabel="recording [s]", ylabel="time [s]", xlim=(0, None), ylim=(0, None))
-    axes.set_title(f"`{fidelity}`", fontsize=9)
-    axes.legend(fontsize=7, loc="upper left")
-    axes.grid(alpha=0.2)
+    axes.legend(loc="upper left")
+    dress(axes, title=f"`{fidelity}`")
     memory, beside = [row["peak_memory_mb"] for row in rows], axes.twinx()
     beside.plot(x, memory, "s--", color="0.5", markersize=4)
     beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))

@@ -46,22 +46,9 @@ class RunError(RuntimeError):
     """A run did not end well; the message is its last line."""
 
 
-@dataclass(frozen=True)
-class Spread:
+def spread(seconds: Sequence[float]) -> dict[str, float]:
     """Best and median of some measurements of one thing [s]."""
-
-    best: float
-    median: float
-
-    @classmethod
-    def of(cls, seconds: Sequence[float]) -> Spread:
-        """Of at least one measurement."""
-        return cls(min(seconds), median(seconds))
-
-
-def with_elsewhere(stages: Mapping[str, float], wall_s: float) -> dict[str, float]:
-    """Seconds by stage, and the rest of the whole [s]; not below zero, should stages overlap."""
-    return {**stages, ELSEWHERE: max(wall_s - sum(stages.values()), 0.0)}
+    return {"best": min(seconds), "median": median(seconds)}
 
 
 def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
@@ -69,10 +56,10 @@ def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
     return wall_s - sum(stages.get(name, 0.0) for name in NOT_TO_CLOUD)
 
 
-def by_stage(runs: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
-    """Seconds by stage over runs, in order of appearance; a run without a stage spent 0 s there."""
+def by_stage(runs: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:
+    """`spread` by stage over runs, in order of appearance; a run that lacks one spent 0 s there."""
     names = dict.fromkeys(name for run in runs for name in run)
-    return {name: Spread.of([run.get(name, 0.0) for run in runs]) for name in names}
+    return {name: spread([run.get(name, 0.0) for run in runs]) for name in names}
 
 
 def paired_ratio(seconds: Sequence[float], of: Sequence[float]) -> float:
@@ -88,9 +75,10 @@ class Run:
     summary: dict[str, Any]
 
     @property
-    def stages(self) -> dict[str, float]:
-        """Seconds by stage, ``elsewhere`` among them."""
-        return with_elsewhere(self.summary["stages"], self.whole_s)
+    def stages(self) -> dict[str, Any]:
+        """Seconds by stage, ``elsewhere`` among them: not below zero, should stages overlap."""
+        stages = self.summary["stages"]
+        return stages | {ELSEWHERE: max(self.whole_s - sum(stages.values()), 0.0)}
 
     @property
     def whole_s(self) -> float:
@@ -106,11 +94,6 @@ class Run:
     def from_start_to_cloud_s(self) -> float:
         """Time to the cloud with start, imports, compiling and warm-up [s]."""
         return self.process_s - self.whole_s + self.to_cloud_s
-
-    @property
-    def peak_memory_mb(self) -> float:
-        """Largest resident size [MB]."""
-        return float(self.summary["peak_memory_mb"])
 
 
 class Runner:
@@ -143,25 +126,18 @@ class Runner:
             words += ["--out", str(out / "run")]
             what = f"{case.fidelity}, radar {case.radar}"
             began = time.perf_counter()
-            summary = _json_of(words, out / "summary.json", what, self._environment(case.fidelity))
+            home = self._folder / case.fidelity
+            home.mkdir(exist_ok=True)
+            summary = _json_of(words, out / "summary.json", what, with_caches_in(home))
             return Run(time.perf_counter() - began, summary)
-
-    def _environment(self, fidelity: str) -> dict[str, str]:
-        """Environment with all caches of compiled code and of fonts in a folder of the model."""
-        home = self._folder / fidelity
-        home.mkdir(exist_ok=True)
-        return with_caches_in(home)
 
 
 def with_caches_in(home: Path) -> dict[str, str]:
     """Environment with all caches of compiled code and of fonts in a folder."""
     # Packages of the user are found through HOME, unless their folder is named.
-    moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
-    return {
-        **os.environ,
-        "PYTHONUSERBASE": site.getuserbase(),
-        **{name: str(place) for name, place in moved.items()},
-    }
+    own = {"PYTHONUSERBASE": site.getuserbase(), "HOME": str(home)}
+    own |= {"XDG_CACHE_HOME": str(home / "cache"), "NUMBA_CACHE_DIR": str(home / "numba")}
+    return dict(os.environ) | own
 
 
 def _json_of(
@@ -177,23 +153,12 @@ def _json_of(
     return found
 
 
-@dataclass(frozen=True)
-class Baseline:
-    """Time of the paper's method for one frame, by stage and in all [s].
-
-    ``cycles`` TDM cycles were synthesised, and the times are scaled to ``cycles_per_frame``.
-    """
-
-    stages: dict[str, Spread]
-    total: Spread
-    cycles: int
-    cycles_per_frame: int
-
-
-def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | None:
+def measure_baseline(radar: str, repeats: int, *, quick: bool) -> dict[str, Any] | None:
     """Time the paper's method in plain NumPy, one thread, for some frames, or a part of each.
 
-    None where the validation scripts, one of which it is, are not there.
+    Returns the time for one frame, by ``stages`` and in ``total`` [s], scaled from the ``cycles``
+    TDM cycles that were synthesised to ``cycles_per_frame``; None where the validation scripts, one
+    of which it is, are not there.
     """
     script = validation_folder() / "other_methods" / "paper_numpy.py"
     if not script.is_file():
@@ -203,5 +168,9 @@ def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | Non
     with temporary_folder() as folder:
         found = _json_of(words, folder / "frames.json", script.name)
     frames = found["frames"]
-    total = Spread.of([sum(frame.values()) for frame in frames])
-    return Baseline(by_stage(frames), total, found["cycles"], found["cycles_per_frame"])
+    return {
+        "stages": by_stage(frames),
+        "total": spread([sum(frame.values()) for frame in frames]),
+        "cycles": found["cycles"],
+        "cycles_per_frame": found["cycles_per_frame"],
+    }

@@ -1,5 +1,163 @@
-"""What works on this machine, and what is missing."""
+"""What this machine offers rtradar, what is missing, and how to mend it."""
 
-from rtradar.doctor.examination import DoctorReport, examine, report, report_text
+from __future__ import annotations
 
-__all__ = ["DoctorReport", "examine", "report", "report_text"]
+import importlib.metadata
+import os
+import platform
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+from rtradar.errors import BackendError
+from rtradar.kernels.jit import CacheWarning, try_cache
+from rtradar.system.files import write_json
+from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
+from rtradar.trace.backends.llvm import candidates
+from rtradar.trace.backends.probe import probe_backend
+
+PACKAGES = (
+    *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh"),
+    *("h5py", "zarr", "matplotlib"),
+)
+"""Packages whose versions tell most when something goes wrong."""
+
+Report = dict[str, Any]
+
+
+def examine() -> Report:
+    """Examine this machine, which takes some seconds.
+
+    Every backend is probed anew, in a process of its own, and a function is compiled, kept and
+    loaded again.
+
+    Returns
+    -------
+    dict
+        Plain values, for JSON. ``python`` and ``system`` name the interpreter, the operating system
+        and the processor; ``cores`` are those that this process may use. The memory of the machine
+        [MiB] is None where the system does not report it, and a version where one of `PACKAGES` is
+        not installed. ``llvm`` has each libLLVM in the order of trial, ``backends`` says ``good``
+        or what is wrong with each, ``compiled_code`` where compiled code was kept and loaded again,
+        or why not. ``chosen`` is Mitsuba's variant that ``--variant auto`` takes, None where
+        nothing works; ``advice`` says what to do, most urgent first.
+    """
+    libraries = candidates()
+    results = [probe_backend(VARIANTS["llvm"], library, fresh=True) for library in libraries]
+    tried = list(zip(libraries, results, strict=True))
+    good = next((library for library, result in tried if result.good), None)
+    backends: dict[Kind, str] = {"llvm": "good" if good else "no libLLVM that works"}
+    for kind in ("scalar", "cuda"):
+        backends[kind] = probe_backend(VARIANTS[kind], good, fresh=True).finding
+    chosen, advice = _chosen(backends)
+    packages = {name: _version(name) for name in PACKAGES}
+    if missing := [name for name, version in packages.items() if version is None]:
+        advice.append(f"packages are missing; install them: pip install {' '.join(missing)}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CacheWarning)
+        compiled_code, what_to_do = try_cache()
+    if what_to_do:
+        advice.append(what_to_do)
+    total, available = _memory_mb()
+    implementation = platform.python_implementation()
+    return {
+        "python": f"{platform.python_version()} ({implementation}, {sys.executable})",
+        "system": platform.platform(),
+        "cores": len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1,
+        "memory_total_mb": total,
+        "memory_available_mb": available,
+        "packages": packages,
+        "llvm": [
+            {
+                "path": library.path,
+                "origin": library.origin,
+                "version": result.version,
+                "finding": result.finding,
+                "chosen": library is good and chosen == VARIANTS["llvm"],
+            }
+            for library, result in tried
+        ],
+        "backends": backends,
+        "compiled_code": compiled_code,
+        "chosen": chosen,
+        "advice": advice,
+    }
+
+
+def _chosen(backends: dict[Kind, str]) -> tuple[str | None, list[str]]:
+    """The variant that is chosen where it works, and advice about it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", BackendWarning)
+            backend = select("auto")
+    except BackendError as error:
+        return None, [str(error)]
+    finding, advice = backends[backend.kind], [backend.warning] if backend.warning else []
+    if finding == "good":
+        return backend.variant, advice
+    remedy = "reinstall it: pip install --force-reinstall mitsuba"
+    return None, [f"{backend.variant}: {finding}; {remedy}", *advice]
+
+
+def report_text(found: Report) -> str:
+    """The report for a person at a terminal."""
+    memory, chosen = "unknown", found["chosen"]
+    if found["memory_total_mb"] is not None:
+        memory = f"{found['memory_total_mb'] / 1024:.1f} GiB"
+        if found["memory_available_mb"] is not None:
+            memory += f", {found['memory_available_mb'] / 1024:.1f} GiB available"
+    versions = (f"{name} {version}" for name, version in found["packages"].items() if version)
+    lines = [
+        f"Python    {found['python']}",
+        f"System    {found['system']}",
+        f"Cores     {found['cores']}",
+        f"Memory    {memory}",
+        f"Packages  {', '.join(versions)}",
+        "libLLVM   " + ("in the order of trial:" if found["llvm"] else "none found"),
+    ]
+    lines += [
+        f"  {'->' if row['chosen'] else '  '} {row['version'] or '?':<8} "
+        f"{row['finding']:<28} {row['origin']:<12} {row['path']}"
+        for row in found["llvm"]
+    ]
+    lines.append("Backends")
+    lines += [
+        f"  {'->' if VARIANTS[kind] == chosen else '  '} {kind:<8} {finding}"
+        for kind, finding in found["backends"].items()
+    ]
+    lines.append(f"Compiled  {found['compiled_code']}")
+    lines += [f"To do     {line}" for line in found["advice"]]
+    verdict = f"ready, on {chosen}" if chosen else "no backend works: rays cannot be traced"
+    return "\n".join([*lines, f"Verdict   {verdict}"])
+
+
+def report(json_path: str | Path | None = None) -> int:
+    """Examine the machine, print the report, and return 0 where a backend works, else 1.
+
+    The report is written as JSON where a path is given; an `InputError` is raised where it cannot
+    be.
+    """
+    found = examine()
+    print(report_text(found))
+    if json_path is not None:
+        write_json(json_path, found)
+    return 0 if found["chosen"] else 1
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _memory_mb() -> tuple[float | None, float | None]:
+    """Total and available memory [MiB], None for what the system does not tell."""
+    try:
+        total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**20
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+    except (AttributeError, ValueError, OSError):
+        return None, None
+    available = next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), None)
+    return total, float(available) / 1024 if available else None

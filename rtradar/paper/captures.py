@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from rtradar.clouds.rdt import RdtCloud
+from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import ValidityWarning
-from rtradar.paper.sources import ACTIVITIES, TITLES, Sources
+from rtradar.paper.sources import ACTIVITIES, Sources
 from rtradar.pipeline import Result, run
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import add_colour_bar, bin_edges
+from rtradar.report.figures.maps import few_ticks
 from rtradar.system.figure_style import DIVERGING, LIGHT, dress, new_figure, save_figure
 
 Results = Mapping[str, Result]
@@ -27,7 +28,6 @@ Results = Mapping[str, Result]
 _WIDTH_IN, _HEIGHT_IN = 9.0, 7.4
 _BELOW_DB = 40.0
 _TRIANGLES = 30_000
-_CLASS_S = {"jumping_jack": 1.0, "kick": 1.5, "punch": 1.0, "walk": 1.5}
 
 
 def activity_figures(sources: Sources) -> dict[str, Any]:
@@ -48,11 +48,11 @@ def activity_figures(sources: Sources) -> dict[str, Any]:
     cpu_s = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
-        for activity, longest_s in ACTIVITIES.items():
-            motion = sources.motion(activity)
-            duration_s = min(longest_s, motion.duration_s)
+        for name, activity in ACTIVITIES.items():
+            motion = sources.motion(name)
+            duration_s = min(activity.shown_s, motion.duration_s)
             began_s = time.process_time()
-            results[activity] = run(motion, radar, duration_s=duration_s)
+            results[name] = run(motion, radar, duration_s=duration_s)
             cpu_s.append(time.process_time() - began_s)
     flat: dict[str, Callable[[Result, Axes], Any]] = {
         "figure-4": lambda result, axes: result.plot.range_time(axes),
@@ -85,14 +85,14 @@ def _side_by_side(
         draw(result, axes)
         for text in list(axes.texts):
             text.remove()
-        dress(axes, title=TITLES[activity], grid=projection is not None)
+        dress(axes, title=ACTIVITIES[activity].title, grid=projection is not None)
     save_figure(figure, sources.out / f"{name}.png")
 
 
 def _draw_first_points(result: Result, axes: Any) -> None:
     """Draw the spatial cloud of the first frame."""
     cloud = result.spatial.strongest()
-    first = cloud.time == result.maps["time"].values[0]
+    first = _of_first_frame(cloud, result)
     fastest = float(np.abs(cloud.velocity[first]).max(initial=0.1))
     style: dict[str, Any] = {"cmap": DIVERGING, "vmin": -fastest, "vmax": fastest, "s": 6}
     dots = axes.scatter(*cloud.points[first].T, c=cloud.velocity[first], **style)
@@ -101,8 +101,12 @@ def _draw_first_points(result: Result, axes: Any) -> None:
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
     axes.set(xlim=sides[0], ylim=sides[1], zlim=(0, 2.2))
     axes.set_box_aspect((1, 1, 1.4), zoom=0.9)
-    _few_ticks(axes)
+    few_ticks(axes, 4)
     add_colour_bar(dots, [axes], "Velocity [m/s]", shrink=0.7, pad=0.14)
+
+
+def _of_first_frame(cloud: SpatialCloud, result: Result) -> NDArray[np.bool_]:
+    return np.asarray(cloud.time == result.maps["time"].values[0])
 
 
 def _draw_surface(result: Result, axes: Any) -> None:
@@ -123,12 +127,7 @@ def _draw_surface(result: Result, axes: Any) -> None:
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]")
     axes.set_box_aspect((1.6, 1, 1), zoom=0.9)
-    _few_ticks(axes)
-
-
-def _few_ticks(axes: Any) -> None:
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(4))
+    few_ticks(axes, 4)
 
 
 def _draw_angles_in_metres(sources: Sources, result: Result) -> None:
@@ -167,7 +166,7 @@ def _findings(results: Results) -> dict[str, Any]:
         found |= {
             f"{activity}_fastest": float(np.quantile(speed, 0.99)),
             f"{activity}_points": result.summary["rdt_triangles"],
-            f"{activity}_first": _first_points(result),
+            f"{activity}_first": int(_of_first_frame(result.spatial, result).sum()),
         }
         for name, limit_mps in (("60", 1.61), ("77", 1.27)):
             found[f"{activity}_beyond_{name}"] = 100 * float(np.mean(speed > limit_mps))
@@ -184,12 +183,10 @@ def _findings(results: Results) -> dict[str, Any]:
     found["ours_s"] = max(one["wall_s"] for one in times)
     found["ours_capture_s"] = max(one["capture_s"] for one in times)
     found["ours_mb"] = max(one["peak_memory_mb"] for one in times)
-    found["lengths"] = ", ".join(f"{TITLES[k].lower()} {v:.1f} s" for k, v in _CLASS_S.items())
+    found["lengths"] = ", ".join(
+        f"{one.title.lower()} {one.class_s:.1f} s" for one in ACTIVITIES.values()
+    )
     return found
-
-
-def _first_points(result: Result) -> int:
-    return int(np.sum(result.spatial.time == result.maps["time"].values[0]))
 
 
 def _triangles(result: Result, every: int) -> int:

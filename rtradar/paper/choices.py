@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from rtradar.paper.items import contents
 from rtradar.settings import RunOptions
 
 PAPER_OS_SCALE = 5.0003
@@ -39,15 +40,4 @@ def paper_warnings() -> tuple[str, ...]:
     >>> len(paper_warnings())
     5
     """
-    return (
-        "fidelity = analytic-paper: echoes come from the centres of the ellipsoids, up to 10 cm "
-        "behind their surface, as plane waves, though the far field of the array begins at 32 m; "
-        "and nothing is occluded",
-        "spreading = False: near and far parts of the body are equally strong",
-        f"detector scale = {PAPER_OS_SCALE}: on one channel it alarms once in 763 cells of noise, "
-        "whatever rate is asked for; it is not the multiplier of a sum of channels",
-        "velocities are those of the centre of the sweep; the paper's axis is that of its start, "
-        "which reads 17 % too high at 12 GHz, and is not repeated",
-        "the paper's program has an error in the cross-section, 14 to 26 dB low end-on, and noise "
-        "of fixed power, 3 to 6 dB below the echoes; neither is repeated",
-    )
+    return tuple(contents()["warnings"])

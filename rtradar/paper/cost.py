@@ -10,7 +10,7 @@ from typing import Any
 from rtradar.bench.runs import measure_baseline
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.paper.formulas import slow_chirps
-from rtradar.paper.sources import ACTIVITIES, TITLES, Sources
+from rtradar.paper.sources import ACTIVITIES, Sources
 from rtradar.pipeline import run
 from rtradar.radar import Radar
 from rtradar.system.figure_style import dress, new_figure, save_figure
@@ -34,9 +34,10 @@ def cost_figures(sources: Sources) -> dict[str, Any]:
     baseline = measure_baseline("paper-12ghz", 1, quick=True)
     if baseline is None:
         raise InputError("there is no paper_numpy.py to time; use a checkout, or install again")
-    frame_s = baseline.total.median
+    frame_s = baseline["total"]["median"]
     motion = sources.motion("jumping_jack")
-    longest_s = min(ACTIVITIES["jumping_jack"], motion.duration_s)
+    activity = ACTIVITIES["jumping_jack"]
+    longest_s = min(activity.shown_s, motion.duration_s)
     duration_s = min(_QUICK_S, longest_s) if sources.quick else longest_s
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
@@ -48,7 +49,7 @@ def cost_figures(sources: Sources) -> dict[str, Any]:
             aliased.plot.spectrogram(axes)
             for text in list(axes.texts):
                 text.remove()
-            dress(axes, title=f"{TITLES['jumping_jack']}, {radar.name}", grid=False)
+            dress(axes, title=f"{activity.title}, {radar.name}", grid=False)
         save_figure(figure, sources.out / "number-60-77ghz.png")
     return {
         "machine": f"{os.cpu_count()} cores, {platform.machine()}",

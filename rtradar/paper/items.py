@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from typing import Any
 
@@ -60,6 +61,19 @@ class Item:
         return Item(self.id, self.title, **texts, picture=self.picture)
 
 
+@cache
+def contents() -> dict[str, Any]:
+    """Read the tables of ``items.toml``.
+
+    Returns
+    -------
+    dict
+        ``items``, ``activities`` and ``warnings``.
+    """
+    text = files("rtradar.paper").joinpath("items.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
 def load_items() -> tuple[Item, ...]:
     """Read all items, with braces where figures belong.
 
@@ -68,5 +82,4 @@ def load_items() -> tuple[Item, ...]:
     tuple of Item
         Items in the order of the paper.
     """
-    text = files("rtradar.paper").joinpath("items.toml").read_text(encoding="utf-8")
-    return tuple(Item(**entry) for entry in tomllib.loads(text)["items"])
+    return tuple(Item(**entry) for entry in contents()["items"])

@@ -113,7 +113,7 @@ def _write(folder: Path, settings: Mapping[str, Any], parts: Mapping[str, Any]) 
     items = load_items()
     pictures = [item.picture for item in items if item.picture]
     content = {
-        "items": [asdict(_shown(folder, item)) for item in _measured(items, figures)],
+        "items": [_shown(folder, item) for one in items if (item := one.filled(figures))],
         "settings": dict(settings),
         "version": version("rtradar"),
         "parts": dict(parts),
@@ -124,15 +124,10 @@ def _write(folder: Path, settings: Mapping[str, Any], parts: Mapping[str, Any]) 
     return content
 
 
-def _measured(items: tuple[Item, ...], figures: Mapping[str, Any]) -> list[Item]:
-    filled = (item.filled(figures) for item in items)
-    return [item for item in filled if item is not None]
-
-
-def _shown(folder: Path, item: Item) -> Item:
+def _shown(folder: Path, item: Item) -> dict[str, Any]:
     """Return the item without a picture where there is none: curves come with ``full``."""
     there = item.picture is not None and (folder / item.picture).is_file()
-    return item if there else Item(**asdict(item) | {"picture": None})
+    return asdict(item) | ({} if there else {"picture": None})
 
 
 def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> None:

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion, synthetic_motion
+from rtradar.paper.items import contents
 
-ACTIVITIES = {"jumping_jack": 3.0, "kick": 3.0, "punch": 2.5, "walk": 3.0}
-"""Activities in the order of the paper's pictures, and how much of each it shows [s]."""
 
-TITLES = dict(zip(ACTIVITIES, ("Jumping jack", "Kick", "Punch", "Walk"), strict=True))
-"""Titles of the activities."""
+class Activity(NamedTuple):
+    """One of the paper's activities, as ``items.toml`` has it."""
 
-_RECORDINGS = {
-    "jumping_jack": ("jumpingJack3Reps_001", "jumpingJack"),
-    "kick": ("kickLSide2Reps_001", "kick"),
-    "punch": ("punchLSide2Reps_001", "punch"),
-    "walk": ("walkLeft3Steps_001", "walk"),
-}
+    title: str
+    shown_s: float
+    class_s: float
+    recordings: list[str]
+
+
+ACTIVITIES = {name: Activity(**one) for name, one in contents()["activities"].items()}
+"""Activities in the order of the paper's pictures."""
 
 
 @dataclass(frozen=True)
@@ -62,15 +64,18 @@ class Sources:
             If the recording cannot be read.
         """
         if (path := self.recordings.get(activity)) is None:
-            return synthetic_motion(activity, seed=0, duration_s=ACTIVITIES[activity])
-        return load_motion(path, skeleton=_skeleton(path))
+            return synthetic_motion(activity, seed=0, duration_s=ACTIVITIES[activity].shown_s)
+        # The skeleton of a recording begins with the same ``HDM_`` and subject.
+        skeleton = path.with_name("_".join(path.name.split("_")[:2]) + ".asf")
+        return load_motion(path, skeleton=skeleton)
 
     @property
     def named(self) -> str:
         """Who does each activity, in words."""
         actors = dict.fromkeys(ACTIVITIES, "a synthetic actor")
         actors |= {name: f"HDM05 file {path.name}" for name, path in self.recordings.items()}
-        return "; ".join(f"{TITLES[name].lower()}: {actor}" for name, actor in actors.items())
+        named = ((ACTIVITIES[name].title.lower(), actor) for name, actor in actors.items())
+        return "; ".join(f"{title}: {actor}" for title, actor in named)
 
 
 def find_recordings(folder: Path | None) -> dict[str, Path]:
@@ -95,19 +100,13 @@ def find_recordings(folder: Path | None) -> dict[str, Path]:
         return {}
     there = sorted(folder.rglob("HDM_*.amc"))
     found = {}
-    for activity, patterns in _RECORDINGS.items():
-        for pattern in patterns:
-            fitting = [path for path in there if f"_{pattern}" in path.name]
-            if fitting and activity not in found:
-                found[activity] = fitting[0]
+    for name, activity in ACTIVITIES.items():
+        for pattern in reversed(activity.recordings):
+            if fitting := [path for path in there if f"_{pattern}" in path.name]:
+                found[name] = fitting[0]
     if not found:
         raise InputError(
             f"--mocap {folder}: it holds no HDM_*.amc of a jumping jack, kick, punch or walk; "
             "give a folder of HDM05, or leave it out for synthetic actors"
         )
     return found
-
-
-def _skeleton(path: Path) -> Path:
-    """Return the skeleton of a recording, which begins with the same ``HDM_`` and subject."""
-    return path.with_name("_".join(path.name.split("_")[:2]) + ".asf")

@@ -10,6 +10,7 @@ pixels wide, a letter of the smallest font is 8 pixels high.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,37 +59,15 @@ class Theme:
     person: str
     ghost: str
     detection: str
-    cycle: tuple[str, ...]
+    cycle: list[str]
 
 
-LIGHT = Theme(
-    page="#ffffff",
-    text="#1b2733",
-    faint="#b8c2cc",
-    wall="#3c4854",
-    furniture="#a9713a",
-    reflector="#7b3fa0",
-    radar="#1b2733",
-    person="#d1353f",
-    ghost="#e4572e",
-    detection="#c2185b",
-    cycle=("#2b6cb0", "#dd7a00", "#2f8f4e", "#b83280", "#6b46c1", "#00838f", "#8a6d1a", "#52606d"),
-)
+_THEMES = tomllib.loads(Path(__file__).with_name("themes.toml").read_text(encoding="utf-8"))
+
+LIGHT = Theme(**_THEMES["light"])
 """Colours on a white page."""
 
-DARK = Theme(
-    page="#14181d",
-    text="#e6ebf0",
-    faint="#46525e",
-    wall="#c4ced8",
-    furniture="#d9a066",
-    reflector="#c792ea",
-    radar="#ffffff",
-    person="#ff6b6b",
-    ghost="#ff8a5c",
-    detection="#ff5fa2",
-    cycle=("#63b3ed", "#f6ad55", "#68d391", "#f687b3", "#b794f4", "#4dd0e1", "#d6bc5a", "#a0aec0"),
-)
+DARK = Theme(**_THEMES["dark"])
 """Colours on a dark page."""
 
 

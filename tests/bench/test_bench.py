@@ -13,16 +13,19 @@ import rtradar.bench
 from rtradar.bench import runs
 from rtradar.bench.floors import Rates
 from rtradar.bench.plan import Case
-from rtradar.bench.runs import Baseline, Run, RunError, Runner, Spread
+from rtradar.bench.runs import Run, RunError, Runner, by_stage, paired_ratio, spread, to_cloud_s
 from rtradar.cli import main
 
 pytestmark = pytest.mark.drawn
 
 CHIRPS = 1596 * 3  # three frames of the paper's radar
 RATES = Rates(1e10, 1e8, 1e10, 1e6, 1e6, 1e6, 1e6)
-BASELINE = Baseline(
-    {"echoes and IF": Spread(8.0, 8.0), "cfar": Spread(2.0, 2.0)}, Spread(10.0, 10.0), 12, 133
-)
+BASELINE = {
+    "stages": {"echoes and IF": spread([8.0]), "cfar": spread([2.0])},
+    "total": spread([10.0]),
+    "cycles": 12,
+    "cycles_per_frame": 133,
+}
 
 
 def summary(scatter_s: float) -> dict[str, Any]:
@@ -67,18 +70,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
 def test_all_that_is_measured_is_in_the_json(
     machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "bench",
-        "--fidelity",
-        "analytic-paper,analytic,specular",
-        "--repeats",
-        "2",
-        "--only",
-        "models",
-    ]
-    assert (
-        main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
-    )
+    words = "bench --fidelity analytic-paper,analytic,specular --repeats 2 --only models".split()
+    words += ["--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]
+    assert main(words) == 0
     found = json.loads((tmp_path / "b.json").read_text())
     assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
     assert found["settings"]["repeats"] == 2
@@ -117,33 +111,16 @@ def test_all_that_is_measured_is_in_the_json(
 def test_models_take_turns_after_their_first_use(
     machine: list[Case], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "--radar",
-        "paper-12ghz",
-        "--fidelity",
-        "analytic,specular",
-        "--repeats",
-        "2",
-        "--only",
-        "models",
-    ]
-    assert main(["bench", *words]) == 0
+    words = "bench --radar paper-12ghz --fidelity analytic,specular --repeats 2 --only models"
+    assert main(words.split()) == 0
     assert [case.fidelity for case in machine] == ["analytic", "specular"] * 3
 
 
 def test_growth_with_length(
     machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = [
-        "bench",
-        "--quick",
-        "--only",
-        "growth",
-        "--json",
-        str(tmp_path / "b.json"),
-        "--figure",
-        str(tmp_path / "b.png"),
-    ]
+    words = ["bench", "--quick", "--only", "growth"]
+    words += ["--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]
     assert main(words) == 0
     growth = json.loads((tmp_path / "b.json").read_text())["growth"]
     assert growth["fidelity"] == "specular"
@@ -181,9 +158,12 @@ def test_the_baseline_is_timed_in_a_process_of_its_own(
     )
     monkeypatch.setattr(runs, "validation_folder", lambda: tmp_path)
     found = runs.measure_baseline("paper-77ghz", 2, quick=True)
-    assert found == Baseline(
-        {"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133
-    )
+    assert found == {
+        "stages": {"echoes and IF": spread([1.0, 3.0]), "cfar": spread([0.5])},
+        "total": {"best": 1.5, "median": 2.5},
+        "cycles": 12,
+        "cycles_per_frame": 133,
+    }
     (folder / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
     with pytest.raises(RunError, match=r"paper_numpy.py: ArithmeticError: the abacus is broken"):
         runs.measure_baseline("paper-77ghz", 2, quick=True)
@@ -244,3 +224,27 @@ def test_a_process_that_fails_says_its_last_line(
     )
     with pytest.raises(RunError, match=r"^bench: specular, radar mine.toml: rtradar: no$"):
         Runner(tmp_path).run(Case("mine.toml", "specular", 0.5))
+
+
+# -- arithmetic on given seconds -------------------------------------------------------------------
+
+
+def test_what_leads_to_the_cloud_is_all_but_other_products_and_files() -> None:
+    stages = {"scatter": 1.0, "cloud": 0.5, "angle": 2.0, "spectrogram": 0.25}
+    stages |= {"write": 0.125, "pictures": 4.0, "report": 8.0}
+    # 15.875 s in stages, and 0.125 s elsewhere.
+    assert to_cloud_s(stages, wall_s=16.0) == 1.625
+    assert Run(20.0, {"stages": stages, "wall_s": 16.0}).stages["elsewhere"] == 0.125
+    # Stages that overlap leave nothing elsewhere.
+    assert Run(20.0, {"stages": stages, "wall_s": 3.0}).stages["elsewhere"] == 0.0
+
+
+def test_a_stage_that_a_run_lacks_took_it_no_time() -> None:
+    found = by_stage([{"a": 1.0}, {"a": 3.0, "b": 1.0}, {"a": 2.5, "b": 5.0}])
+    assert list(found) == ["a", "b"]
+    assert found == {"a": {"best": 1.0, "median": 2.5}, "b": {"best": 0.0, "median": 1.0}}
+
+
+def test_ratios_are_of_neighbours() -> None:
+    # The third pair was measured in a slow minute, which is no matter.
+    assert paired_ratio([2.0, 4.0, 40.0], of=[1.0, 1.0, 20.0]) == 2.0

@@ -54,13 +54,18 @@ def angle_view(
 
 def rdt_points(axes: Any, points: NDArray[np.float64], *, fastest: float, s: float) -> Any:
     """Draw points (point, 3) [s, m, m/s] in 3D, coloured by velocity up to ``fastest`` [m/s]."""
-    from matplotlib.ticker import MaxNLocator
-
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(MaxNLocator(5))
+    few_ticks(axes, 5)
     colours = {"c": points[:, 2], "cmap": DIVERGING, "vmin": -fastest, "vmax": fastest}
     return axes.scatter(*points.T, s=s, **colours)
+
+
+def few_ticks(axes: Any, most: int) -> None:
+    """Leave axes in 3D so many steps at most between their ticks."""
+    from matplotlib.ticker import MaxNLocator
+
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(most))
 
 
 def thinned(

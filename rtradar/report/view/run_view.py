@@ -99,6 +99,14 @@ class Levels:
         """Power of the highest level of the colour scale [dB]."""
         return self.low_db + self.step_db * MOST_LEVEL
 
+    def drawn(self, number: int) -> tuple[Any, ...]:
+        """Return one map [dB], its axes across and up, and the limits of its colours."""
+        rows, columns = self.level.shape[1:]
+        across = self.across[0] + self.across[1] * np.arange(columns)
+        up = self.up[0] + self.up[1] * np.arange(rows)
+        decibels = self.low_db + self.step_db * self.level[number]
+        return decibels, across, up, (self.low_db, self.high_db)
+
     def packed(self) -> dict[str, Any]:
         """Return plain values for JSON; ``levels`` are compressed by zlib and encoded in base64."""
         return {

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize, to_rgba
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba_array
 from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
-from rtradar.report.figures.canvas import VELOCITY_LABEL, add_colour_bar
-from rtradar.report.view.run_view import GROUPS, VELOCITY_COLOURS, Levels, RunView, group_of_parts
+from rtradar.report.figures.canvas import VELOCITY_LABEL, add_colour_bar, draw_levels
+from rtradar.report.view.run_view import GROUPS, VELOCITY_COLOURS, RunView, group_of_parts
 from rtradar.report.view.three_d import drawn_sphere
 from rtradar.system.figure_style import dress, new_figure, save_figure, write_heading
 from rtradar.system.files import atomic_file
@@ -39,17 +40,17 @@ def draw_still(
     figure = new_figure(8.2, width_in=13)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
     time = f"{run_view.snapshots.times[step]:.2f} s"
-    paint = _Paint(run_view, colour or run_view.colour)
+    tints = _tints(run_view, colour or run_view.colour, step)
     views = [
         figure.add_subplot(grid[row, column], projection=None if column else "3d")
         for row, column in np.ndindex(2, 2)
     ]
-    _draw_body(views[0], run_view, step, paint)
-    _draw_map(views[1], run_view, step, paint)
-    _draw_cloud(views[2], run_view, step, paint)
+    _draw_body(views[0], run_view, step, tints)
+    _draw_map(views[1], run_view, step, tints)
+    _draw_cloud(views[2], run_view, step, tints)
     _draw_spectrogram(views[3], run_view, step)
     write_heading(figure, f"{run_view.heading}, {run_view.subtitle}: {time}")
-    paint.legend(figure, views)
+    _explain(figure, views, tints)
     for view in (views[0], views[2]):
         for artist in (*view.collections, *view.lines):
             # A long 3D box is wider than its axes, whose edge would cut the body. The layout
@@ -60,94 +61,80 @@ def draw_still(
         save_figure(figure, file)
 
 
-class _Paint:
-    """Colours of echoes, parts and cloud points by person, part, power or velocity."""
+class _Tints(NamedTuple):
+    """Colours (rgba) of one step, and what says what they mean: names, or a scale with a label."""
 
-    def __init__(self, run_view: RunView, colour: str) -> None:
-        self.colour, self._run_view = colour, run_view
-        snapshots = run_view.snapshots
-        self._legend = list(GROUPS.items())
-        self._named = np.array(group_of_parts(snapshots.part_names.tolist()))
-        names, tints = run_view.source_names, run_view.source_colours
-        self.sources = np.array([to_rgba(tint) for tint in tints])
-        if colour == "person":
-            self._legend, self._named = list(zip(names, tints, strict=True)), snapshots.part_person
-        fastest = run_view.fastest_mps
-        of_echo = np.broadcast_to(self._named[snapshots.echo_part], snapshots.range_m.shape)
-        rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
-        tints = [tint for _, tint in self._legend]
-        named = ListedColormap(tints), (-0.5, len(tints) - 0.5), of_echo
-        self.map, limits, self._echo = {
-            "person": named,
-            "part": named,
-            "power": (colormaps["viridis"], run_view.power_range_db, run_view.power_db),
-            "velocity": (rates, (-fastest, fastest), snapshots.velocity_mps),
-        }[colour]
-        self.norm = Normalize(*limits)
-
-    def echoes(self, step: int) -> NDArray[np.float64]:
-        """Colour of each echo (echo, rgba); grey if it is occluded."""
-        return self._rgba(self._echo[step].astype(np.float64))
-
-    def parts(self, step: int) -> NDArray[np.float64]:
-        """Colour of each part (part, rgba), by its strongest direct echo."""
-        snapshots = self._run_view.snapshots
-        if self.colour in _NAMED:
-            return self._rgba(self._named.astype(np.float64))
-        out = np.full(len(snapshots.part_names), np.nan)
-        power = snapshots.power_m2[step]
-        for echo in np.argsort(power, kind="stable"):
-            if snapshots.direct[echo]:
-                out[snapshots.echo_part[echo]] = self._echo[step, echo]
-        return self._rgba(out)
-
-    def cloud(self) -> NDArray[np.float64]:
-        """Colour of each point of the cloud (point, rgba)."""
-        run_view = self._run_view
-        if self.colour == "part":
-            return self._rgba(run_view.rdt_group().astype(np.float64))
-        if self.colour == "person":
-            return self.sources[run_view.rdt_source]  # that of nobody is the last
-        by_power = self.colour == "power"
-        return self._rgba(run_view.rdt_power_db if by_power else run_view.rdt_points[:, 2])
-
-    def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        rgba = np.array(self.map(self.norm(np.nan_to_num(values, nan=0.0)))).reshape(-1, 4)
-        rgba[~np.isfinite(values)] = to_rgba(_HIDDEN)
-        return rgba
-
-    def legend(self, figure: Any, views: list[Any]) -> None:
-        """Add a legend of the colours below the views."""
-        if self.colour in _NAMED:
-            patches = [Patch(color=tint, label=name) for name, tint in self._legend]
-            columns = min(len(patches), _MOST_COLUMNS)
-            figure.legend(handles=patches, loc="outside lower center", ncols=columns)
-            return
-        label = VELOCITY_LABEL
-        if self.colour == "power":
-            label = self._run_view.power_unit.label("of an echo")
-        place = {"location": "bottom", "shrink": 0.4, "aspect": 50, "pad": 0.02}
-        bar = figure.colorbar(ScalarMappable(self.norm, self.map), ax=views, label=label, **place)
-        dress(bar.ax, grid=False)
+    echoes: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    cloud: NDArray[np.float64]
+    sources: NDArray[np.float64]
+    names: Mapping[str, Any]
+    scale: tuple[ScalarMappable, str] | None = None
 
 
-def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+def _tints(run_view: RunView, colour: str, step: int) -> _Tints:
+    """Return colours by person, part, power or velocity; what is occluded is grey."""
+    snapshots = run_view.snapshots
+    sources = to_rgba_array(run_view.source_colours)
+    if colour in _NAMED:
+        if colour == "part":
+            names, of_part = GROUPS, group_of_parts(snapshots.part_names.tolist())
+            table, of_cloud = to_rgba_array(list(GROUPS.values())), run_view.rdt_group()
+        else:
+            names = dict(zip(run_view.source_names, run_view.source_colours, strict=True))
+            table, of_cloud = sources, run_view.rdt_source  # that of nobody is the last
+            of_part = snapshots.part_person.tolist()
+        parts = table[of_part]
+        return _Tints(parts[snapshots.echo_part], parts, table[of_cloud], sources, names)
+    if colour == "power":
+        label, limits = run_view.power_unit.label("of an echo"), run_view.power_range_db
+        values, of_cloud, scale = (
+            run_view.power_db[step],
+            run_view.rdt_power_db,
+            colormaps["viridis"],
+        )
+    else:
+        label, limits = VELOCITY_LABEL, (-run_view.fastest_mps, run_view.fastest_mps)
+        values, of_cloud = snapshots.velocity_mps[step], run_view.rdt_points[:, 2]
+        scale = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
+    painted = ScalarMappable(Normalize(*limits), scale.with_extremes(bad=_HIDDEN))
+    # Each part has the colour of its strongest direct echo, the last that is set.
+    strongest = np.argsort(snapshots.power_m2[step], kind="stable")
+    strongest = strongest[snapshots.direct[strongest]]
+    of_part = np.full(len(snapshots.part_names), np.nan)
+    of_part[snapshots.echo_part[strongest]] = values[strongest]
+    tints = (painted.to_rgba(np.ma.masked_invalid(own)) for own in (values, of_part, of_cloud))
+    return _Tints(*tints, sources, {}, (painted, label))
+
+
+def _explain(figure: Any, views: list[Any], tints: _Tints) -> None:
+    """Add a legend of the colours below the views, or their scale."""
+    if tints.scale is None:
+        patches = [Patch(color=tint, label=name) for name, tint in tints.names.items()]
+        columns = min(len(patches), _MOST_COLUMNS)
+        figure.legend(handles=patches, loc="outside lower center", ncols=columns)
+        return
+    painted, label = tints.scale
+    place = {"location": "bottom", "shrink": 0.4, "aspect": 50, "pad": 0.02}
+    dress(figure.colorbar(painted, ax=views, label=label, **place).ax, grid=False)
+
+
+def _draw_body(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     snapshots = run_view.snapshots
     radar = run_view.radar.at(float(snapshots.times[step]))
     vertices, faces = drawn_sphere()
     poses = snapshots.poses[step].astype(np.float64)
-    tints = paint.parts(step)
     for part in np.flatnonzero(snapshots.drawn_parts):
         centre, *semi_axes = poses[part]
         corners = (centre + vertices @ np.array(semi_axes))[faces]
-        style = {"facecolors": tints[part, :3], "shade": True, "linewidth": 0}
+        style = {"facecolors": tints.parts[part, :3], "shade": True, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(corners, **style))
     moving, of_face = snapshots.mesh_vertices(step), snapshots.mesh_faces[:, 0]
     if len(of_face):
         own = snapshots.mesh_part[of_face]
         source = snapshots.mesh_source[snapshots.mesh_of_vertex[of_face]]
-        rgba = paint.sources[source]
-        rgba[own >= 0] = tints[own[own >= 0]]
+        rgba = tints.sources[source]
+        rgba[own >= 0] = tints.parts[own[own >= 0]]
         style = {"facecolors": rgba[:, :3], "shade": True, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(moving[snapshots.mesh_faces], **style))
     outlines = [np.concatenate([corners, corners[:1]]) for corners in snapshots.walls]
@@ -158,14 +145,13 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
         style = {"facecolors": "#b08d57", "alpha": 0.18, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(triangles, **style))
     place = np.array(radar.position_m)
-    rgba = paint.echoes(step)
     for echo in np.flatnonzero(run_view.seen[step]):
         corners = snapshots.corners[step, echo].astype(np.float64)
         corners = corners[np.isfinite(corners).all(axis=1)]
         if len(corners):
             line = np.concatenate([[place], corners, [place]])
             width, alpha = (1.2, 0.8) if snapshots.direct[echo] else (0.6, 0.35)
-            axes.plot(*line.T, color=rgba[echo], linewidth=width, alpha=alpha)
+            axes.plot(*line.T, color=tints.echoes[echo], linewidth=width, alpha=alpha)
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
     centres, walls = snapshots.poses[:, :, 0].reshape(-1, 3), snapshots.walls.reshape(-1, 3)
@@ -183,30 +169,16 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     dress(axes, title="Body and paths")
 
 
-def _extent(levels: Levels) -> tuple[float, float, float, float]:
-    rows, columns = levels.level.shape[1:]
-    (x, dx), (y, dy) = levels.across, levels.up
-    return x - dx / 2, x + dx * (columns - 0.5), y - dy / 2, y + dy * (rows - 0.5)
-
-
-def _image(axes: Any, levels: Levels, number: int, colours: str) -> Any:
-    decibels = levels.low_db + levels.step_db * levels.level[number]
-    return axes.imshow(
-        decibels, origin="lower", aspect="auto", interpolation="nearest", cmap=colours,
-        vmin=levels.low_db, vmax=levels.high_db, extent=_extent(levels),
-    )  # fmt: skip
-
-
-def _draw_map(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+def _draw_map(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     snapshots = run_view.snapshots
-    image = _image(axes, run_view.range_doppler, step, "Greys")
-    rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
+    image = draw_levels(axes, *run_view.range_doppler.drawn(step), cmap="Greys")
+    velocity = run_view.shown_velocity()[step]
     for direct in (False, True):
         own = np.flatnonzero(run_view.seen[step] & (snapshots.direct == direct))
         style: dict[str, Any] = {"marker": "D", "s": 14, "facecolors": "none"}
-        style["edgecolors"] = rgba[own]
+        style["edgecolors"] = tints.echoes[own]
         if direct:
-            style = {"marker": "o", "s": 40, "color": rgba[own], "edgecolors": "white"}
+            style = {"marker": "o", "s": 40, "color": tints.echoes[own], "edgecolors": "white"}
         axes.scatter(velocity[own], snapshots.range_m[step, own], linewidths=0.7, **style)
     across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
@@ -215,17 +187,16 @@ def _draw_map(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     add_colour_bar(image, [axes], run_view.range_doppler.label)
 
 
-def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+def _draw_cloud(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     points, time = run_view.rdt_points, run_view.snapshots.times[step]
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
     dress(axes, title=f"Range-Doppler-time cloud: {len(points)} points")
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
         return
-    rgba = paint.cloud()
     own = np.abs(points[:, 0] - time) <= run_view.radar.frame_duration_s / 2
-    axes.scatter(*points[~own].T, c=rgba[~own], s=1.5, alpha=0.35, depthshade=False)
-    axes.scatter(*points[own].T, c=rgba[own], s=12, depthshade=False)
+    axes.scatter(*points[~own].T, c=tints.cloud[~own], s=1.5, alpha=0.35, depthshade=False)
+    axes.scatter(*points[own].T, c=tints.cloud[own], s=12, depthshade=False)
     (_, r0, v0), (_, r1, v1) = points.min(axis=0), points.max(axis=0)
     axes.plot([time] * 5, [r0, r1, r1, r0, r0], [v0, v0, v1, v1, v0], color=_NOW, linewidth=1.2)
 
@@ -237,6 +208,6 @@ def _draw_spectrogram(axes: Any, run_view: RunView, step: int) -> None:
         style = {"ha": "center", "va": "center", "transform": axes.transAxes}
         axes.text(0.5, 0.5, "The capture is too short for one.", **style)
         return
-    image = _image(axes, run_view.spectrogram, 0, "viridis")
+    image = draw_levels(axes, *run_view.spectrogram.drawn(0))
     axes.axvline(run_view.snapshots.times[step], color=_NOW, linewidth=1.5)
     add_colour_bar(image, [axes], run_view.spectrogram.label)
