@@ -13,6 +13,8 @@ from dataclasses import asdict, astuple, dataclass, field, fields, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
 
+from rtradar.system.figure_style import dress, new_figure, save_figure
+
 QUICK_LIMIT_S = 900.0
 """A script that takes longer with ``--quick`` hangs: the slowest takes four minutes."""
 
@@ -112,28 +114,22 @@ def table(rows: Sequence[Row]) -> str:
 
 def draw(rows: Sequence[Row], path: Path, title: str) -> None:
     """Draw the judged rows nearest to their limits, by the fractions of the limits they use."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
     of_judged = (row for row in rows if row.tolerance is not None)
     nearest = sorted(of_judged, key=lambda row: row.used, reverse=True)[:_MOST_DRAWN]
-    size = (9.0, 1.5 + 0.19 * max(len(nearest), 4))
-    figure, axes = plt.subplots(figsize=size, layout="constrained")
+    figure = new_figure(1.5 + 0.19 * max(len(nearest), 4), width_in=9.0)
+    axes = figure.subplots()
     # Infinite values and exact zeros are drawn at the ends of the axis.
     places = [min(max(row.used, 1e-6), 100.0) for row in nearest]
     colours = ["tab:green" if row.passed else "tab:red" for row in nearest]
     axes.scatter(places, range(len(nearest)), c=colours, s=18, zorder=2)
     axes.axvline(1.0, color="black", linewidth=1)
     names = [f"{row.claim}: {row.quantity}"[:90] for row in nearest]
-    axes.set_yticks(range(len(nearest)), names, fontsize=6)
+    axes.set_yticks(range(len(nearest)), names)
     axes.set(xscale="log", xlabel="error / tolerance")
     axes.invert_yaxis()
-    axes.set_title(title, fontsize=9)
-    axes.grid(axis="x", alpha=0.3)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    dress(axes, title=title)
+    axes.tick_params(axis="y", labelsize=6)
+    save_figure(figure, path)
 
 
 def main(

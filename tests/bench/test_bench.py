@@ -70,8 +70,15 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
 def test_all_that_is_measured_is_in_the_json(
     machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = "bench --fidelity analytic-paper,analytic,specular --repeats 2 --only models".split()
-    words += ["--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]
+    words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2"]
+    words += [
+        "--only",
+        "models",
+        "--json",
+        str(tmp_path / "b.json"),
+        "--figure",
+        str(tmp_path / "b.png"),
+    ]
     assert main(words) == 0
     found = json.loads((tmp_path / "b.json").read_text())
     assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]

@@ -13,7 +13,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.pipeline.output.moving_meshes import moving_meshes
+from rtradar.pipeline.output.snapshots import moving_meshes
 from rtradar.report.view.run_view import (
     GROUPS,
     Levels,

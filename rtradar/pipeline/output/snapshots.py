@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,20 +11,21 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.pipeline.output.echo_table import EchoTable, Look
-from rtradar.pipeline.output.moving_meshes import moving_meshes, thinned_mesh
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scene import Scene
+from rtradar.scene import Object, Scene
 
 MAX_ECHOES = 400
 """Number of echoes kept, the strongest; a person has 273 over single walls in a room of six."""
 
 MAX_FACES = 2000
 """Largest number of faces of a piece of furniture or of what moves; finer ones are thinned."""
+
+_CELL_M, _COARSER = 0.005, 1.2  # of the grid that thins a mesh
 
 Key = tuple[int, int, int]
 
@@ -157,3 +159,70 @@ def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], ND
         vertices.append(triangles.vertices[kept])
         piece.append(np.full(len(kept), number))
     return np.concatenate(vertices).astype(np.float32), np.concatenate(faces), np.concatenate(piece)
+
+
+# -- what moves and is a mesh ----------------------------------------------------------------------
+
+
+def moving_meshes(
+    body: Body, objects: Sequence[Object], times: NDArray[np.float64], most_faces: int
+) -> dict[str, NDArray[Any]]:
+    """Return the fields of `Snapshots` of the meshes of people and objects at times (time,) [s].
+
+    Each mesh is thinned to ``most_faces``. Breath, which moves a chest by millimetres, is left out.
+    """
+    from scipy.sparse import coo_matrix  # slow to import
+
+    # Of each mesh: whose it is, its faces, the part of each vertex, weights, and rows over time.
+    found: list[tuple[int, NDArray[Any], NDArray[Any], Any, NDArray[np.float64]]] = []
+    for number, person in enumerate(body.people):
+        if (mesh := person.mesh) is not None:
+            kept, faces = thinned_mesh(mesh.fit.vertices, mesh.faces(), most_faces)
+            part = np.flatnonzero(body.owner == number)[mesh.weights()[kept].argmax(axis=1)]
+            bones = mesh.bones(np.minimum(times, person.duration_s))
+            found.append((number, faces, part, mesh.fit.skinning[kept].tocoo(), bones))
+    for number, one in enumerate(objects, start=len(body.people)):
+        kept, faces = thinned_mesh(one.shape.vertices, one.shape.faces, most_faces)
+        rotation, place = one.pose(times)
+        corners = np.concatenate([one.shape.vertices[kept], np.ones((len(kept), 1))], axis=1)
+        axes = np.concatenate([np.swapaxes(rotation, 1, 2), place[:, None]], axis=1)
+        found.append((number, faces, np.full(len(kept), -1), coo_matrix(corners), axes))
+    # Vertices and rows of a mesh come after those of the meshes before it.
+    vertex = np.cumsum([0, *(len(part) for _, _, part, _, _ in found)])
+    row = np.cumsum([0, *(rows.shape[1] for *_, rows in found)])
+    blends = [blend for *_, blend, _ in found]
+
+    def joined(values: Iterable[Any], shape: tuple[int, ...] = (0,)) -> NDArray[np.int64]:
+        return np.concatenate([np.zeros(shape), *values]).astype(np.int64)
+
+    return {
+        "object_names": np.array([one.name for one in objects], dtype=np.str_),
+        "mesh_source": np.array([source for source, *_ in found], dtype=np.int64),
+        "mesh_faces": joined((one[1] + at for one, at in zip(found, vertex, strict=False)), (0, 3)),
+        "mesh_of_vertex": np.repeat(np.arange(len(found)), np.diff(vertex)),
+        "mesh_part": joined(part for _, _, part, _, _ in found),
+        "mesh_rows": np.concatenate(
+            [np.zeros((len(times), 0, 3)), *(rows for *_, rows in found)], axis=1
+        ).astype(np.float32),
+        "blend_vertex": joined(blend.row + at for blend, at in zip(blends, vertex, strict=False)),
+        "blend_row": joined(blend.col + at for blend, at in zip(blends, row, strict=False)),
+        "blend_weight": np.concatenate([[], *(blend.data for blend in blends)]).astype(np.float32),
+    }
+
+
+def thinned_mesh(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], most_faces: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return which vertices of a mesh to draw, and faces of these, ``most_faces`` or fewer.
+
+    Vertices in one cell of a grid become one, the first; the cells grow until that is enough.
+    """
+    kept, cell_m = np.arange(len(vertices)), _CELL_M
+    thinned = faces
+    while len(thinned) > most_faces:
+        cells = np.floor(vertices / cell_m).astype(np.int64)
+        _, kept, number = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        thinned = number.reshape(-1)[faces]
+        thinned = thinned[(thinned != np.roll(thinned, 1, axis=1)).all(axis=1)]
+        cell_m *= _COARSER
+    return kept, thinned

@@ -20,17 +20,14 @@ _MAX_BYTES = 200_000_000  # far more than the 2 MB that a run writes
 _LARGEST = 1e9
 
 _MAY_BE_NAN = ("corners",)
-_POINTS_INTO = {
-    "echo_path": "path", "echo_part": "part",
-    "furniture_faces": "vertex", "furniture_piece": "piece",
-    "part_person": "person", "mesh_faces": "mesh vertex", "mesh_of_vertex": "mesh",
-    "blend_vertex": "mesh vertex", "blend_row": "row",
-}  # fmt: skip
 
 
-def _array(kind: str, *axes: str | int) -> Any:
-    """Field of `Snapshots`: NumPy's code of its type, and the names or lengths of its axes."""
-    return field(metadata={"kind": kind, "axes": axes})
+def _array(kind: str, *axes: str | int, into: str | None = None) -> Any:
+    """Field of `Snapshots`: NumPy's code of its type, and the names or lengths of its axes.
+
+    Its values are indices along the axis ``into``.
+    """
+    return field(metadata={"kind": kind, "axes": axes, "into": into})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,8 +65,8 @@ class Snapshots:
     part_names: NDArray[np.str_] = _array("U", "part")
     poses: NDArray[np.float32] = _array("f4", "step", "part", 4, 3)
     path_names: NDArray[np.str_] = _array("U", "path")
-    echo_path: NDArray[np.int64] = _array("i8", "echo")
-    echo_part: NDArray[np.int64] = _array("i8", "echo")
+    echo_path: NDArray[np.int64] = _array("i8", "echo", into="path")
+    echo_part: NDArray[np.int64] = _array("i8", "echo", into="part")
     echo_bounces: NDArray[np.int64] = _array("i8", "echo")
     range_m: NDArray[np.float64] = _array("f8", "step", "echo")
     velocity_mps: NDArray[np.float64] = _array("f8", "step", "echo")
@@ -79,32 +76,33 @@ class Snapshots:
     walls: NDArray[np.float64] = _array("f8", "wall", 4, 3)
     furniture_names: NDArray[np.str_] = _array("U", "piece")
     furniture_vertices: NDArray[np.float32] = _array("f4", "vertex", 3)
-    furniture_faces: NDArray[np.int64] = _array("i8", "face", 3)
-    furniture_piece: NDArray[np.int64] = _array("i8", "vertex")
-    part_person: NDArray[np.int64] = _array("i8", "part")
+    furniture_faces: NDArray[np.int64] = _array("i8", "face", 3, into="vertex")
+    furniture_piece: NDArray[np.int64] = _array("i8", "vertex", into="piece")
+    part_person: NDArray[np.int64] = _array("i8", "part", into="person")
     person_names: NDArray[np.str_] = _array("U", "person")
     person_position: NDArray[np.float64] = _array("f8", "step", "person", 3)
     person_speed: NDArray[np.float64] = _array("f8", "step", "person")
     object_names: NDArray[np.str_] = _array("U", "object")
     mesh_source: NDArray[np.int64] = _array("i8", "mesh")
-    mesh_faces: NDArray[np.int64] = _array("i8", "mesh face", 3)
-    mesh_of_vertex: NDArray[np.int64] = _array("i8", "mesh vertex")
+    mesh_faces: NDArray[np.int64] = _array("i8", "mesh face", 3, into="mesh vertex")
+    mesh_of_vertex: NDArray[np.int64] = _array("i8", "mesh vertex", into="mesh")
     mesh_part: NDArray[np.int64] = _array("i8", "mesh vertex")
     mesh_rows: NDArray[np.float32] = _array("f4", "step", "row", 3)
-    blend_vertex: NDArray[np.int64] = _array("i8", "blend")
-    blend_row: NDArray[np.int64] = _array("i8", "blend")
+    blend_vertex: NDArray[np.int64] = _array("i8", "blend", into="mesh vertex")
+    blend_row: NDArray[np.int64] = _array("i8", "blend", into="row")
     blend_weight: NDArray[np.float32] = _array("f4", "blend")
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
         for one in fields(self):
-            array = _checked(one.name, getattr(self, one.name), sizes, **one.metadata)
+            kind, axes = one.metadata["kind"], one.metadata["axes"]
+            array = _checked(one.name, getattr(self, one.name), sizes, kind, axes)
             object.__setattr__(self, one.name, array)
         if not sizes["step"]:
             raise InputError("view: there is no snapshot; at least one is needed")
-        for name, axis in _POINTS_INTO.items():
-            index = getattr(self, name)
-            if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
+        for one in fields(self):
+            name, axis, index = one.name, one.metadata["into"], getattr(self, one.name)
+            if axis and index.size and not 0 <= index.min() <= index.max() < sizes[axis]:
                 allowed = f"it must be from 0 to {sizes[axis] - 1}"
                 raise InputError(f"view: {name} points at a {axis} that is not there; {allowed}")
         of, part = self.mesh_source, self.mesh_part
