@@ -13,6 +13,7 @@ from typing import Any
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
+from rtradar.system.templates import templates
 from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.backends.llvm import candidates
 from rtradar.trace.backends.probe import probe_backend
@@ -102,34 +103,8 @@ def _chosen(backends: dict[Kind, str]) -> tuple[str | None, list[str]]:
 
 def report_text(found: Report) -> str:
     """The report for a person at a terminal."""
-    memory, chosen = "unknown", found["chosen"]
-    if found["memory_total_mb"] is not None:
-        memory = f"{found['memory_total_mb'] / 1024:.1f} GiB"
-        if found["memory_available_mb"] is not None:
-            memory += f", {found['memory_available_mb'] / 1024:.1f} GiB available"
-    versions = (f"{name} {version}" for name, version in found["packages"].items() if version)
-    lines = [
-        f"Python    {found['python']}",
-        f"System    {found['system']}",
-        f"Cores     {found['cores']}",
-        f"Memory    {memory}",
-        f"Packages  {', '.join(versions)}",
-        "libLLVM   " + ("in the order of trial:" if found["llvm"] else "none found"),
-    ]
-    lines += [
-        f"  {'->' if row['chosen'] else '  '} {row['version'] or '?':<8} "
-        f"{row['finding']:<28} {row['origin']:<12} {row['path']}"
-        for row in found["llvm"]
-    ]
-    lines.append("Backends")
-    lines += [
-        f"  {'->' if VARIANTS[kind] == chosen else '  '} {kind:<8} {finding}"
-        for kind, finding in found["backends"].items()
-    ]
-    lines.append(f"Compiled  {found['compiled_code']}")
-    lines += [f"To do     {line}" for line in found["advice"]]
-    verdict = f"ready, on {chosen}" if chosen else "no backend works: rays cannot be traced"
-    return "\n".join([*lines, f"Verdict   {verdict}"])
+    template = templates(Path(__file__).parent, escaped=False).get_template("report.txt")
+    return template.render(found, variants=VARIANTS)
 
 
 def report(json_path: str | Path | None = None) -> int:

@@ -11,11 +11,13 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
+from rtradar.system.templates import templates
 from rtradar.validate.claims import (
     Claim,
     Outcome,
@@ -29,31 +31,12 @@ from rtradar.validate.rows import worst
 
 __all__ = ["claims", "validate", "validation_folder"]
 
-_LINE = "{:<14} {:<18} {:>5} {:>6} {:>6} {:>11} {:>8}"
-_COSTLIEST = 15
-_HEAD = _LINE.format("key", "script", "rows", "judged", "failed", "error/limit", "seconds")
+_HEAD = "key            script              rows judged failed error/limit  seconds"
 
 
-def _lines(outcome: Outcome) -> Iterator[str]:
-    """Lines of a script: one for each key, and one for each figure outside its limit."""
-    name, seconds = outcome.claim.name, f"{outcome.seconds:.1f}"
-    for key in outcome.keys:
-        rows = [row for row in outcome.rows if row.key == key]
-        judged = sum(row.tolerance is not None for row in rows)
-        failed = sum(not row.passed for row in rows)
-        nearest = worst(rows)
-        used = "-" if nearest is None else f"{nearest.used:.3g}"
-        yield _LINE.format(key, name, len(rows), judged, failed, used, seconds)
-        seconds = ""
-    if not outcome.keys:
-        yield _LINE.format("-", name, 0, 0, 0, "-", seconds)
-    for what in outcome.left_out:
-        yield f"  not measured: {what}"
-    for row in outcome.failed:
-        limit = "must be a number" if row.tolerance is None else f"limit {row.tolerance:.4g}"
-        yield f"  FAILED  {row.claim}: {row.quantity}: {row.error:.4g} {row.unit}, {limit}"
-    if outcome.trouble:
-        yield f"  FAILED  {name} {outcome.trouble}"
+def _text(template: str, **values: Any) -> str:
+    found = templates(Path(__file__).parent, escaped=False)
+    return found.get_template(template).render(values).rstrip("\n")
 
 
 def _run(
@@ -134,37 +117,18 @@ def validate(
             outcomes.append(outcome)
             bar.set_description(outcome.claim.name)
             bar.update()
-            for line in _lines(outcome):
-                tqdm.write(line)
+            tqdm.write(_text("outcome.txt", outcome=outcome, worst=worst))
             sys.stdout.flush()
     outcomes.sort(key=lambda outcome: outcome.claim.name)
     rows = [row for outcome in outcomes for row in outcome.rows]
     judged = [row for row in rows if row.tolerance is not None]
     passed = all(row.passed for row in rows) and not any(outcome.trouble for outcome in outcomes)
-    print(
-        f"{'passed' if passed else 'FAILED'}: {sum(row.passed for row in judged)} of {len(judged)} "
-        f"judged figures within their limits, {len(rows) - len(judged)} reported; "
-        f"{len(outcomes)} scripts, {sum(outcome.seconds for outcome in outcomes):.0f} s"
-    )
-    print(_costs(outcomes))
+    print(_text("verdict.txt", passed=passed, judged=judged, rows=rows, outcomes=outcomes))
     if json_path is not None:
         _write_json(json_path, outcomes, passed, quick)
     if readme is not None:
         write_readme(readme, markdown(outcomes))
     return 0 if passed else 1
-
-
-def _costs(outcomes: Sequence[Outcome]) -> str:
-    """What the costliest scripts take for how many judged figures."""
-    lines = [f"{'script':<26} {'processor':>10} {'share':>6} {'judged':>6} {'a figure':>9}"]
-    whole = sum(outcome.cpu_seconds for outcome in outcomes) or 1.0
-    for outcome in sorted(outcomes, key=lambda each: -each.cpu_seconds)[:_COSTLIEST]:
-        seconds, count = outcome.cpu_seconds, outcome.judged
-        each = f"{seconds / count:.2f} s" if count else "-"
-        lines.append(
-            f"{outcome.claim.name:<26} {seconds:8.1f} s {seconds / whole:6.1%} {count:6d} {each:>9}"
-        )
-    return "\n".join(lines)
 
 
 def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bool) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_bytes
+from rtradar.system.templates import templates
 from rtradar.validate.claims import Outcome
 from rtradar.validate.rows import Row, worst
 
@@ -34,24 +35,20 @@ def markdown(outcomes: Sequence[Outcome]) -> str:
     # Sorting is stable, so the scripts and their rows keep their order.
     places = {key: place for place, key in enumerate(KEYS)}
     ordered = sorted(groups, key=lambda line: (places.get(line[0], len(KEYS)), line[0]))
-    lines = ["| key | claim | worst | limit | cases | script |", "|---|---|---|---|---|---|"]
+    lines = []
     for same in ordered:
         (key, script, says, unit, _), rows = same, groups[same]
         row = worst(rows) or rows[0]
         if not row.says and len(rows) == 1:
             says = f"{row.claim}: {row.quantity}"
         unit = f" {unit}" if unit not in ("", "1") else ""
-        limit, cases = f"{row.tolerance:.3g}{unit}", sum(row.cases for row in rows)
-        error = f"{_figure(row.error)}{unit}"
-        error = error if row.passed else f"**{error}: FAILED**"
-        lines.append(f"| `{key}` | {_cell(says)} | {error} | {limit} | {cases} | `{script}` |")
+        line = {"key": key, "script": script, "says": says, "passed": row.passed}
+        line |= {"error": f"{_figure(row.error)}{unit}", "limit": f"{row.tolerance:.3g}{unit}"}
+        lines.append(line | {"cases": sum(row.cases for row in rows)})
     judged = [row for rows in groups.values() for row in rows]
-    kept = sum(row.passed for row in judged)
     others = sum(len(outcome.rows) for outcome in outcomes) - len(judged)
-    within = f"{kept} of {len(judged)} judged figures are within their limits"
-    lines += ["", f"{within}; {others} more are reported."]
-    troubles = ((each.claim.script.name, each.trouble) for each in outcomes if each.trouble)
-    return "\n".join(lines + [f"`{script}` {_cell(trouble)}." for script, trouble in troubles])
+    template = templates(Path(__file__).parent, escaped=False).get_template("table.md")
+    return template.render(lines=lines, judged=judged, others=others, outcomes=outcomes).rstrip()
 
 
 def _figure(value: float) -> str:
@@ -59,10 +56,6 @@ def _figure(value: float) -> str:
     if 100 <= abs(value) < 1e5:
         return f"{value:.0f}"
     return format(value, ".3g" if abs(value) >= 0.1 else ".2g")
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
 
 
 def write_readme(path: Path, text: str) -> None:

@@ -22,6 +22,7 @@ from rtradar.errors import InputError
 from rtradar.report.pages import labels
 from rtradar.scatter.validity import WARN_FRACTION
 from rtradar.system.files import atomic_file, open_regular
+from rtradar.system.templates import templates
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -33,15 +34,7 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 @cache
 def _environment() -> Environment:
-    from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
-
-    found = Environment(
-        autoescape=True,
-        loader=PackageLoader("rtradar.report", "pages"),
-        lstrip_blocks=True,
-        trim_blocks=True,
-        undefined=StrictUndefined,
-    )
+    found = templates(Path(__file__).parent, escaped=True)
     shown = (labels.grouped, labels.minus, labels.quantities, labels.stage_label, labels.with_unit)
     found.filters |= {one.__name__: one for one in (*shown, grade)}
     found.globals |= {"png": _png}
