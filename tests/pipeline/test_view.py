@@ -214,7 +214,7 @@ def test_a_spectrogram_is_divided_by_the_bandwidth_of_the_runs_window(
         ("summary.json", '{"parameters": {"radar": {"tx_y": -1}}}', "tx_y = -1"),
         ("summary.json", '{"parameters": {"radar": {}, "range_window": 3}}', "range window 3"),
         ("view.npz", None, "is not there"),
-        ("maps.h5", None, "No such file"),
+        ("maps.h5", None, "is not there"),
         ("maps.h5", "text", "is damaged"),
         ("cloud_rdt.npz", None, "is not there"),
         ("cloud_xyz.npz", "text", "is damaged"),

@@ -22,7 +22,7 @@ from rtradar.radar import Radar
 from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.figures.maps import thinned
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
-from rtradar.report.view.snapshots import Snapshots, load_snapshots
+from rtradar.report.view.snapshots import DAMAGE, Snapshots, load_snapshots, refused
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json, stored
 from rtradar.system.output_folder import check_whole
@@ -45,9 +45,6 @@ _MAX_LETTERS = 200
 _DYNAMIC_RANGE_DB = 60.0
 _SAMPLED = 16
 """Number of maps whose medians give the noise."""
-
-_DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
-_MEND = "make it anew with: rtradar run"
 
 
 def view(
@@ -129,16 +126,16 @@ def run_view_of(
     if at_most is not None:
         snapshots = snapshots.every(snapshots.stride(*at_most))
     points = run_points(folder)
-    columns = ("points", "velocity", "power", "time")
-    spatial = _archive(folder / "cloud_xyz.npz", columns, ("points",), ("source",))
+    path = folder / "cloud_xyz.npz"
+    spatial = _archive(path, ("points", "velocity", "power", "time"), ("points",), ("source",))
     try:
         cloud = SpatialCloud(**spatial)
-    except (InputError, TypeError) as error:
-        raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
+    except DAMAGE as error:
+        raise refused(path, ValueError(str(error))) from None
     with run_maps(folder) as file:
         maps = _maps(file)
         if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
-            raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
+            raise ValueError("it is not of one run with view.npz")
         return assembled(maps, snapshots, points, cloud, radar, summary, windows)
 
 
@@ -187,10 +184,8 @@ def run_summary(folder: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
         # Folders of older versions name none; theirs were Hann windows.
         names = (parameters.get(f"{axis}_window", "hann") for axis in ("range", "doppler"))
         return summary, Radar(**parameters["radar"]), WindowFunctions(*names)
-    except InputError as error:
-        raise InputError(f"'{path}': {error}; {_MEND}") from None
-    except _DAMAGE:
-        raise InputError(f"'{path}' is damaged; {_MEND}") from None
+    except DAMAGE as error:
+        raise refused(path, error) from None
 
 
 def run_points(folder: Path) -> NDArray[np.float64]:
@@ -198,7 +193,7 @@ def run_points(folder: Path) -> NDArray[np.float64]:
     path = folder / "cloud_rdt.npz"
     points: NDArray[np.float64] = _archive(path, ("points",))["points"]
     if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"'{path}' is damaged; {_MEND}")
+        raise refused(path, ValueError(f"points have shape {points.shape}"))
     return points
 
 
@@ -211,11 +206,8 @@ def run_maps(folder: Path) -> Iterator[h5py.File]:
             yield file
     except InputError:
         raise
-    except _DAMAGE as error:
-        why: str | None = "is damaged, or of another kind"
-        if isinstance(error, FileNotFoundError):
-            why = error.strerror
-        raise InputError(f"'{path}': {why}; {_MEND}") from None
+    except DAMAGE as error:
+        raise refused(path, error) from None
 
 
 def _line(value: Any) -> str:
@@ -235,9 +227,8 @@ def _archive(
             _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
         found = {name: arrays[name].astype(np.float64) for name in names}
         return found | {name: _whole(arrays[name]) for name in may_lack if name in arrays}
-    except _DAMAGE as error:
-        why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
-        raise InputError(f"'{path}' {why}; {_MEND}") from None
+    except DAMAGE as error:
+        raise refused(path, error) from None
 
 
 def _finite(values: NDArray[Any]) -> NDArray[Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from rtradar.report.figures.canvas import FieldUnit, add_colour_bar, colour_limi
 from rtradar.report.figures.fitting import fitted_limits
 from rtradar.report.figures.maps import rdt_points
 from rtradar.report.pages.html import write_page
-from rtradar.report.pages.labels import stage_label
 from rtradar.report.view.run_view import RunView
 from rtradar.report.view.three_d import posed_figure
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading
@@ -142,31 +141,7 @@ def write_comparison(
     measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts;
     ``views`` are the data of the maps of each model, the reference last.
     """
-    models, parameters = summary["fidelities"], summary["parameters"]
-    *others, reference = views
-    values = {
-        "heading": str(parameters["motion"]),
-        "subtitle": f"{parameters['radar']['name']}: {', '.join(models)}",
-        "sections": {
-            "side": "Side by side",
-            "measures": "What differs",
-            "maps": "Pictures",
-            "parts": "Mean echo power by part",
-            "parameters": "Settings of all runs",
-            "cost": "Cost: seconds for each stage",
-        },
-        "panels": {
-            "figure": "The body",
-            **{f"map-{k}": name for k, name in enumerate(others)},
-            f"map-{len(others)}": f"{reference} (reference)",
-            **{f"difference-{k}": f"{name} less {reference}" for k, name in enumerate(others)},
-        },
-        "parameters": {"": parameters},
-        "head": ["", *models],
-        "parts": _parts([*models.values()], unit),
-        "power_label": unit.label(),
-        "stages": _stages([*models.values()]),
-    }
+    values = {"fidelities": summary["fidelities"], "models": [*views], "unit": unit}
     scripts = ("plots.js", "figure.js", "compare.js")
     _write(path, summary, rows, pictures, values, data=comparison_data(views), scripts=scripts)
 
@@ -178,24 +153,11 @@ def write_folders(
     pictures: Mapping[str, Path],
 ) -> None:
     """Write a comparison of folders as a page: what `write_comparison` writes, but for models."""
-    folders = summary["folders"]
-    radar = folders[summary["reference"]]["parameters"]["radar"]["name"]
-    values = {
-        "heading": " and ".join(folders),
-        "subtitle": str(radar),
-        "sections": {
-            "measures": "What differs",
-            "settings": "Settings that differ",
-            "maps": "Pictures",
-            "parameters": "Settings",
-        },
-        "parameters": {name: found["parameters"] for name, found in folders.items()},
-        "folders": folders,
-        "differ": [
-            (key, *(str(values.get(name, "")) for name in folders))
-            for key, values in summary["differ"].items()
-        ],
-    }
+    differ = [
+        (key, *(str(values.get(name, "")) for name in summary["folders"]))
+        for key, values in summary["differ"].items()
+    ]
+    values = {"folders": summary["folders"], "differ": differ}
     _write(path, summary, rows, pictures, values)
 
 
@@ -207,8 +169,7 @@ def _write(
     values: Mapping[str, Any],
     **options: Any,
 ) -> None:
-    shared = {"kind": "rtradar compare", "reference": summary["reference"]}
-    shared |= {"rows": rows, "pictures": pictures}
+    shared = {"summary": summary, "rows": rows, "pictures": pictures}
     write_page(path, "compare.html", shared | dict(values), **options)
 
 
@@ -243,16 +204,3 @@ def _spread(one: NDArray[np.float64], other: NDArray[np.float64], floor_db: floa
     """Return what a twentieth of the differences exceed, where either is above the floor [dB]."""
     differences = np.abs(one - other)[np.maximum(one, other) > floor_db]
     return float(np.percentile(differences, 95)) if len(differences) else 0.0
-
-
-def _parts(models: Sequence[Mapping[str, Any]], unit: FieldUnit) -> Iterator[list[str]]:
-    for part in models[0]["part_power_m2"]:
-        powers = [model["part_power_m2"][part] for model in models]
-        levels = (f"{unit.level(power):.1f}" if power > 0 else "occluded" for power in powers)
-        yield [part.capitalize(), *levels]
-
-
-def _stages(models: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
-    for stage in dict.fromkeys(stage for found in models for stage in found["stages"]):
-        seconds = (model["stages"].get(stage) for model in models)
-        yield [stage_label(stage), *("-" if one is None else f"{one:.3f}" for one in seconds)]

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import field_unit
 from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.html import write_page
-from rtradar.report.pages.labels import grouped, minus, signal_to_noise
+from rtradar.report.pages.labels import signal_to_noise
 from rtradar.report.view.run_view import RunView, linked_views, view_data
 from rtradar.report.view.three_d import rdt_data, spatial_data
 
@@ -70,6 +70,7 @@ def write_report(
     """
     parameters = dict(summary.get("parameters", {}))
     data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
+    points = np.asarray(rdt_points, dtype=np.float64)
     if spatial is not None:
         data["spatial"] = spatial_data(spatial, radar)
     clouds = dict(data)
@@ -95,36 +96,15 @@ def write_report(
         "kind": "rtradar report",
         "heading": str(parameters.get("motion", "Recording")),
         "subtitle": ", ".join(filter(None, told)),
-        "headline": _headline(summary, np.asarray(rdt_points, dtype=np.float64)),
+        "n_points": len(points),
+        "spread": central_limits(points) if len(points) else None,
+        "ratio": signal_to_noise(summary),
         "sections": {name: title for name, (title, there) in shown.items() if there},
         "radar": radar,
         "clouds": clouds,
         "shown_db": SHOWN_DB,
     }
     write_page(path, "report.html", values, data=data, scripts=(*scripts, "report.js"))
-
-
-def _headline(summary: Mapping[str, Any], points: NDArray[np.float64]) -> Iterator[tuple[str, str]]:
-    """Yield what the radar saw, as figures with captions."""
-    if len(points):
-        low, high = central_limits(points)
-        nearest, farthest = summary.get("detected_range_m") or (low[1], high[1])
-        yield f"{nearest:.1f} to {farthest:.1f} m", "range of what was detected"
-        yield (
-            minus(f"{low[2]:+.1f} to {high[2]:+.1f} m/s"),
-            "velocity of what was detected, positive: receding",
-        )
-    if ratio := signal_to_noise(summary):
-        yield ratio, "signal to noise, of one IF sample"
-    if "detections" in summary:
-        frames = f" in {summary['windows']} frames" if "windows" in summary else ""
-        yield grouped(summary["detections"]), f"detections{frames}"
-    yield (
-        grouped(len(points)),
-        "points of the range-Doppler-time cloud, drawn on the surface about the detections",
-    )
-    if "capture_s" in summary:
-        yield f"{summary['capture_s']:.2f} s", "of radar"
 
 
 def _summary(summary: Mapping[str, Any], radar: Radar) -> dict[str, Any]:
@@ -173,21 +153,7 @@ def _room(
             sorted(own.items(), key=lambda one: ROOM_PICTURES.index(Path(one[1]).name))
         ),
         "pictures": {title: path for title, path in pictures.items() if title not in own},
-        "room_tiles": _room_tiles(room, clutter),
         "ghosts": list(zip(ghosts, levels, strict=True)),
         "ghost_unit": unit,
         "left_out": left_out,
     }
-
-
-def _room_tiles(room: Mapping[str, Any], clutter: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield what was found out about a room, as figures with captions."""
-    if (before := clutter.get("signal_to_clutter_db")) is not None:
-        yield minus(f"{before:.1f} dB"), "signal to clutter, as received"
-    if (after := clutter.get("after_removal_db")) is not None:
-        yield minus(f"\u2265 {after:.1f} dB"), "signal to clutter, after removal"
-    if paths := [path for path in room.get("paths", ()) if path["order"]]:
-        kept = sum(1 for path in paths if path["kept"])
-        yield f"{kept} of {len(paths)}", "paths over walls are above the noise"
-    if ghosts := room.get("ghosts"):
-        yield str(len(ghosts["paths"])), f"ghosts at {ghosts['time_s']:.2f} s"

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.system.checks import printable
 from rtradar.system.files import atomic_file, read_arrays
 
 _FORMAT = 2
 _MAX_BYTES = 200_000_000  # far more than the 2 MB that a run writes
 
 _LARGEST = 1e9
+
+DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
+"""Errors that damaged files and arrays cause."""
 
 _MAY_BE_NAN = ("corners",)
 
@@ -189,25 +193,27 @@ def load_snapshots(path: str | Path) -> Snapshots:
 
     Files of version 0.1 have one person, whose place is then that of the lower torso.
     """
-    mend = "make it anew with: rtradar run"
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)
         if arrays["format"].tolist() == 1:
             arrays |= _of_one_person(**arrays)
-        names = ("format", *(one.name for one in fields(Snapshots)))
-        found: dict[str, Any] = {name: arrays[name] for name in names}
-    except FileNotFoundError:
-        raise InputError(f"'{path}' is not there; {mend}") from None
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise InputError(
-            f"'{path}' is damaged or no file of snapshots ({' '.join(str(error).split())}); {mend}"
-        ) from None
-    if found.pop("format").tolist() != _FORMAT:
-        raise InputError(f"'{path}' is of another version of rtradar; {mend}")
-    try:
-        return Snapshots(**found)
-    except InputError as error:
-        raise InputError(f"'{path}': {error}; {mend}") from None
+        if arrays["format"].tolist() != _FORMAT:
+            raise InputError("it is of another version of rtradar")
+        return Snapshots(**{one.name: arrays[one.name] for one in fields(Snapshots)})
+    except DAMAGE as error:
+        raise refused(path, error) from None
+
+
+def refused(path: str | Path, error: Exception) -> InputError:
+    """Return what is said of a file of a run that is missing, damaged or refused."""
+    if isinstance(error, InputError):
+        why = str(error)
+    elif isinstance(error, FileNotFoundError):
+        why = "it is not there"
+    else:
+        said = printable(" ".join(str(error).split()))[:100]
+        why = f"it is damaged, or of another kind ({said})"
+    return InputError(f"'{path}': {why}; make it anew with: rtradar run")
 
 
 def _of_one_person(
