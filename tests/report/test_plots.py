@@ -38,16 +38,11 @@ def texts(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_visible() and text.get_alpha() != 0]
 
 
-def test_limits_have_what_is_detected_and_a_margin() -> None:
+def test_limits_have_what_is_detected_a_margin_and_no_handful_of_outliers() -> None:
     counts = np.zeros(100)
     counts[40:60] = 50
     # Edges 39.5 to 59.5, and 15 % of 20 bins at each side.
     assert fitted_limits(counts, BINS) == pytest.approx((36.5, 62.5))
-
-
-def test_a_handful_of_outliers_sets_no_limit_and_more_of_them_do() -> None:
-    counts = np.zeros(100)
-    counts[40:60] = 50
     counts[[2, 97]] = 3
     assert fitted_limits(counts, BINS) == pytest.approx((36.5, 62.5))
     counts[2] = 4
@@ -98,6 +93,9 @@ def test_every_text_is_whole_and_covers_no_other(plots_of: Callable[..., Plots],
     seen = texts(figure)
     boxes = [text.get_window_extent() for text in seen]
     assert any("walks.through" in text.get_text().replace("\n", "") for text in seen)
+    # Letters are readable where the picture is 420 pixels wide.
+    pixels = 420 / figure.get_size_inches()[0] / 72
+    assert min(text.get_fontsize() for text in seen) * pixels >= 8
     for text, box in zip(seen, boxes, strict=True):
         assert min(box.x0, box.y0) >= 0, text
         assert box.x1 <= figure.bbox.x1, text
@@ -133,8 +131,12 @@ def test_a_picture_is_drawn_on_the_axes_that_are_given(
     plots_of: Callable[..., Plots], name: str
 ) -> None:
     figure = new_figure(4.0)
+    figure.set_facecolor(DARK.page)
     own = figure.add_subplot(projection="3d" if name == "rdt" else None)
     assert getattr(plots_of(RADAR), name)(own) is own
+    # Colours follow the background.
+    assert theme_of(own) is DARK
+    assert {label.get_color() for label in own.get_xticklabels()} == {DARK.text}
     assert [axes for axes in figure.axes if axes.get_label() != "<colorbar>"] == [own]
     with pytest.raises(rt.InputError, match="ax = 'x'; it must be axes of Matplotlib"):
         getattr(plots_of(RADAR), name)(ax="x")
@@ -150,23 +152,6 @@ def test_a_notebook_shows_what_is_drawn_without_axes(plots_of: Callable[..., Plo
         plt.close("all")
     made.range_time()
     assert plt.get_fignums() == []  # files of a run leave pyplot alone
-
-
-@pytest.mark.parametrize("name", PICTURES)
-def test_colours_follow_the_background(plots_of: Callable[..., Plots], name: str) -> None:
-    figure = new_figure(4.0)
-    figure.set_facecolor(DARK.page)
-    own = figure.add_subplot(projection="3d" if name == "rdt" else None)
-    getattr(plots_of(RADAR), name)(ax=own)
-    assert theme_of(own) is DARK
-    assert {label.get_color() for label in own.get_xticklabels()} == {DARK.text}
-
-
-def test_letters_are_readable_at_420_pixels(plots_of: Callable[..., Plots]) -> None:
-    for name in ("range_doppler", "spatial"):
-        figure = getattr(plots_of(RADAR), name)().figure
-        pixels = 420 / figure.get_size_inches()[0] / 72
-        assert min(text.get_fontsize() for text in texts(figure)) * pixels >= 8
 
 
 def test_a_picture_says_which_frame_it_is(plots_of: Callable[..., Plots]) -> None:
