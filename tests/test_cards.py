@@ -13,8 +13,7 @@ import pytest
 import rtradar as rt
 from rtradar.cards import html_card, quantity, text_card
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import write_index, write_sample
 from rtradar.scene import Furniture, material
 
 HOSTILE = "</td><script>alert(1)</script>&\"'\n\x00"

@@ -226,7 +226,7 @@ def test_a_page_of_the_users_own_is_not_replaced(
 
 
 def test_an_index_of_the_users_own_is_not_replaced(tmp_path: Path) -> None:
-    from rtradar.clouds.sample_index import read_index, write_index
+    from rtradar.clouds.sample_files import read_index, write_index
     from rtradar.errors import InputError
 
     write_index(tmp_path, ["b", "a"])
@@ -240,7 +240,7 @@ def test_an_index_of_the_users_own_is_not_replaced(tmp_path: Path) -> None:
 
 
 def test_sweeping_takes_only_what_an_interrupted_writer_leaves(tmp_path: Path) -> None:
-    from rtradar.clouds.sample_index import sweep
+    from rtradar.clouds.sample_files import sweep
 
     ours = [".0a1b2c.npz.0123456789ab.part", ".collection.json.0123456789ab.part"]
     users = [

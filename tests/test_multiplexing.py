@@ -279,7 +279,7 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
     assert result.summary["detections"] > 0
     # Under DDM a chirp holds the sum of all Tx.
     n_tx = 1 if multiplexing == "ddm" else 4
-    assert open_recording(tmp_path / "out").shape == (2000, n_tx, 4, 128)
+    assert open_recording(tmp_path / "out").cube_shape == (2000, n_tx, 4, 128)
     # The limbs of a walk, in a map up to 54 m/s; where four Tx fade against each other, a copy may
     # be taken for the echo.
     assert (np.abs(result.points[:, 2]) < 6.0).mean() > 0.99

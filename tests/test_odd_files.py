@@ -28,6 +28,7 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.system import files
 from rtradar.system.files import open_regular, read_bytes
+from rtradar.system.hdf5 import stored
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX")
 
@@ -220,8 +221,7 @@ def folders(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     from rtradar.classify.recipes import RECIPES
     from rtradar.classify.study import write_plan
     from rtradar.clouds import Sample
-    from rtradar.clouds.sample_files import write_sample
-    from rtradar.clouds.sample_index import write_index
+    from rtradar.clouds.sample_files import write_index, write_sample
 
     root = tmp_path_factory.mktemp("folders")
     shutil.copytree(small_run, root / "run")
@@ -387,11 +387,11 @@ def test_a_link_inside_of_hdf5_is_not_followed(tmp_path: Path) -> None:
     with guarded(), open_regular(tmp_path / "maps.h5") as raw, h5py.File(raw) as file:
         for name in ("power", "same"):
             with pytest.raises(ValueError, match="is not in this file"):
-                files.stored(file, name)
+                stored(file, name)
         for name in ("nothing", "there/nothing"):
             with pytest.raises(KeyError):
-                files.stored(file, name)
-        assert files.stored(file, "there").shape == (3,)
+                stored(file, name)
+        assert stored(file, "there").shape == (3,)
 
 
 def test_a_samples_folder_of_links_is_not_followed(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from rtradar.classify.splits import SCHEMES
 from rtradar.cli import _parser
 from rtradar.cli.captures import _FLAGS
 from rtradar.cli.listing import _KINDS as LISTED
-from rtradar.clouds.sample_files import KINDS
+from rtradar.clouds.arrays import KINDS
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import models_that
 from rtradar.scene.moving import _KINDS as MOTIONS

@@ -19,8 +19,7 @@ from hypothesis import strategies as st
 import rtradar
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import write_index, write_sample
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import load_motion
 from rtradar.radar import Radar

@@ -6,10 +6,8 @@ import itertools
 import math
 import threading
 import time
-from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,8 +17,14 @@ from rtradar import __version__
 from rtradar.campaign.cluster import dask_client, refuse_in_worker
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
 from rtradar.campaign.spec_file import check_shard, read_spec, write_made
-from rtradar.clouds.sample_files import check_size, is_whole, sample_path, write_sample
-from rtradar.clouds.sample_index import sweep, write_index
+from rtradar.clouds.sample_files import (
+    check_size,
+    is_whole,
+    sample_path,
+    sweep,
+    write_index,
+    write_sample,
+)
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.files import cleanup_on_exit
 from rtradar.system.output_folder import exclusive_lock
@@ -43,26 +47,15 @@ class Outcome(NamedTuple):
     trouble: str = ""
 
 
-@dataclass(frozen=True)
-class Store:
-    """State of a data set's folder: plans of missing or damaged samples, and counts of samples."""
-
-    folder: Path
-    missing: tuple[SamplePlan, ...]
-    whole: int
-    damaged: int
-
-    @classmethod
-    def look(cls, plans: Sequence[SamplePlan], folder: Path) -> Store:
-        """Check every sample that exists."""
-        missing, damaged = [], 0
-        bar = {"desc": "looking for samples", "unit": "sample", "leave": False}
-        for plan in tqdm(plans, disable=None, **bar):
-            path = sample_path(folder, plan.identity)
-            if not is_whole(path, plan.parameters):
-                missing.append(plan)
-                damaged += path.exists()
-        return cls(folder, tuple(missing), len(plans) - len(missing), damaged)
+def missing_of(plans: Sequence[SamplePlan], folder: Path) -> tuple[list[SamplePlan], int]:
+    """Check every sample that exists; return the missing or damaged, and how many are damaged."""
+    bar = {"desc": "looking for samples", "unit": "sample", "leave": False}
+    missing = [
+        plan
+        for plan in tqdm(plans, disable=None, **bar)
+        if not is_whole(sample_path(folder, plan.identity), plan.parameters)
+    ]
+    return missing, sum(sample_path(folder, plan.identity).exists() for plan in missing)
 
 
 def build_dataset(
@@ -116,38 +109,34 @@ def build_dataset(
         read = read._replace(shard=check_shard(shard))
     plans = plan_samples(read)
     folder = out.resolve()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot make folder '{out}': {error.strerror}; give another one (--out)"
-        ) from None
     with exclusive_lock(folder):
         sweep(folder)
-        store = Store.look(plans, folder)
+        missing, damaged = missing_of(plans, folder)
         write_index(folder, [plan.identity for plan in plans])
         write_made(spec, read, folder)
         began = time.perf_counter()
-        done, n_workers = _make_missing(store, plan_only, workers, scheduler)
+        done, n_workers = _make_missing(missing, folder, plan_only, workers, scheduler)
         wall_s = time.perf_counter() - began
+        sweep(folder)
     good = [outcome for outcome in done if not outcome.trouble]
-    _tell_troubles(done, plans, store)
+    whole = len(plans) - len(missing)
+    _tell_troubles(done, plans, whole)
     report = {
         "samples": len(plans),
         "by": counts(plans),
-        "whole": store.whole,
-        "damaged": store.damaged,
+        "whole": whole,
+        "damaged": damaged,
         "made": len(good),
-        "missing": len(store.missing) - len(good),
+        "missing": len(missing) - len(good),
         "bytes": sum(outcome.size for outcome in good),
         "work_s": sum(outcome.work_s for outcome in good) / max(len(good), 1),
         "wall_s": wall_s,
         "workers": n_workers,
     }
-    return report | (_estimate(store.missing, good, n_workers) if plan_only else {})
+    return report | (_estimate(missing, good, n_workers) if plan_only else {})
 
 
-def _tell_troubles(done: Sequence[Outcome], plans: Sequence[SamplePlan], store: Store) -> None:
+def _tell_troubles(done: Sequence[Outcome], plans: Sequence[SamplePlan], whole: int) -> None:
     """Raise InputError about the first sample that cannot be made, and how many there are."""
     bad = [outcome for outcome in done if outcome.trouble]
     if bad:
@@ -155,32 +144,44 @@ def _tell_troubles(done: Sequence[Outcome], plans: Sequence[SamplePlan], store: 
         where = f"{values['recording']} from {values['start_s']:g} s"
         raise InputError(
             f"{len(bad)} of {len(plans)} samples cannot be made, the other "
-            f"{store.whole + len(done) - len(bad)} are there; the first of them, {bad[0].identity} "
+            f"{whole + len(done) - len(bad)} are there; the first of them, {bad[0].identity} "
             f"({where}, {values['radar']}, {values['scene']}): {bad[0].trouble}"
         )
 
 
 def _make_missing(
-    store: Store, plan_only: bool, workers: int | None, scheduler: str | None
+    missing: Sequence[SamplePlan],
+    folder: Path,
+    plan_only: bool,
+    workers: int | None,
+    scheduler: str | None,
 ) -> tuple[list[Outcome], int]:
     """Make the missing samples, or a few of each kind; return outcomes and number of workers."""
-    if not store.missing:
+
+    def tidy() -> None:
+        if scheduler is None:  # else workers may still be writing
+            sweep(folder)
+
+    if not missing:
         return [], 0
-    # Partial files of local workers are removed, even if this process is terminated. The workers of
-    # another scheduler may still be writing.
-    local = scheduler is None
-    leftovers = cleanup_on_exit(lambda: sweep(store.folder)) if local else nullcontext()
     try:
-        with leftovers, dask_client(workers, scheduler) as client:
+        # Partial files go even if this process is terminated.
+        with cleanup_on_exit(tidy), dask_client(workers, scheduler) as client:
             count = len(client.scheduler_info(n_workers=-1)["workers"])
-            chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
-            done = work(client, chosen, store.folder, make_sample)
-    except BaseException:
-        if local:
-            sweep(store.folder)
-        raise
-    sweep(store.folder)
-    return done, count
+            # Enough of each kind to keep all workers busy, twice: the first are slow.
+            kinds = list(_by_kind(missing).values())
+            most = 2 * math.ceil(count / len(kinds))
+            few = [plan for plans in kinds for plan in plans[:most]]
+            return work(client, few if plan_only else missing, folder, make_sample), count
+    finally:
+        tidy()
+
+
+def _by_kind(plans: Iterable[SamplePlan]) -> Mapping[tuple[str, str, str], list[SamplePlan]]:
+    found = defaultdict(list)
+    for plan in plans:
+        found[plan.kind].append(plan)
+    return found
 
 
 def work(
@@ -254,31 +255,19 @@ def _kept(done: Sequence[Outcome], missing: Sequence[SamplePlan]) -> str:
     )
 
 
-def _first_of_each_kind(missing: Sequence[SamplePlan], workers: int) -> list[SamplePlan]:
-    """Choose enough samples of each kind to keep all workers busy, twice: the first are slow."""
-    most = 2 * math.ceil(workers / len({plan.kind for plan in missing}))
-    seen: Counter[tuple[str, str, str]] = Counter()
-    chosen = []
-    for plan in missing:
-        seen[plan.kind] += 1
-        if seen[plan.kind] <= most:
-            chosen.append(plan)
-    return chosen
-
-
 def _estimate(
     missing: Sequence[SamplePlan], good: Sequence[Outcome], workers: int
 ) -> dict[str, float]:
     """Estimate time and bytes of the missing samples from the fastest sample of each kind."""
-    measured = {outcome.identity: outcome for outcome in good}
-    rates: defaultdict[tuple[str, str, str], list[float]] = defaultdict(list)
-    for plan in missing:
-        if plan.identity in measured:
-            rates[plan.kind].append(measured[plan.identity].work_s / plan.interval_s)
-    left = [plan for plan in missing if plan.identity not in measured]
-    seconds = sum(plan.interval_s * min(rates[plan.kind]) for plan in left)
+    measured = {outcome.identity: outcome.work_s for outcome in good}
+    seconds, count = 0.0, len(missing) - len(good)
+    for plans in _by_kind(missing).values():
+        made = [plan for plan in plans if plan.identity in measured]
+        fastest = min(measured[plan.identity] / plan.interval_s for plan in made)
+        left_s = [plan.interval_s for plan in plans if plan.identity not in measured]
+        seconds += fastest * sum(left_s)
     size = sum(outcome.size for outcome in good) / max(len(good), 1)
-    return {"estimated_s": seconds / max(workers, 1), "estimated_bytes": size * len(left)}
+    return {"estimated_s": seconds / max(workers, 1), "estimated_bytes": size * count}
 
 
 def in_words(report: Mapping[str, Any]) -> str:

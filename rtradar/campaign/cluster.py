@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
+from unittest import mock
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import check_cache
@@ -72,7 +73,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
     }
     with (
         _place_for_kernels(environment),
-        _kept_environment(),  # which Dask changes to that of its workers
+        mock.patch.dict(os.environ),  # Dask changes it to that of its workers
         dask.config.set(settings),
     ):
         # Python's process that removes semaphores of a killed build starts with this, silently.
@@ -140,15 +141,3 @@ def _can_be_written(folder: str) -> bool:
     except OSError:
         return False
     return True
-
-
-@contextmanager
-def _kept_environment() -> Iterator[None]:
-    """Restore the environment of this process afterwards."""
-    before = dict(os.environ)
-    try:
-        yield
-    finally:
-        for name in os.environ.keys() - before.keys():
-            del os.environ[name]
-        os.environ.update(before)

@@ -7,23 +7,18 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from rtradar.campaign.card import data_card
+from rtradar.clouds.arrays import ARRAYS, KINDS, attributes
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_files import (
-    ARRAYS,
-    KINDS,
-    UNKNOWN,
-    attributes,
-    read_sample,
-    read_shape,
-)
+from rtradar.clouds.sample_files import UNKNOWN, read_sample, read_shape
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import check_place
@@ -37,6 +32,20 @@ _COUNTS = {"points": ("n_points", "RDT cloud"), "spatial": ("n_spatial", "spatia
 _COORDINATES = {"coordinate": ["time", "range", "velocity"], "axis": ["x", "y", "z"]}
 _NOT_KNOWN = -2  # who returned a point that is none, or of a sample with one person
 _UNITS = re.compile(r"_(s|m|deg|db)$")
+_COLUMNS = {
+    "source": "where the motion is from",
+    "radar": "radars",
+    "scene": "scenes",
+    "fidelity": "fidelity levels",
+    "duration_s": "lengths of intervals [s]",
+    "body_material": "material of the body",
+    "clutter_removal": "removal of static clutter",
+    "detector": "detectors",
+    "pfa": "probability of a false alarm",
+    "version": "versions of rtradar",
+}
+_RANGES = {"snr_db": "SNR [dB]", "heading_deg": "heading [deg]"}
+_MOST_SHOWN = 12
 
 
 def export_dataset(folders: Sequence[Path], out: Path) -> int:
@@ -203,3 +212,85 @@ def _summary(collection: Collection) -> dict[str, Any]:
         # Not "coordinates", a name that has a meaning of its own in these files.
         "world_axes": "x from the radar to the person, y left, z up [m]",
     }
+
+
+def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
+    """Describe a data set and its arrays in Markdown, by the text of ``card.md``.
+
+    Parameters
+    ----------
+    collection : Collection
+        The data set.
+    arrays : mapping
+        Zarr arrays by name.
+
+    Returns
+    -------
+    str
+    """
+    rows, labels = collection.provenance, Counter(collection.labels.tolist())
+    subjects = {str(row.get("subject", UNKNOWN)) for row in rows}
+    told = [row["limits"] for row in rows if isinstance(row.get("limits"), list)]
+    limits = Counter(printable(str(line)) for lines in told for line in lines)
+    if empty := sum(not read_shape(path, "points")[0] for path in collection.paths):
+        limits["nothing was detected: the cloud is empty"] = empty
+    classes = [(name, number, labels[name]) for number, name in enumerate(collection.classes)]
+    known = [
+        (
+            f"`{name}`",
+            ", ".join(array.metadata.dimension_names),
+            " x ".join(map(str, array.shape)),
+            array.attrs.get("units", ""),
+            array.attrs.get("long_name", ""),
+        )
+        for name, array in sorted(arrays.items())
+        if len(array.shape) > 1 or "long_name" in array.attrs
+    ]
+    card = resources.files("rtradar.campaign").joinpath("card.md").read_text("utf-8")
+    return Template(card).substitute(
+        samples=len(collection),
+        motions=len({str(row.get("recording")) for row in rows}),
+        people=len(subjects - {UNKNOWN}),
+        kinds=len(labels),
+        classes=_table(("class", "label", "samples"), classes),
+        arrays=_table(("name", "dimensions", "size", "unit", "meaning"), known),
+        made="\n".join(_made(rows)),
+        licences="\n".join(_licences(rows)),
+        limits="\n".join(
+            f"- in {count} samples: {line}" for line, count in limits.most_common(_MOST_SHOWN)
+        ),
+    )
+
+
+def _made(rows: list[Mapping[str, Any]]) -> list[str]:
+    lines = []
+    for key, name in _COLUMNS.items():
+        counted = Counter(printable(str(row[key])) for row in rows if key in row)
+        if counted:
+            shown = [f"{value} ({count})" for value, count in counted.most_common(_MOST_SHOWN)]
+            more = len(counted) - len(shown)
+            lines.append(f"- {name}: {', '.join(shown)}{f' and {more} more' if more else ''}")
+    for key, name in _RANGES.items():
+        values = [row[key] for row in rows if isinstance(row.get(key), int | float)]
+        if values:
+            lines.append(f"- {name}: {min(values):.3g} to {max(values):.3g}")
+    unknown = sum(row.get("subject") == UNKNOWN for row in rows)
+    if unknown:
+        lines.append(
+            f"- subject unknown: {unknown} samples; each of their recordings counts as a person of "
+            "its own where a split goes by subject"
+        )
+    return lines
+
+
+def _licences(rows: list[Mapping[str, Any]]) -> list[str]:
+    counted = Counter(printable(str(row.get("licence", UNKNOWN))) for row in rows)
+    hints = {UNKNOWN: "; nobody said what may be done with them: find out before you pass them on"}
+    return [
+        f"- {name}: {count} samples{hints.get(name, '')}" for name, count in counted.most_common()
+    ]
+
+
+def _table(head: tuple[str, ...], rows: Iterable[Iterable[object]]) -> str:
+    lines = [head, ["---"] * len(head), *([printable(str(cell)) for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

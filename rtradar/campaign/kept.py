@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds import RdtCloudResult, SpatialCloud
-from rtradar.clouds.sample_files import ARRAYS, KINDS
+from rtradar.clouds.arrays import ARRAYS, KINDS
 from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.prepare import prepare
@@ -139,11 +138,7 @@ class MapKeeper:
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
-        if self._makes_clouds:
-            return self._clouds.finish()
-        none = np.empty(0)
-        spatial = SpatialCloud(np.empty((0, 3)), none, none, none)
-        return Clouds(RdtCloudResult(np.empty((0, 3)), 0, 0), spatial, 0, None)
+        return (self._clouds if self._makes_clouds else CloudMaker(self._processing)).finish()
 
 
 def _axes(processing: Processing, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import warnings
 from collections import Counter
@@ -40,7 +41,7 @@ from rtradar.radar.schedule import FollowingCount
 from rtradar.scene import Object, Scene
 from rtradar.settings import RunSettings
 from rtradar.system.clock import Moment
-from rtradar.system.files import open_regular
+from rtradar.system.files import digest_of
 from rtradar.system.seeds import stream
 
 SPATIAL_POINTS = 3000
@@ -146,24 +147,19 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
         raise InputErrors([f"{text}, or leave it out (skip_short = true)" for text in short])
     for text in short:
         warnings.warn(f"{text.partition(';')[0]}: left out", ValidityWarning, stacklevel=2)
-    run = asdict(spec.run)
-    usual = asdict(RunSettings())
+    run, usual = asdict(spec.run), asdict(RunSettings())
     common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
-    if spec.keep:
-        common["keep"] = list(spec.keep)
-    if not spec.angles:
-        common["angles"] = False
-    if not spec.clouds:
-        common["clouds"] = False
+    later = {"keep": list(spec.keep), "angles": spec.angles, "clouds": spec.clouds}
+    common |= {key: value for key, value in later.items() if value not in ([], True)}
     planned = [
-        _plan(interval, _drawn(interval, combination, spec), common, spec.others)
+        _plan(interval, combination, spec, common)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
         for combination in spec.combinations
     ]
-    identities = Counter(plan.identity for plan in planned)
-    for plan in planned:
-        if identities[plan.identity] > 1:
+    planned.sort(key=lambda plan: plan.identity)
+    for plan, other in itertools.pairwise(planned):
+        if plan.identity == other.identity:
             raise InputError(
                 f"recording '{plan.parameters['recording']}' from {plan.parameters['start_s']:g} s "
                 "is given twice; leave one out"
@@ -171,7 +167,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     number, count = spec.shard
     if number > len(planned):
         raise InputError(f"shard {number} of {count} is empty: there are {len(planned)} samples")
-    return sorted(planned, key=lambda plan: plan.identity)[number - 1 :: count]
+    return planned[number - 1 :: count]
 
 
 def counts(planned: Sequence[SamplePlan]) -> dict[str, dict[str, int]]:
@@ -238,22 +234,16 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
             )
 
 
-def _drawn(interval: _Interval, each: Combination, spec: Spec) -> Combination:
-    """Draw the room of an interval, where each has one of its own."""
-    if not spec.random_rooms:
-        return each
-    room = Scene.random(_seed("room", interval.parameters["seed"]))
-    place = each.scene.person_position_m
-    return each._replace(scene=replace(room, name="random", person_position_m=place))
-
-
 def _plan(
-    interval: _Interval, each: Combination, common: Mapping[str, Any], others: Others | None
+    interval: _Interval, each: Combination, spec: Spec, common: Mapping[str, Any]
 ) -> SamplePlan:
-    drawn, radar = interval.drawn, each.scene.turn(each.radar)
-    x, y = each.scene.person_position_m
+    drawn, seed, scene = interval.drawn, interval.parameters["seed"], each.scene
+    x, y = scene.person_position_m
+    if spec.random_rooms:
+        scene = replace(Scene.random(_seed("room", seed)), name="random")
+    radar = scene.turn(each.radar)
     place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
-    scene = replace(each.scene, person_position_m=place)
+    scene = replace(scene, person_position_m=place)
     parameters = {
         **interval.parameters,
         **common,
@@ -267,8 +257,8 @@ def _plan(
         "person_position_m": list(place),
         "radar_position_m": list(scene.radar_place(radar)),
     }
-    if others is not None:
-        parameters["others"] = _drawn_others(others, interval.parameters["seed"], place)
+    if spec.others is not None:
+        parameters["others"] = _drawn_others(spec.others, seed, place)
     return SamplePlan(interval.label, parameters, radar, scene, interval.motion)
 
 
@@ -428,8 +418,5 @@ def _mesh_digest(path: Path, changed_ns: int, size: int) -> str:
 
 def digest(paths: list[Path]) -> str:
     """Hash of the content of files, one after the other."""
-    found = hashlib.sha256()
-    for path in paths:
-        with open_regular(path) as file:
-            found.update(hashlib.file_digest(file, "sha256").digest())
-    return found.hexdigest()[:_ID_DIGITS]
+    found = b"".join(bytes.fromhex(digest_of(path)) for path in paths)
+    return hashlib.sha256(found).hexdigest()[:_ID_DIGITS]

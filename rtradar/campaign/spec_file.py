@@ -34,8 +34,7 @@ from rtradar.campaign.spec import (
     check_equal_sizes,
     check_samples,
 )
-from rtradar.clouds.sample_files import UNKNOWN, write_durably
-from rtradar.clouds.sample_index import MADE_FROM
+from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.description import MOST_FILES, check_files, versions
 from rtradar.errors import InputError, InputErrors

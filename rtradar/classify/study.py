@@ -30,7 +30,7 @@ from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_index import MADE_FROM
+from rtradar.clouds.sample_files import MADE_FROM
 from rtradar.description import made_from
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json, remove_parts

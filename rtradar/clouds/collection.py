@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.cards import html_card, text_card
-from rtradar.clouds import display
+from rtradar.cards import cut, html_card, text_card
+from rtradar.clouds.arrays import ARRAYS, KINDS, attributes
 from rtradar.clouds.sample_files import (
-    ARRAYS,
-    KINDS,
     Sample,
-    attributes,
     damaged,
     read_digest,
+    read_index,
     read_sample,
     read_shape,
     sample_path,
 )
-from rtradar.clouds.sample_index import read_index
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, is_whole
 
@@ -31,6 +29,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from rtradar.clouds.torch_dataset import SampleDataset
+
+
+_ENTRIES = {
+    "Subjects": "subject",
+    "Sources": "source",
+    "Radars": "radar",
+    "Scenes": "scene",
+    "Levels": "fidelity",
+    "SNR [dB]": "snr_db",
+}
+"""Entry of the provenance for each row of what a data set shows of itself."""
 
 
 class Collection:
@@ -63,19 +72,18 @@ class Collection:
         if not folders:
             raise InputError("no folder of clouds; give at least one of rtradar dataset build")
         self.folders = tuple(Path(folder) for folder in folders)
-        found = {folder: read_index(folder) for folder in self.folders}
-        self._name = ", ".join(f"'{folder}'" for folder in found)
-        self.paths = tuple(
-            sample_path(folder, identity) for folder, ids in found.items() for identity in ids
-        )
-        self.ids = tuple(path.stem for path in self.paths)
-        for folder, ids in found.items():
-            missing = sum(not sample_path(folder, identity).is_file() for identity in ids)
-            if missing:
+        self._name = ", ".join(f"'{folder}'" for folder in self.folders)
+        paths: list[Path] = []
+        for folder in dict.fromkeys(self.folders):
+            own = [sample_path(folder, identity) for identity in read_index(folder)]
+            if missing := sum(not path.is_file() for path in own):
                 raise InputError(
-                    f"collection '{folder}': {missing} of {len(ids)} samples are missing; "
+                    f"collection '{folder}': {missing} of {len(own)} samples are missing; "
                     "finish it with: rtradar dataset build"
                 )
+            paths += own
+        self.paths = tuple(paths)
+        self.ids = tuple(path.stem for path in paths)
         if repeated := len(self.ids) - len(set(self.ids)):
             raise InputError(
                 f"{repeated} samples are in more than one of {self._name}; leave one out"
@@ -91,7 +99,12 @@ class Collection:
 
     @property
     def _rows(self) -> dict[str, str]:
-        return display.rows(self.labels.tolist(), self.provenance)
+        found = {"Samples": f"{len(self):,}", "Activities": _counted(self.labels.tolist())}
+        for label, key in _ENTRIES.items():
+            values = [entries[key] for entries in self.provenance if key in entries]
+            if values:
+                found[label] = _counted(values)
+        return found
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -299,8 +312,7 @@ class Collection:
         (n, 3) float64
             Time [s], range [m] and velocity [m/s] of each point.
         """
-        points: NDArray[np.float64] = read_sample(self.paths[index], "points")
-        return points
+        return read_sample(self.paths[index], "points")
 
     def spatial(self, index: int) -> NDArray[np.float64]:
         """Read the spatial cloud of the same capture.
@@ -321,8 +333,7 @@ class Collection:
         InputError
             If its file is damaged.
         """
-        points: NDArray[np.float64] = read_sample(self.paths[index], "spatial")
-        return points
+        return read_sample(self.paths[index], "spatial")
 
     def spatial_source(self, index: int) -> NDArray[np.int64] | None:
         """Read who returned each point of the spatial cloud.
@@ -346,8 +357,15 @@ class Collection:
         """
         if not self._has_sources(index):
             return None
-        found: NDArray[np.int64] = read_sample(self.paths[index], "spatial_source").astype(np.int64)
-        return found
+        return read_sample(self.paths[index], "spatial_source").astype(np.int64)
 
     def _has_sources(self, index: int) -> bool:
         return "source_names" in self._about[index]["provenance"]
+
+
+def _counted(values: Iterable[object]) -> str:
+    """List different values, the most frequent first, each with its number of samples."""
+    counts = Counter(cut(str(value), 40) for value in values).most_common()
+    if len(counts) > 12:
+        return f"{len(counts)} different ones"
+    return ", ".join(f"{value} ({count:,})" for value, count in counts)

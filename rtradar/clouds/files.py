@@ -208,42 +208,48 @@ def read_npz(path: Path) -> CloudTable:
 
 def read_ply(path: Path) -> CloudTable:
     """Read the vertices of a binary little-endian PLY; errors of many types if it is none."""
-    data = read_bytes(path, _MOST_BYTES)
-    head, end, body = data.partition(b"end_header\n")
-    lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
-    if not end or lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
+    text, body = _parted(path, b"end_header\n")
+    lines = [line.split() for line in text.splitlines()]
+    if lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
         raise ValueError("no header of a binary little-endian PLY")
     elements = [k for k, line in enumerate(lines) if line[:1] == ["element"]]
     if not elements or lines[elements[0]][1] != "vertex":
         raise ValueError("its first element is no vertex")
     own = lines[elements[0] + 1 : elements[1] if len(elements) > 1 else None]
     fields = [(line[2], _PLY_TYPES[line[1]]) for line in own if line[0] == "property"]
-    return _table(head, fields, int(lines[elements[0]][2]), body)
+    return _table(text, fields, int(lines[elements[0]][2]), body)
 
 
 def read_pcd(path: Path) -> CloudTable:
     """Read a binary PCD with one number per field; errors of many types if it is none."""
-    data = read_bytes(path, _MOST_BYTES)
-    head, end, body = data.partition(b"DATA binary\n")
-    lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
+    text, body = _parted(path, b"DATA binary\n")
+    lines = [line.split() for line in text.splitlines()]
     entries = {line[0]: line[1:] for line in lines if len(line) > 1 and line[0][0] != "#"}
-    if not end or any(count != "1" for count in entries.get("COUNT", [])):
+    if any(count != "1" for count in entries.get("COUNT", [])):
         raise ValueError("no header of a binary PCD with one number a field")
     letters = {"F": "f", "I": "i", "U": "u"}
     kinds = zip(entries["TYPE"], entries["SIZE"], strict=True)
     types = [f"<{letters[letter]}{int(size)}" for letter, size in kinds]
     fields = list(zip(entries["FIELDS"], types, strict=True))
-    return _table(head, fields, int(entries["POINTS"][0]), body)
+    return _table(text, fields, int(entries["POINTS"][0]), body)
 
 
-def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) -> CloudTable:
+def _parted(path: Path, end: bytes) -> tuple[str, bytes]:
+    """Return the text of a header before its last line, and what follows it."""
+    head, found, body = read_bytes(path, _MOST_BYTES).partition(end)
+    if not found:
+        raise ValueError(f"no header that ends with '{end.decode().strip()}'")
+    return head[:_MOST_HEADER_BYTES].decode("ascii"), body
+
+
+def _table(text: str, fields: list[tuple[str, str]], count: int, body: bytes) -> CloudTable:
     kind = np.dtype(fields)
     if count < 0 or len(body) < count * kind.itemsize:
         told = f"its header tells of {count} points of {kind.itemsize}"
         raise ValueError(f"{len(body)} bytes where {told}; it is cut off")
     rows = np.frombuffer(body, dtype=kind, count=count)
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
-    meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
+    meant = {field: (name, unit) for field, name, unit in _MEANING.findall(text)}
     names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)
     with np.errstate(invalid="ignore"):  # signalling NaNs become NaNs, which `checked` reports
         values = np.column_stack([rows[field].astype(np.float64) for field in order])

@@ -1,10 +1,10 @@
-"""File of one sample of a data set: a NumPy archive that is whole or absent.
+"""Files of a data set: of each sample a NumPy archive that is whole or absent, and their index.
 
-It holds ``points``, ``spatial``, perhaps ``spatial_source``, maps and joints, and ``about`` (label
-and provenance as JSON). It is not compressed and has fixed dates, so that the same sample gives the
-same bytes everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all bytes before
-them. A
-file that is read may be damaged or come from a stranger, so its contents are checked before use.
+An archive holds ``points``, ``spatial``, perhaps ``spatial_source``, maps and joints, and ``about``
+(label and provenance as JSON). It is not compressed and has fixed dates, so that the same sample
+gives the same bytes everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all
+bytes before them. A file that is read may be damaged or come from a stranger, so its contents are
+checked before use.
 """
 
 from __future__ import annotations
@@ -13,81 +13,31 @@ import hashlib
 import io
 import json
 import os
+import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.clouds.arrays import ARRAYS, Array
 from rtradar.errors import InputError
-from rtradar.system.files import atomic_file, open_regular
+from rtradar.system.checks import brief
+from rtradar.system.files import (
+    array_header,
+    atomic_file,
+    open_regular,
+    read_arrays,
+    read_json,
+    remove_parts,
+)
 
 FORMAT = 1
 """Format number of sample files and of indexes; files with another number are refused."""
 
-
-class Array(NamedTuple):
-    """Axes, unit, meaning and type of an array of a sample."""
-
-    dims: tuple[str, ...]
-    unit: str
-    meaning: str
-    dtype: str = "<f8"
-
-
-_SINCE = "since the start of the capture"
-ARRAYS: Mapping[str, Array] = {
-    "points": Array(("point", "coordinate"), "s, m, m/s", "time, range and velocity of the points"),
-    "spatial": Array(("spatial_point", "axis"), "m", "world x, y and z of the points"),
-    "spatial_source": Array(
-        ("spatial_point",),
-        "1",
-        "who returned most of the point: 0 the person of the label, then others and objects, "
-        "as source_names lists them; -1 the room or nobody; -2 not known",
-        "<i2",
-    ),
-    "spectrogram": Array(
-        ("spectrogram_time", "spectrogram_velocity"),
-        "m2",
-        "power of one channel summed over range",
-        "<f4",
-    ),
-    "range_doppler": Array(
-        ("time", "range", "velocity"), "m2", "power summed over all channels", "<f4"
-    ),
-    "range_azimuth": Array(
-        ("time", "range", "azimuth"), "m2", "power summed over detected cells", "<f4"
-    ),
-    "joints": Array(("time", "joint", "axis"), "m", "world x, y and z of the joints"),
-    "time": Array(("time",), "s", f"centre of the processing window {_SINCE}"),
-    "range": Array(("range",), "m", "half the path from Tx to Rx"),
-    "velocity": Array(("velocity",), "m/s", "rate of range, positive receding"),
-    "azimuth": Array(("azimuth",), "rad", "azimuth in the radar's frame, positive to the left"),
-    "spectrogram_time": Array(
-        ("spectrogram_time",), "s", f"centre of the spectrogram's window {_SINCE}"
-    ),
-    "spectrogram_velocity": Array(
-        ("spectrogram_velocity",), "m/s", "rate of range, positive receding"
-    ),
-}
-"""Arrays that the file of a sample may hold: clouds, maps, joints, and the axes of those.
-
-``spatial_source`` is there where ``source_names`` of the provenance lists several people or
-objects.
-"""
-
-KINDS = {
-    "clouds": "points",
-    "spatial": "spatial",
-    "spectrograms": "spectrogram",
-    "range_doppler": "range_doppler",
-    "range_azimuth": "range_azimuth",
-    "joints": "joints",
-}
-"""What a data set may hold of each sample, and the name of its array."""
 
 UNKNOWN = "unknown"
 """Subject and licence of a recording about which a specification says nothing."""
@@ -95,10 +45,17 @@ UNKNOWN = "unknown"
 _DIGEST = 64  # hexadecimal digits of SHA-256
 _MAX_BYTES = 200_000_000
 _MAX_MAP_BYTES = 190_000_000  # of maps, which leaves room for clouds and provenance
-_DTYPES = {name: np.dtype(array.dtype) for name, array in ARRAYS.items()} | {
-    "about": np.dtype("u1")
-}
+_ABOUT = Array(("byte",), "label and provenance as JSON", dtype="|u1")
 _OF_THREE = ("coordinate", "axis")
+
+
+INDEX = "collection.json"
+"""Name of the file that lists the samples of a data set."""
+
+MADE_FROM = "collection.toml"
+"""Name of the file that says what a data set was made from."""
+
+_IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a plain name, which cannot lead to another folder
 
 
 @dataclass(frozen=True)
@@ -120,11 +77,6 @@ class Sample:
     points: NDArray[np.float64]
     label: str
     provenance: Mapping[str, Any]
-
-
-def attributes(name: str) -> dict[str, str]:
-    """Return the attributes of an array: ``units`` and ``long_name``."""
-    return {"units": ARRAYS[name].unit, "long_name": ARRAYS[name].meaning}
 
 
 def sample_path(folder: Path, identity: str) -> Path:
@@ -153,7 +105,7 @@ def write_sample(
         "about": np.frombuffer(about.encode(), dtype=np.uint8),
     }
     for name, values in sorted((maps or {}).items()):
-        arrays[name] = np.ascontiguousarray(values, dtype=_DTYPES[name])
+        arrays[name] = np.ascontiguousarray(values, dtype=ARRAYS[name].dtype)
     buffer = io.BytesIO()  # the only copy: maps may be large
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, values in arrays.items():
@@ -215,36 +167,27 @@ def read_digest(path: Path) -> str:
 def read_sample(path: Path, name: str) -> Any:
     """Read one entry of a sample's file: one of `ARRAYS`, or the dict ``about``.
 
-    The others are not read: the archive holds a checksum for each entry, and its comment marks the
-    end of the file. InputError if the file is damaged or larger than 200 MB.
+    The others are not read: the archive holds a checksum for each entry. InputError if the file is
+    damaged or larger than 200 MB.
     """
     try:
-        with open_regular(path) as file:
-            size = os.fstat(file.fileno()).st_size
-            if size <= _MAX_BYTES:
-                array = _read_array(file, name)
-                if name == "about":
-                    return _parse_about(array)
-                return array.astype(array.dtype.newbyteorder("="))
-    except Exception:  # readers of archives and headers raise any type if the file is damaged
+        array = read_arrays(path, _MAX_BYTES, [name], _DIGEST)[name]
+        _check(name, array.shape, array.dtype)
+        if name == "about":
+            return _parse_about(array)
+        return array.astype(array.dtype.newbyteorder("="), copy=False)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise damaged(path) from None
-    raise InputError(
-        f"sample '{path}' has {size / 1e6:.0f} MB; {_MAX_BYTES / 1e6:.0f} MB are allowed: "
-        "it is none of rtradar's"
-    )
 
 
 def read_shape(path: Path, name: str) -> tuple[int, ...]:
     """Read the shape of an array of a sample's file, without its values."""
     try:
-        with (
-            open_regular(path) as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(_entry(archive, name)) as data,
-        ):
-            return _header(data, name)[0]
-    except Exception:  # see read_sample
+        shape, dtype = array_header(path, name, _MAX_BYTES, _DIGEST)
+        _check(name, shape, dtype)
+    except (OSError, ValueError, KeyError):
         raise damaged(path) from None
+    return shape
 
 
 def damaged(path: Path) -> InputError:
@@ -254,31 +197,12 @@ def damaged(path: Path) -> InputError:
     )
 
 
-def _read_array(file: BinaryIO, name: str) -> NDArray[Any]:
-    with zipfile.ZipFile(file) as archive:
-        data = io.BytesIO(archive.read(_entry(archive, name)))
-    shape, dtype = _header(data, name)
-    return np.frombuffer(data.getvalue(), dtype, offset=data.tell()).reshape(shape)
-
-
-def _entry(archive: zipfile.ZipFile, name: str) -> zipfile.ZipInfo:
-    """Return the entry of an array; our archives are not compressed: no entry exceeds the file."""
-    entry = archive.getinfo(f"{name}.npy")
-    if len(archive.comment) != _DIGEST or entry.compress_type != zipfile.ZIP_STORED:
+def _check(name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+    """Raise ValueError if an array is none of its name."""
+    own = ARRAYS.get(name, _ABOUT)
+    sizes = zip(shape, own.dims, strict=True)
+    if dtype != own.dtype or any(size != 3 for size, axis in sizes if axis in _OF_THREE):
         raise ValueError
-    return entry
-
-
-def _header(data: Any, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read the shape and the type of an array from its header."""
-    if np.lib.format.read_magic(data) != (1, 0):
-        raise ValueError
-    shape, _, dtype = np.lib.format.read_array_header_1_0(data)
-    dims = ARRAYS[name].dims if name in ARRAYS else ("byte",)
-    threes = all(size == 3 for size, axis in zip(shape, dims, strict=True) if axis in _OF_THREE)
-    if dtype != _DTYPES[name] or not threes:
-        raise ValueError
-    return shape, dtype
 
 
 def _parse_about(data: NDArray[np.uint8]) -> dict[str, Any]:
@@ -295,3 +219,61 @@ def write_durably(path: Path, content: bytes | memoryview) -> None:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+def sweep(folder: Path) -> int:
+    """Remove the partial files of interrupted writers, which must have ended; return how many."""
+    return remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
+
+
+def write_index(folder: Path, identities: Iterable[str]) -> None:
+    """Write the list of samples that belong to the data set; the samples need not exist yet.
+
+    InputError if it cannot be written, or its name belongs to a file that is not an index.
+    """
+    path = folder / INDEX
+    try:
+        _content(path)
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError):
+        raise InputError(
+            f"'{path}' is there, and no index of a collection; "
+            "move it away, or give another folder (--out)"
+        ) from None
+    content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
+    write_durably(path, content.encode() + b"\n")
+
+
+def read_index(folder: Path) -> tuple[str, ...]:
+    """Read the ids of the samples of a data set, ascending; InputError if there is no index."""
+    path, anew = folder / INDEX, "with: rtradar dataset build"
+    try:
+        content = _content(path)
+    except OSError as error:
+        raise InputError(
+            f"'{folder}' holds no collection ({INDEX}: {error.strerror}); make one {anew}"
+        ) from None
+    except ValueError:
+        raise InputError(
+            f"'{path}' is damaged; move it away and mend the collection {anew}"
+        ) from None
+    if content["format"] != FORMAT:
+        raise InputError(
+            f"'{path}' is no index of format {FORMAT}; build the collection anew {anew}"
+        )
+    for identity in content["samples"]:
+        if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
+            raise InputError(
+                f"'{path}' names {brief(identity)}, which is no sample; mend the collection {anew}"
+            )
+    return tuple(sorted(content["samples"]))
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """Return what an index says, of whatever format; OSError or ValueError if it is none."""
+    content = read_json(path)
+    samples = content.get("samples") if isinstance(content, dict) else None
+    if not isinstance(samples, list) or "format" not in content:
+        raise ValueError
+    return content

@@ -62,10 +62,13 @@ class SpatialCloud:
     part: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
-        for field in ("points", "velocity", "power", "time"):
-            values = np.asarray(getattr(self, field), dtype=np.float64)
+        count = len(self.points)
+        for field, given in vars(self).items():
+            if given is None:
+                continue
+            kind = np.int64 if field in ("source", "part") else np.float64
+            values = np.asarray(given, dtype=kind)
             object.__setattr__(self, field, values)
-            count = len(self.points)
             if values.shape != ((count, 3) if field == "points" else (count,)):
                 raise InputError(
                     f"spatial cloud: {field} has shape {values.shape}; "
@@ -75,16 +78,6 @@ class SpatialCloud:
                 raise InputError(
                     f"spatial cloud: {field} holds NaN or infinity; "
                     "every value must be finite, but for y or z not measured"
-                )
-
-        for field in ("source", "part"):
-            if getattr(self, field) is None:
-                continue
-            numbers = np.asarray(getattr(self, field), dtype=np.int64)
-            object.__setattr__(self, field, numbers)
-            if numbers.shape != (len(self.points),):
-                raise InputError(
-                    f"spatial cloud: {field} has shape {numbers.shape}; give one for each point"
                 )
 
     @property

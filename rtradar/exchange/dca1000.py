@@ -3,12 +3,18 @@
 A chip sends its samples over LVDS lanes, and the board writes the words as they arrive, little-
 endian. Chirps follow in the order of sending. The orders are those of TI's application report
 SWRA581, "Mmwave Radar Device ADC Raw Data Capture".
+
+The board sends its words in packets of at most 1456 bytes, whose headers programs that listen to it
+may write, too. Before the words stand the number of the packet, from 1 on (4 bytes), and the number
+of bytes sent before (6 bytes), little-endian; mmWave Studio writes the length of the packet between
+both (4 bytes). A packet that was lost is a gap in the numbers.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +26,14 @@ from rtradar.system.checks import brief
 
 _MOST_RX = 4
 _FOUR_LANES = re.compile(r"[ai]wr(12|14|22)\d\d", re.IGNORECASE)
+
+
+PAYLOAD_BYTES = 1456
+"""Bytes of words in a packet, but the last one of a capture."""
+
+_HEADERS = (10, 14)
+_MOST_LOST = 0.5
+"""Fraction of the packets that may be lost; beyond, it is taken for words without headers."""
 
 
 @dataclass(frozen=True)
@@ -127,3 +141,75 @@ def _lanes(layout: Dca1000Layout, n_rx: int) -> NDArray[Any]:
     """Lane of each Rx that is on."""
     mask = 2**n_rx - 1 if layout.rx_mask is None else layout.rx_mask
     return np.flatnonzero([mask >> lane & 1 for lane in range(_MOST_RX)])
+
+
+@dataclass(frozen=True, eq=False)
+class Packets:
+    """Words in the packets of a file.
+
+    ``place`` (packet,) is the number of each packet in the file by its number in the capture, -1
+    where it was lost; ``last`` the bytes of the last one.
+    """
+
+    path: Path
+    header: int
+    place: NDArray[np.int64]
+    last: int
+
+    @property
+    def size(self) -> int:
+        """Number of bytes of words, those of lost packets included."""
+        return (len(self.place) - 1) * PAYLOAD_BYTES + self.last
+
+    @property
+    def lost(self) -> int:
+        """Number of lost packets."""
+        return int((self.place < 0).sum())
+
+    def words(self, offset: int, count: int) -> NDArray[np.int16]:
+        """Return ``count`` words from a byte of the words on; those of lost packets are 0."""
+        first, end = offset // PAYLOAD_BYTES, -(-(offset + 2 * count) // PAYLOAD_BYTES)
+        data = np.zeros((end - first, PAYLOAD_BYTES), np.uint8)
+        step = PAYLOAD_BYTES + self.header
+        raw = np.memmap(self.path, np.uint8, "r")
+        for row, place in enumerate(self.place[first:end]):
+            if place >= 0:
+                own = raw[place * step + self.header : (place + 1) * step]
+                data[row, : len(own)] = own
+        begin = offset - first * PAYLOAD_BYTES
+        return data.reshape(-1)[begin : begin + 2 * count].view("<i2")
+
+
+def packets_in(path: Path) -> Packets | None:
+    """Find the packets of a file; None where it holds words alone."""
+    size = path.stat().st_size
+    for header in _HEADERS:
+        step = PAYLOAD_BYTES + header
+        count = -(-size // step)
+        last = size - (count - 1) * step - header
+        if count < 2 or last < 2 or last % 2:
+            continue
+        raw = np.memmap(path, np.uint8, "r")
+        rows = np.lib.stride_tricks.as_strided(raw, (count, header), (step, 1), writeable=False)
+        # Two tell of most files; all of them touch every page of a large one.
+        if not all(_tells_twice(some) for some in (rows[:2], rows)):
+            continue
+        numbers = _number(rows[:, :4])
+        whole = int(numbers.max())
+        if len(np.unique(numbers)) < count or count < (1 - _MOST_LOST) * whole:
+            continue
+        place = np.full(whole, -1)
+        place[numbers - 1] = np.arange(count)
+        return Packets(path, header, place, last if place[-1] == count - 1 else PAYLOAD_BYTES)
+    return None
+
+
+def _tells_twice(rows: NDArray[np.uint8]) -> bool:
+    """Whether the numbers of packets (packet, byte) and the bytes before them are the same."""
+    numbers, before = _number(rows[:, :4]), _number(rows[:, -6:])
+    return bool((numbers >= 1).all() and (before == (numbers - 1) * PAYLOAD_BYTES).all())
+
+
+def _number(digits: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Numbers (row,) of little-endian bytes (row, byte)."""
+    return (digits.astype(np.int64) << 8 * np.arange(digits.shape[1])).sum(axis=1)

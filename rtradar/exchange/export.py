@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,34 +22,37 @@ from rtradar.exchange.recording import (
     IfRecording,
     SampleFile,
     open_recording,
+    rows_in_cycle,
     unreadable,
 )
 from rtradar.radar import Radar
-from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.files import open_regular
 from rtradar.system.output_folder import check_whole
 
-IF_FORMATS: Mapping[
-    str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], SampleFile]]
-] = {
-    ".mat": (if_formats.write_mat, if_formats.open_mat),
-    ".nc": (if_formats.write_netcdf, if_formats.open_netcdf),
-    ".bin": (int16_files.write_int16, int16_files.open_int16),
-    ".npy": (if_formats.write_npy, if_formats.open_npy),
-    ".zarr": (if_formats.write_zarr, if_formats.open_zarr),
-}
-"""Writer and opener of IF samples, by the suffix of the file."""
 
-_BY_TX = (".mat", ".nc", ".bin")
+class Format(NamedTuple):
+    """Writer and reader of a format, and whether its samples have an axis of Tx."""
 
-CLOUD_FORMATS: Mapping[
-    str, tuple[Callable[[Path, CloudTable], dict[str, Any]], Callable[[Path], CloudTable]]
-] = {
-    ".npz": (cloud_files.write_npz, cloud_files.read_npz),
-    ".ply": (cloud_files.write_ply, cloud_files.read_ply),
-    ".pcd": (cloud_files.write_pcd, cloud_files.read_pcd),
+    write: Callable[[Path, Any], dict[str, Any]]
+    read: Callable[[Path], Any]
+    by_tx: bool = False
+
+
+IF_FORMATS: Mapping[str, Format] = {
+    ".mat": Format(if_formats.write_mat, if_formats.open_mat, by_tx=True),
+    ".nc": Format(if_formats.write_netcdf, if_formats.open_netcdf, by_tx=True),
+    ".bin": Format(int16_files.write_int16, int16_files.open_int16, by_tx=True),
+    ".npy": Format(if_formats.write_npy, if_formats.open_npy),
+    ".zarr": Format(if_formats.write_zarr, if_formats.open_zarr),
 }
-"""Writer and reader of point clouds, by the suffix of the file."""
+"""Formats of IF samples, by the suffix of the file."""
+
+CLOUD_FORMATS: Mapping[str, Format] = {
+    ".npz": Format(cloud_files.write_npz, cloud_files.read_npz),
+    ".ply": Format(cloud_files.write_ply, cloud_files.read_ply),
+    ".pcd": Format(cloud_files.write_pcd, cloud_files.read_pcd),
+}
+"""Formats of point clouds, by the suffix of the file."""
 
 
 def export(
@@ -102,7 +104,7 @@ def export(
             check_whole(origin.parent)
         cloud = read_cloud(origin)
         about = {"axes": list(cloud.names), "shape": list(cloud.values.shape)}
-        about |= CLOUD_FORMATS[suffix][0](target, cloud)
+        about |= CLOUD_FORMATS[suffix].write(target, cloud)
     return {"file": str(target)} | about
 
 
@@ -110,18 +112,18 @@ def _export_samples(
     recording: IfRecording, target: Path, dca1000: Dca1000Layout | None
 ) -> dict[str, Any]:
     suffix = target.suffix.lower()
-    about: dict[str, Any] = {"axes": list(IF_AXES), "shape": list(recording.shape)}
+    about: dict[str, Any] = {"axes": list(IF_AXES), "shape": list(recording.cube_shape)}
     if dca1000 is not None:
         if suffix != ".bin":
             raise InputError(f"'{target}': a file of a DCA1000 is named .bin; give such a name")
         return about | int16_files.write_int16(target, recording, dca1000)
-    if recording.radar.receives_sums and suffix in _BY_TX:
+    if recording.radar.receives_sums and IF_FORMATS[suffix].by_tx:
         raise InputError(
             f"'{recording.name}' holds the sum of all Tx, as multiplexing = "
             f"'{recording.radar.multiplexing}' receives it, which has no tx axis; export it as "
             ".npy, .zarr or for a DCA1000"
         )
-    return about | IF_FORMATS[suffix][0](target, recording)
+    return about | IF_FORMATS[suffix].write(target, recording)
 
 
 def open_samples(
@@ -153,7 +155,7 @@ def open_samples(
     suffix = place.suffix.lower()
     if os.path.isdir(place) and suffix != ".zarr":
         recording = open_recording(place)
-        return SampleFile(place, radar or recording.radar, recording.row_shape, recording.read)
+        return recording if radar is None else replace(recording, radar=radar)
     if suffix not in IF_FORMATS:
         raise InputError(
             f"'{path}': IF samples are read from {', '.join(IF_FORMATS)}; give such a file"
@@ -163,10 +165,10 @@ def open_samples(
             open_regular(place).close()  # not at a pipe, which would seem empty
         if suffix == ".bin":
             return int16_files.open_int16(place, radar, dca1000)
-        found = IF_FORMATS[suffix][1](place)
+        found = IF_FORMATS[suffix].read(place)
     except DAMAGE as error:
         raise unreadable(place, "IF samples", error) from None
-    return replace(found, radar=radar or found.radar)
+    return found if radar is None else replace(found, radar=radar)
 
 
 def read_if(path: str | Path) -> IfCube:
@@ -191,7 +193,7 @@ def read_if(path: str | Path) -> IfCube:
         raise InputError(
             f"'{path}' does not tell of its radar; read it with rtradar.exchange.open_samples"
         )
-    rows = found.radar.n_tx // chirps_together(found.radar)
+    rows = rows_in_cycle(found.radar)
     if found.tx_per_cycle not in (None, rows):
         raise InputError(
             f"'{path}' has cycles of {found.tx_per_cycle} Tx, and its radar '{found.radar.name}' "
@@ -225,7 +227,7 @@ def read_cloud(path: str | Path) -> CloudTable:
             f"'{path}': a cloud is read from {', '.join(CLOUD_FORMATS)}; give such a file"
         )
     try:
-        cloud = CLOUD_FORMATS[place.suffix.lower()][1](place)
-    except (*DAMAGE, zipfile.BadZipFile) as error:
+        cloud = CLOUD_FORMATS[place.suffix.lower()].read(place)
+    except DAMAGE as error:
         raise unreadable(place, "a cloud", error) from None
     return cloud_files.checked(cloud, place)

@@ -28,7 +28,8 @@ from rtradar.exchange.recording import (
     radar_of,
 )
 from rtradar.signal.real_samples import complex_of_real
-from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
+from rtradar.system.files import atomic_file, open_regular
+from rtradar.system.hdf5 import LastingFile, netcdf_array, stored
 from rtradar.system.output_folder import new_folder
 
 _MAT_HEADER = (
@@ -48,16 +49,15 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
 
     MATLAB reverses the axes: (chirp, tx, rx, sample) is stored as (sample, rx, tx, chirp).
     """
-    chirps, *rest = recording.shape
+    chirps, *rest = recording.cube_shape
     chunk = (*rest[::-1], recording.step)
     with atomic_file(path) as raw, LastingFile(raw) as written:
         with h5py.File(written, "w", userblock_size=_MAT_HEADER_BYTES, libver=_OLD_LAYOUT) as file:
             data = file.create_dataset("if_samples", (*rest[::-1], chirps), _COMPLEX, chunks=chunk)
             data.attrs["MATLAB_class"] = np.bytes_("single")
             for first, block in recording.blocks("writing"):
-                whole = np.zeros(chunk, dtype=np.complex64)  # the last chunk is stored whole too
-                whole[..., : len(block)] = block.T
-                data.id.write_direct_chunk((0, 0, 0, first), whole.tobytes())
+                turned = np.ascontiguousarray(block.T).view(_COMPLEX)
+                data[..., first : first + len(block)] = turned
                 written.check()
             for name, quantity in recording.quantities().items():
                 _put(file, name, np.atleast_2d(quantity.values))
@@ -153,8 +153,7 @@ def _put_text(place: Any, name: str, text: str) -> None:
 
 def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
     """Write ``if_real`` and ``if_imag`` (chirp, tx, rx, sample), float32, with coordinates."""
-    shape = recording.shape
-    chunk = (recording.step, *shape[1:])
+    shape = recording.cube_shape
     layout: dict[str, Any] = {"libver": _OLD_LAYOUT, "track_order": True}
     with (
         atomic_file(path) as raw,
@@ -162,33 +161,26 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         h5py.File(written, "w", **layout) as file,
     ):
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
-            axis = file.create_dataset(name, data=np.arange(length))
-            axis.make_scale(name)
             meaning = "0, 1, 2 are x, y, z" if name == "xyz" else f"number of the {name}"
-            axis.attrs["units"], axis.attrs["long_name"] = "1", meaning
-        parts = [file.create_dataset(name, shape, "<f4", chunks=chunk) for name in _PARTS]
-        for part, kind in zip(parts, _PARTS.values(), strict=True):
-            _describe(file, part, IF_AXES, IF_UNIT, f"{kind} part of the IF samples")
+            netcdf_array(file, name, (name,), "1", meaning, data=np.arange(length))
+        kept: dict[str, Any] = {"shape": shape, "dtype": "<f4"}
+        kept["chunks"] = (recording.step, *shape[1:])
+        parts = [
+            netcdf_array(file, name, IF_AXES, IF_UNIT, f"{kind} part of the IF samples", **kept)
+            for name, kind in _PARTS.items()
+        ]
         for name, quantity in recording.quantities().items():
-            data = file.create_dataset(name, data=quantity.values)
-            _describe(file, data, quantity.axes, quantity.unit, quantity.meaning)
+            axes, values, unit, meaning = quantity
+            netcdf_array(file, name, axes, unit, meaning, data=values)
         for part in parts:
             part.attrs["coordinates"] = "chirp_time sample_time"
         file.attrs.update(recording.waveform())
         file.attrs["title"], file.attrs["radar"] = recording.name, recording.radar_text
         for first, block in recording.blocks("writing"):
             for part, values in zip(parts, (block.real, block.imag), strict=True):
-                whole = np.zeros(chunk, dtype=np.float32)  # the last chunk is stored whole too
-                whole[: len(block)] = values
-                part.id.write_direct_chunk((first, 0, 0, 0), whole.tobytes())
+                part[first : first + len(block)] = values
             written.check()
     return {"variables": list(_PARTS), "type": "float32"}
-
-
-def _describe(file: Any, data: Any, axes: tuple[str, ...], unit: str, meaning: str) -> None:
-    data.attrs["units"], data.attrs["long_name"] = unit, meaning
-    for number, axis in enumerate(axes):
-        data.dims[number].attach_scale(file[axis])
 
 
 def open_netcdf(path: Path) -> SampleFile:
@@ -211,7 +203,7 @@ def open_netcdf(path: Path) -> SampleFile:
 
 def write_npy(path: Path, recording: IfRecording) -> dict[str, Any]:
     """Write (chirp, rx, sample), the chirps of all Tx in turn, complex64; without the radar."""
-    shape = recording.row_shape
+    shape = recording.shape
     header = {"descr": "<c8", "fortran_order": False, "shape": shape}
     with atomic_file(path) as file:
         np.lib.format.write_array_header_1_0(file, header)
@@ -249,14 +241,14 @@ def write_zarr(path: Path, recording: IfRecording) -> dict[str, Any]:
     """Write a Zarr array (chirp, rx, sample) complex64, with the radar as an attribute."""
     import zarr  # slow to import
 
-    shape = recording.row_shape
+    shape = recording.shape
     if os.path.lexists(path):
         raise InputError(f"'{path}' is there; remove it, or give another name (--out)")
     with new_folder(path) as folder:
         array = zarr.create_array(
             folder,
             shape=shape,
-            chunks=(min(recording.stored.chunks[0], shape[0]), *shape[1:]),
+            chunks=(min(recording.together, shape[0]), *shape[1:]),
             dtype="complex64",
             dimension_names=ROW_AXES,
             attributes={"units": IF_UNIT, "radar": recording.radar_text},

@@ -16,8 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.exchange.dca1000 import Dca1000Layout, of_radar, pack, unpack, words_of
-from rtradar.exchange.packets import Packets, packets_in
+from rtradar.exchange.dca1000 import (
+    Dca1000Layout,
+    Packets,
+    of_radar,
+    pack,
+    packets_in,
+    unpack,
+    words_of,
+)
 from rtradar.exchange.recording import (
     IF_AXES,
     IF_UNIT,
@@ -77,7 +84,7 @@ def write_int16(
             raw.write(words.tobytes())
         # The text of an older cube must not lie beside this one, wherever the next steps end.
         beside.unlink(missing_ok=True)
-    rows = {"axes": list(ROW_AXES), "shape": list(recording.row_shape)}
+    rows = {"axes": list(ROW_AXES), "shape": list(recording.shape)}
     said = {"beside": str(beside), "scale": scale, "quantisation": scale / 2, "type": "int16"}
     return said if layout is None else rows | said
 
@@ -97,13 +104,13 @@ def _about(path: Path, recording: IfRecording, layout: Dca1000Layout | None) -> 
         "data": path.name,
         "type": "int16, little-endian",
         "axes": [*IF_AXES, "iq"],
-        "shape": [*recording.shape, 2],
+        "shape": [*recording.cube_shape, 2],
         "unit": IF_UNIT,
         **recording.waveform(),
         "radar": json.loads(recording.radar_text),
     }
     if layout is not None:
-        shape = [recording.row_shape[0], words_of(layout, radar)]
+        shape = [recording.shape[0], words_of(layout, radar)]
         return about | {
             "axes": ["chirp", "word"],
             "shape": shape,

@@ -105,20 +105,26 @@ class SampleFile:
 
     def __getitem__(self, rows: slice) -> NDArray[np.complex64]:
         first, last, _ = rows.indices(len(self))
+        last = max(first, last)
         try:
-            return np.asarray(self.read(first, max(first, last)), dtype=np.complex64)
-        except DAMAGE as error:
+            return np.asarray(self.read(first, last), dtype=np.complex64)
+        except MemoryError:
+            size = f"{(last - first) * math.prod(self.shape[1:]) * 8 / 1e9:.3g} GB"
+            raise InputError(
+                f"'{self.path}': {size} of IF samples at once, more than there is memory; "
+                "take a shorter run"
+            ) from None
+        except Exception as error:  # readers fail in many ways on damaged files
             raise unreadable(self.path, "IF samples", error) from None
 
 
 def unreadable(path: Path, what: str, error: Exception) -> InputError:
-    """Return one line for an error of `DAMAGE`, itself if it is such a line already."""
+    """Return one line for an error of a reader, itself if it is such a line already."""
     if isinstance(error, InputError):
         return error
     why = getattr(error, "strerror", None) or in_short(error)
-    return InputError(
-        f"cannot read {what} from '{path}': {why}; give a file of the format that its suffix says"
-    )
+    cure = "run it again" if path.is_dir() else "give a file of the format that its suffix says"
+    return InputError(f"cannot read {what} from '{path}': {why}; {cure}")
 
 
 class Quantity(NamedTuple):
@@ -131,41 +137,34 @@ class Quantity(NamedTuple):
 
 
 @dataclass(frozen=True)
-class IfRecording:
-    """IF samples of a run on the disk, of a radar at its position in the scene.
+class IfRecording(SampleFile):
+    """IF samples that a run kept, whole cycles of a radar at its position in the scene.
 
-    ``stored`` is a zarr array (chirp, rx, sample) complex64, with the chirps of all Tx in turn.
-    ``name`` is shown in progress bars.
+    So many rows as ``together`` are stored in one piece.
     """
 
     radar: Radar
-    stored: Any
-    name: str
+    together: int = 1
 
     @property
-    def shape(self) -> tuple[int, int, int, int]:
-        """Length of the chirp, tx, rx and sample axes, without an incomplete TDM cycle.
+    def name(self) -> str:
+        """Name of the run, for progress bars."""
+        return printable(self.path.resolve().name)
+
+    @property
+    def cube_shape(self) -> tuple[int, int, int, int]:
+        """Length of the chirp, tx, rx and sample axes.
 
         Under Doppler division the tx axis is 1, for all Tx are received as one sum.
         """
-        tx = self._rows
-        return (self.stored.shape[0] // tx, tx, *self.stored.shape[1:])
-
-    @property
-    def row_shape(self) -> tuple[int, int, int]:
-        """Length of the axes (chirp, rx, sample) of the same samples, all Tx in turn."""
-        chirps, tx, rx, samples = self.shape
-        return chirps * tx, rx, samples
+        tx = rows_in_cycle(self.radar)
+        return (self.shape[0] // tx, tx, *self.shape[1:])
 
     @property
     def step(self) -> int:
         """Number of chirps of each Tx in a block that is stored together."""
-        return min(max(1, self.stored.chunks[0] // self._rows), self.shape[0])
-
-    @property
-    def _rows(self) -> int:
-        """Number of stored rows in a cycle."""
-        return self.radar.n_tx // chirps_together(self.radar)
+        chirps, tx, *_ = self.cube_shape
+        return min(max(1, self.together // tx), chirps)
 
     @property
     def radar_text(self) -> str:
@@ -178,7 +177,7 @@ class IfRecording:
 
     def quantities(self) -> dict[str, Quantity]:
         """Return times and positions along the axes of the samples."""
-        radar, (chirps, tx, *_) = self.radar, self.shape
+        radar, (chirps, tx, *_) = self.radar, self.cube_shape
         times = radar.chirp_times(chirps * tx).reshape(chirps, tx)
         since = "centre of each chirp since the start of the capture"
         fast = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
@@ -193,28 +192,17 @@ class IfRecording:
 
     def blocks(self, doing: str) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         """Yield first chirp and samples (chirp, tx, rx, sample) of each block, with a bar."""
-        chirps, tx, rx, samples = self.shape
+        chirps, tx, rx, samples = self.cube_shape
         for first in tqdm(
             range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None
         ):
             last = min(first + self.step, chirps)
-            yield first, self.read(first * tx, last * tx).reshape(last - first, tx, rx, samples)
+            yield first, self[first * tx : last * tx].reshape(last - first, tx, rx, samples)
 
-    def read(self, first: int, last: int) -> NDArray[np.complex64]:
-        """Read the chirps ``first`` to ``last - 1`` of all Tx in turn, (chirp, rx, sample)."""
-        try:
-            return np.asarray(self.stored[first:last], dtype=np.complex64)
-        except MemoryError:
-            size = f"{(last - first) * math.prod(self.stored.shape[1:]) * 8 / 1e9:.3g} GB"
-            raise InputError(
-                f"{self.name}: {size} of IF samples at once, more than there is memory; "
-                "take a shorter run"
-            ) from None
-        except Exception as error:  # zarr and its codecs fail in many ways on damaged chunks
-            raise InputError(
-                f"{self.name}: IF samples {first} to {last} cannot be read ({in_short(error)}); "
-                "run it again"
-            ) from None
+
+def rows_in_cycle(radar: Radar) -> int:
+    """Return how many rows (rx, sample) a cycle has, those of chirps that are received together."""
+    return radar.n_tx // chirps_together(radar)
 
 
 def open_recording(folder: Path) -> IfRecording:
@@ -244,7 +232,7 @@ def open_recording(folder: Path) -> IfRecording:
         ) from None
     shape, kind = stored.shape, np.dtype(stored.dtype)
     expected = (radar.n_rx, radar.samples_per_chirp)
-    least = radar.n_tx // chirps_together(radar)
+    least = rows_in_cycle(radar)
     fits = len(shape) == 3 and shape[1:] == expected and shape[0] >= least
     if not fits or kind != np.complex64:
         raise InputError(
@@ -252,7 +240,12 @@ def open_recording(folder: Path) -> IfRecording:
             f"the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
             f"{radar.samples_per_chirp}), at least {least} chirps; run it again"
         )
-    return IfRecording(radar, stored, printable(folder.resolve().name))
+    whole = shape[0] // least * least
+
+    def read(first: int, last: int) -> NDArray[np.complex64]:
+        return np.asarray(stored[first:last])
+
+    return IfRecording(folder, radar, (whole, *expected), read, together=stored.chunks[0])
 
 
 def check_store(store: Path) -> Any:

@@ -20,9 +20,9 @@ from rtradar.body import Person
 from rtradar.description import Movers, Moving, given_parts
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.labelled_echoes import compared_echoes
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
+from rtradar.pipeline.output.truth import compared_echoes
 from rtradar.pipeline.output.view import load_run_view
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare

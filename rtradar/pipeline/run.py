@@ -21,9 +21,8 @@ from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
 from rtradar.pipeline.output.pictures import draw_pictures
-from rtradar.pipeline.output.room_findings import room_findings
 from rtradar.pipeline.output.snapshots import snapshots
-from rtradar.pipeline.output.summary import cost_of, finished, summary_of
+from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
 from rtradar.pipeline.output.view import run_view_of
 from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
 from rtradar.pipeline.prepare import people_in, prepare
@@ -131,7 +130,7 @@ def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSett
     return Result(
         points=clouds.rdt.points,
         spatial=clouds.spatial,
-        summary=finished(summary | cost_of(capture, started)),
+        summary=finished(summary | cost(capture.processing, capture.n_chirps, started)),
         radar=capture.radar,
         link_budget=capture.link_budget,
         experiment=Experiment(described),
@@ -195,7 +194,7 @@ def run_into(
                     at_most=_MOMENTS,
                 ),
             )
-        summary |= {"pictures": pictures} | cost_of(capture, started)
+        summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
         summary = finished(summary, folder)
     return Result(
         points=points,

@@ -110,25 +110,14 @@ class Directory:
         """Remove a directory with all in it, as far as that goes; no link is followed."""
         shutil.rmtree(self._name(name), ignore_errors=True, dir_fd=self._descriptor)
 
-    @property
-    def number(self) -> int:
-        """Inode number."""
-        return (
-            os.stat(self.path).st_ino
-            if self._descriptor is None
-            else os.fstat(self._descriptor).st_ino
-        )
-
-    def is_own(self) -> bool:
-        """Tell whether it belongs to the user of this process."""
-        return self._descriptor is not None and os.fstat(self._descriptor).st_uid == os.geteuid()
+    def status(self) -> os.stat_result:
+        """Return its owner, its inode number and so on."""
+        return os.stat(self.path if self._descriptor is None else self._descriptor)
 
     def is_in_place(self) -> bool:
         """Tell whether its path still leads to it."""
         try:
-            return self._descriptor is None or os.path.samestat(
-                os.stat(self.path), os.fstat(self._descriptor)
-            )
+            return os.path.samestat(os.stat(self.path), self.status())
         except OSError:
             return False
 
@@ -143,18 +132,6 @@ class Directory:
         except BlockingIOError:
             return False
         return True
-
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Wait for other commands that move files there, and keep them out."""
-        if self._descriptor is None:
-            yield
-            return
-        with Directory(
-            self.path, os.open(".", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._descriptor)
-        ) as again:
-            again.lock(wait=True)
-            yield
 
     def _name(self, name: str) -> str:
         return str(self.path / name) if self._descriptor is None else name

@@ -16,15 +16,16 @@ import sys
 import tempfile
 import threading
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO, TypeVar, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 from rtradar.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
     from numpy.typing import NDArray
 
 _MOST_JSON_BYTES = 100_000_000
@@ -37,7 +38,6 @@ _OTHER_KINDS = {
     stat.S_IFBLK: "a device",
 }
 
-_MOST_COMPRESSION = 1000  # by which the deflate of HDF5 makes zeros smaller
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.]+$)")  # its beginning, and of no number
 _PATIENCE_S = 1.0  # at the end of the process, for a file that is just taking its name
 
@@ -47,8 +47,6 @@ DISK_ERRORS = frozenset(
     if hasattr(errno, name)
 )
 """Error numbers of a disk that takes no more."""
-
-_T = TypeVar("_T")
 
 _lock = threading.RLock()
 _unfinished: list[Callable[[], object]] = []
@@ -88,73 +86,6 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             ) from error
         finally:
             beside.unlink(missing_ok=True)
-
-
-class LastingFile:
-    """A binary file for HDF5 to write, whose failures wait until `check` is called.
-
-    HDF5 cannot close a file that it cannot write: it would print a traceback for each open object,
-    and crash as the process ends. So after the first failure further data are dropped, and `check`
-    raises the error.
-    """
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-        self._error: OSError | None = None
-
-    def check(self) -> None:
-        """Raise the first error, an OSError."""
-        if self._error is not None:
-            raise self._error
-
-    def __enter__(self) -> LastingFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file and raise the first error; may be called again."""
-        self._try(self._file.close, None)
-        self.check()
-
-    def write(self, data: Any) -> int:
-        """Write all of it, or drop it."""
-        size = memoryview(data).nbytes
-        return self._try(lambda: self._file.write(data), size)
-
-    def read(self, size: int = -1) -> bytes:
-        """Read."""
-        return self._try(lambda: self._file.read(size), bytes(max(size, 0)))
-
-    def readinto(self, buffer: Any) -> int:
-        """Read into a buffer."""
-        size = memoryview(buffer).nbytes
-        return self._try(lambda: cast("io.BytesIO", self._file).readinto(buffer), size)
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Move to a place."""
-        return self._try(lambda: self._file.seek(offset, whence), offset)
-
-    def tell(self) -> int:
-        """The place now."""
-        return self._try(self._file.tell, 0)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Change the size of the file."""
-        return self._try(lambda: self._file.truncate(size), size or 0)
-
-    def flush(self) -> None:
-        """Write what is held in memory."""
-        self._try(self._file.flush, None)
-
-    def _try(self, action: Callable[[], _T], otherwise: _T) -> _T:
-        if self._error is None:
-            try:
-                return action()
-            except OSError as error:
-                self._error = error
-        return otherwise
 
 
 def shipped_folder(name: str) -> Path:
@@ -235,48 +166,69 @@ def read_json(path: Path) -> Any:
         raise ValueError("nested too deep") from None
 
 
-def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArray[Any]]:
+def read_arrays(
+    path: Path,
+    most_bytes: int = 1_000_000_000,
+    names: Collection[str] | None = None,
+    comment: int | None = None,
+) -> dict[str, NDArray[Any]]:
     """Read the arrays of a NumPy archive that may be anybody's; none of Python objects.
 
-    Raises OSError if it cannot be read, and ValueError if it is no such archive, is damaged, claims
-    more than it holds, or is larger than ``most_bytes`` when unpacked.
+    Without ``names`` all are read. ``comment`` is the length of the archive's comment, where that
+    is known: what is cut off there nobody else sees. Raises OSError if it cannot be read, and
+    ValueError if it is no such archive, is damaged, claims more than it holds, or is larger than
+    ``most_bytes`` when unpacked.
     """
     import numpy as np  # the command line refuses input before it takes that long
 
     found = {}
+    with _archive(path, most_bytes, comment) as archive:
+        for entry in archive.infolist():
+            name = entry.filename.removesuffix(".npy")
+            if name != entry.filename and (names is None or name in names):
+                with archive.open(entry) as member:
+                    _read_header(member, entry.file_size)
+                    member.seek(0)
+                    found[name] = np.lib.format.read_array(member, allow_pickle=False)
+                    _check_text(found[name])
+    return found
+
+
+def array_header(
+    path: Path, name: str, most_bytes: int, comment: int
+) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read shape and type of an array of a NumPy archive; errors as of `read_arrays`."""
+    with _archive(path, most_bytes, comment) as archive, archive.open(f"{name}.npy") as member:
+        return _read_header(member, archive.getinfo(f"{name}.npy").file_size)
+
+
+@contextmanager
+def _archive(path: Path, most_bytes: int, comment: int | None) -> Iterator[zipfile.ZipFile]:
+    """Open an archive; OSError, or ValueError if it is none, is damaged or larger than that."""
     with open_regular(path) as file:
         try:
             with zipfile.ZipFile(file) as archive:
                 if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
                     raise ValueError(f"it claims more than {most_bytes / 1e6:g} MB")
-                for entry in archive.infolist():
-                    if entry.filename.endswith(".npy"):
-                        with archive.open(entry) as member:
-                            _check_claim(member, entry.file_size)
-                            member.seek(0)
-                            array = np.lib.format.read_array(member, allow_pickle=False)
-                            _check_text(array)
-                            found[entry.filename.removesuffix(".npy")] = array
+                if comment not in (None, len(archive.comment)):
+                    raise ValueError("it is cut off")
+                yield archive
         except OSError:
             raise
         except Exception as error:  # readers raise errors of any type at damaged archives
             raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
-    return found
 
 
-def _check_claim(member: Any, size: int) -> None:
-    """Raise if an array claims more memory than its file has: NumPy allocates before it reads."""
+def _read_header(member: Any, size: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read shape and type of an array, which NumPy allocates; ValueError if its file has less."""
     import numpy as np
 
-    version = np.lib.format.read_magic(member)
-    read_header = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    shape, _, kind = read_header(member)
+    of_old = np.lib.format.read_magic(member) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if of_old else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(member)
     if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
         raise ValueError("it claims more than it holds")
+    return shape, kind
 
 
 def _check_text(array: NDArray[Any]) -> None:
@@ -291,31 +243,6 @@ def _check_text(array: NDArray[Any]) -> None:
         )
         if ((letters > sys.maxunicode) | ((letters >= 0xD800) & (letters < 0xE000))).any():
             raise ValueError("a text holds what is no character")
-
-
-def stored(file: Any, name: str, *, compressed: bool = False) -> Any:
-    """Return a dataset of an open HDF5 file that may be anybody's.
-
-    Raises KeyError if there is none, and ValueError if it is no dataset, lies in another file, or
-    claims more than its file holds: a thousand times as much, at most, if it may be compressed.
-    """
-    import h5py
-
-    data = file
-    for step in name.split("/"):
-        # Asked before it is followed: a link to another file would have that opened.
-        link = data.get(step, getlink=True) if isinstance(data, h5py.Group) else None
-        if link is None:
-            raise KeyError(f"there is no {name}")
-        if not isinstance(link, h5py.HardLink):
-            raise ValueError(f"{name} is not in this file")
-        data = data[step]
-    if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
-        raise ValueError(f"{name} is not in this file")
-    most = file.id.get_filesize() * (_MOST_COMPRESSION if compressed else 1)
-    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > most:
-        raise ValueError(f"{name} claims more than there is")
-    return data
 
 
 @contextmanager

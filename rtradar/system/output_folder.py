@@ -20,10 +20,10 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from rtradar.errors import InputError
@@ -105,13 +105,10 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
             out.mkdir(parents=True, exist_ok=True)
             place = stack.enter_context(Directory.at(out))
             _refuse_foreign(place, kind, overwrite)
-            _remove_leftovers(place, but=_read_list(place, kind).get("unfinished"))
+            _remove_leftovers(place, but=_read_list(place, kind)[1])
             work = stack.enter_context(_new_work_folder(place))
         except OSError as error:
-            raise InputError(
-                f"cannot write to '{out}': {error.strerror}; "
-                "give a folder that can be written (--out)"
-            ) from None
+            raise _no_folder(out, error) from None
 
         moving = False
 
@@ -128,16 +125,21 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                 yield work.path
                 with uninterruptible():
                     _check_made(work, kind)
-                    with place.locked():
-                        _refuse_foreign(place, kind, overwrite)
-                        moving = True
-                        _move(work, place, kind)
+                    place.lock(wait=True)  # against others who move files there
+                    _refuse_foreign(place, kind, overwrite)
+                    moving = True
+                    _move(work, place, kind)
                     place.remove_tree(work.path.name)
                     # Files that a killed command had still to move are replaced now.
                     _remove_leftovers(place)
             except BaseException as error:
+                if moving and isinstance(error, OSError):
+                    raise InputError(
+                        f"cannot move the files of '{work.path}' into '{out}': {error.strerror}; "
+                        "mend that and run it again into that folder, or move what is left by hand"
+                    ) from None
                 if moving:
-                    raise _while_moving(out, work.path, error) from None
+                    raise
                 moved_away = not work.is_in_place()
                 abandon()
                 if moved_away and isinstance(error, Exception):
@@ -180,22 +182,20 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def exclusive_lock(folder: Path) -> Iterator[None]:
-    """Lock an existing folder until the process ends; InputError if another process has it."""
-    try:
-        place = Directory.at(folder)
-    except OSError as error:
-        raise InputError(
-            f"cannot write to '{folder}': {error.strerror}; "
-            "give a folder that can be written (--out)"
-        ) from None
-    with place:
+def exclusive_lock(folder: Path) -> Iterator[Directory]:
+    """Make or open a folder and lock it; InputError if another process has it, or it cannot be."""
+    with ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            place = stack.enter_context(Directory.at(folder))
+        except OSError as error:
+            raise _no_folder(folder, error) from None
         if not place.lock():
             raise InputError(
                 f"another command writes into '{folder}'; "
                 "wait for its end, or give another folder (--out)"
             )
-        yield
+        yield place
 
 
 @contextmanager
@@ -207,16 +207,15 @@ def resumable_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -
     files under names of this command's files that the listing there does not name, unless
     ``overwrite`` allows that they are replaced.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
-        ) from None
-    with exclusive_lock(out):
-        with Directory.at(out) as place:
-            _refuse_foreign(place, kind, overwrite)
+    with exclusive_lock(out) as place:
+        _refuse_foreign(place, kind, overwrite)
         yield
+
+
+def _no_folder(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)"
+    )
 
 
 def check_whole(folder: Path, listing: str = "summary.json") -> None:
@@ -270,22 +269,16 @@ def _entries(names: Iterable[str]) -> list[str]:
     return sorted({store[1] if (store := _STORE.match(name)) else name for name in names})
 
 
-def _read_list(directory: Directory, kind: OutputFiles) -> dict[str, Any]:
-    """Return ``files`` and perhaps ``unfinished`` of the list of a folder; empty if not ours."""
+def _read_list(directory: Directory, kind: OutputFiles) -> tuple[frozenset[str], str]:
+    """Return ``files`` and ``unfinished`` of the list of a folder, each empty if there is none."""
     content = _read_json(directory, kind.listing)
-    if (
-        not isinstance(content, dict)
-        or not isinstance(files := content.get("files"), list)
-        or kind.listing not in files
-    ):
-        return {}
+    files = content.get("files") if isinstance(content, dict) else None
+    if not isinstance(files, list) or kind.listing not in files:
+        return frozenset(), ""
     unfinished = content.get("unfinished")
-    found: dict[str, Any] = {"files": frozenset(name for name in files if isinstance(name, str))}
-    return found | (
-        {"unfinished": unfinished}
-        if isinstance(unfinished, str) and _WORK.fullmatch(unfinished)
-        else {}
-    )
+    is_work = isinstance(unfinished, str) and _WORK.fullmatch(unfinished)
+    names = frozenset(name for name in files if isinstance(name, str))
+    return names, unfinished if is_work else ""
 
 
 def _read_json(directory: Directory, name: str) -> Any:
@@ -295,21 +288,20 @@ def _read_json(directory: Directory, name: str) -> Any:
     return None
 
 
-def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
+def _owned(found: Mapping[str, int], listed: frozenset[str]) -> set[str]:
     """Return the entries that the command may replace: regular files that the list names."""
-    files = frozenset(listed)
-    stores = tuple(name for name in files if name.endswith("/"))
+    stores = tuple(name for name in listed if name.endswith("/"))
     return {
         name
         for name, mode in found.items()
         if stat.S_ISREG(mode)
-        and (name in files or (stores and name.startswith(stores) and _STORE.match(name)))
+        and (name in listed or (name.startswith(stores) and _STORE.match(name)))
     }
 
 
 def _refuse_foreign(place: Directory, kind: OutputFiles, overwrite: bool) -> None:
     found = _existing(place, kind)
-    foreign = sorted(found.keys() - _owned(found, _read_list(place, kind).get("files", ())))
+    foreign = sorted(found.keys() - _owned(found, _read_list(place, kind)[0]))
     odd = [
         name
         for name in foreign
@@ -345,8 +337,8 @@ def _check_made(work: Directory, kind: OutputFiles) -> None:
 
 def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
     """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
-    made, there = list(_all_files(work)), _existing(place, kind)
-    owned = _owned(there, _read_list(place, kind).get("files", ()))
+    made = list(_all_files(work))
+    owned = _owned(_existing(place, kind), _read_list(place, kind)[0])
     said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
     with work.open_file(_UNFINISHED, write=True) as file:
         file.write((json.dumps(said, indent=1) + "\n").encode())
@@ -359,38 +351,22 @@ def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
             with work.parent_of(name) as source, place.parent_of(name, make=True) as target:
                 own = name.rpartition("/")[2]
                 source.move(own, target, own)
-    for name in sorted({folder for file in owned for folder in _folders_of(file)}, reverse=True):
+    above = {str(path) for name in owned for path in PurePosixPath(name).parents} - {"."}
+    for name in sorted(above, reverse=True):
         with suppress(OSError), place.parent_of(name) as folder:
             folder.remove_folder(name.rpartition("/")[2])  # an empty one only
     work.move(kind.listing, place, kind.listing)
 
 
-def _folders_of(name: str) -> Iterator[str]:
-    """Yield the relative names of the folders above a relative name."""
-    while name := name.rpartition("/")[0]:
-        yield name
-
-
-def _while_moving(out: Path, work: Path, error: BaseException) -> BaseException:
-    if not isinstance(error, OSError):
-        return error
-    return InputError(
-        f"cannot move the files of '{work}' into '{out}': {error.strerror}; mend that and run it "
-        "again into that folder, or move what is left by hand"
-    )
-
-
 def _new_work_folder(place: Directory, prefix: str = _PREFIX) -> Directory:
     """Make a work folder, locked as long as its command lives, with a marker of its owner."""
-    while True:
-        name = f"{prefix}{secrets.token_hex(8)}"
-        with suppress(FileExistsError):
-            place.make(name)
-            work = place.open(name)
-            work.lock()
-            with work.open_file(_MARKER, write=True) as file:
-                file.write(str(work.number).encode())
-            return work
+    name = f"{prefix}{secrets.token_hex(8)}"
+    place.make(name)
+    work = place.open(name)
+    work.lock()
+    with work.open_file(_MARKER, write=True) as file:
+        file.write(str(work.status().st_ino).encode())
+    return work
 
 
 def _discard(place: Directory, work: Directory) -> None:
@@ -412,24 +388,21 @@ def _remove_leftovers(place: Directory, but: str | None = None, *, prefix: str =
         if not re.fullmatch(re.escape(prefix) + _DIGITS, name) or name == but:
             continue
         with suppress(OSError), place.open(name) as folder:
-            if not folder.is_own():
-                continue
+            status = folder.status()
             with folder.open_file(_MARKER) as file:
-                marked = file.read(100)
-            if marked == str(folder.number).encode() and folder.lock():
+                is_marked = file.read(100) == str(status.st_ino).encode()
+            if status.st_uid == os.geteuid() and is_marked and folder.lock():
                 place.remove_tree(name)
 
 
 def _disk_error(error: BaseException) -> str:
     """Return the message of an error of the disk; empty for any other error."""
-    number = error.errno if isinstance(error, OSError) else None
-    if (
-        number is None
-        and isinstance(error, OSError | RuntimeError)
-        and (match := _HDF5_ERRNO.search(str(error)))
-    ):
+    if not isinstance(error, OSError | RuntimeError):
+        return ""
+    number: int | None = getattr(error, "errno", None)
+    if number is None and (match := _HDF5_ERRNO.search(str(error))):
         number = int(match[1])
-    return os.strerror(number) if number is not None and number in DISK_ERRORS else ""
+    return os.strerror(number) if number and number in DISK_ERRORS else ""
 
 
 def one_of(names: Sequence[str]) -> str:

@@ -19,13 +19,12 @@ from hypothesis import strategies as st
 
 from rtradar import __version__
 from rtradar.campaign import build as building
-from rtradar.campaign.build import Store, build_dataset, make_and_store, work
+from rtradar.campaign.build import build_dataset, make_and_store, missing_of, work
 from rtradar.campaign.cluster import _place_for_kernels as place_for_kernels
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import sample_path
-from rtradar.clouds.sample_index import sweep, write_index
+from rtradar.clouds.sample_files import sample_path, sweep, write_index
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.output_folder import exclusive_lock
 
@@ -68,16 +67,14 @@ def test_what_is_missing_is_made_once(client: Client, tmp_path: Path) -> None:
     for recipe in RECIPES[:4]:
         make_and_store(recipe, str(tmp_path), fake)
     before = {name: (tmp_path / name).stat().st_mtime_ns for name in contents(tmp_path)}
-    store = Store.look(RECIPES, tmp_path)
-    assert (store.whole, store.damaged, len(store.missing)) == (4, 0, 5)
-    done = work(client, store.missing, tmp_path, fake)
-    assert sorted(outcome.identity for outcome in done) == sorted(
-        recipe.identity for recipe in store.missing
-    )
+    missing, damaged = missing_of(RECIPES, tmp_path)
+    assert (damaged, len(missing)) == (0, 5)
+    done = work(client, missing, tmp_path, fake)
+    assert {outcome.identity for outcome in done} == {recipe.identity for recipe in missing}
     assert {outcome.size for outcome in done} == {
         sample_path(tmp_path, RECIPES[5].identity).stat().st_size
     }
-    assert Store.look(RECIPES, tmp_path).missing == ()
+    assert missing_of(RECIPES, tmp_path) == ([], 0)
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in before} == before
 
 
@@ -105,7 +102,7 @@ def test_order_kills_and_damage_leave_the_same_bytes(
     if path.exists():
         path.write_bytes(path.read_bytes()[:cut])
     sweep(folder)
-    for recipe in Store.look(order, folder).missing:
+    for recipe in missing_of(order, folder)[0]:
         make_and_store(recipe, str(folder), fake)
     assert contents(folder) == contents(undisturbed)
 
@@ -116,9 +113,9 @@ def test_a_damaged_sample_is_found_and_made_anew(tmp_path: Path) -> None:
     path = sample_path(tmp_path, RECIPES[0].identity)
     whole = path.read_bytes()
     path.write_bytes(whole[:-10])
-    store = Store.look(RECIPES[:2], tmp_path)
-    assert (store.whole, store.damaged) == (1, 1)
-    make_and_store(store.missing[0], str(tmp_path), fake)
+    (missing,), damaged = missing_of(RECIPES[:2], tmp_path)
+    assert damaged == 1
+    make_and_store(missing, str(tmp_path), fake)
     assert path.read_bytes() == whole
 
 

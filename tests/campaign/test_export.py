@@ -18,8 +18,7 @@ from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, read_spec
 from rtradar.cli import main
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import read_sample, write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import read_sample, write_index, write_sample
 from rtradar.errors import InputError
 
 SIZES = (3, 0, 5)

@@ -18,8 +18,7 @@ from rtradar.campaign.kept import capture_of
 from rtradar.campaign.samples import make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds import Collection
-from rtradar.clouds.sample_files import check_size, write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import check_size, write_index, write_sample
 from rtradar.errors import InputError
 from rtradar.motion.skeleton import NODES
 

@@ -12,8 +12,7 @@ import pytest
 import torch
 
 from rtradar.clouds import Sample
-from rtradar.clouds.sample_files import write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import write_index, write_sample
 
 PAGE = Path(__file__).parents[2] / "docs" / "data-sets.md"
 

@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_files import Sample, write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import Sample, write_index, write_sample
 
 LABELS = ("kick", "punch", "walk")
 

@@ -13,8 +13,7 @@ from torch.utils.data import DataLoader
 
 import rtradar as rt
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import write_index, write_sample
 from rtradar.clouds.torch_dataset import of_size
 from rtradar.errors import InputError
 

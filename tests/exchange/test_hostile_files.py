@@ -225,8 +225,8 @@ def test_samples_of_a_run_that_claim_more_than_any(
 def test_damaged_samples_of_a_run(run: Path, tmp_path: Path) -> None:
     chunk = run / "if.zarr" / "c" / "0" / "0" / "0"
     chunk.write_bytes(chunk.read_bytes()[:-3])
-    refused(read_if, run, "cannot be read")
-    refused(lambda folder: export(folder, tmp_path / "x.bin"), run, "cannot be read")
+    refused(read_if, run, "cannot read IF samples from .*; run it again")
+    refused(lambda folder: export(folder, tmp_path / "x.bin"), run, "cannot read IF samples")
     assert not (tmp_path / "x.bin").exists()
 
 

@@ -12,8 +12,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.clouds.sample_files import Sample, write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import Sample, write_index, write_sample
 from rtradar.errors import InputError
 
 LINE = (

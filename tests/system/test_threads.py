@@ -154,19 +154,6 @@ raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     )
 
 
-@pytest.mark.parametrize(("named", "limit"), [("3", 3), ("", None)])
-def test_the_environment_limits_threads(
-    monkeypatch: pytest.MonkeyPatch, named: str, limit: int | None
-) -> None:
-    monkeypatch.setenv(THREADS_VARIABLE, named)
-    assert thread_limit() == limit
-
-
-def test_no_environment_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(THREADS_VARIABLE, raising=False)
-    assert thread_limit() is None
-
-
 @pytest.mark.slow
 def test_every_kind_of_thread_is_limited() -> None:
     environment = {**os.environ, **thread_environment(1)}
@@ -197,8 +184,13 @@ def test_matrix_products_take_one_thread_inside_and_as_many_as_before_after() ->
 
 @pytest.mark.parametrize("text", ["abc", "0", "-1", "1.5", "\u00b2"])
 def test_another_number_of_threads_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    monkeypatch.setenv(threads.THREADS_VARIABLE, text)
+    monkeypatch.setenv(THREADS_VARIABLE, text)
     with pytest.raises(InputError, match=r"RTRADAR_THREADS = .*; it must be a whole number"):
-        threads.thread_count()
-    monkeypatch.setenv(threads.THREADS_VARIABLE, "")
-    assert threads.thread_count() >= 1
+        thread_count()
+    monkeypatch.setenv(THREADS_VARIABLE, "3")
+    assert thread_limit() == thread_count() == 3
+    monkeypatch.setenv(THREADS_VARIABLE, "")
+    assert thread_limit() is None
+    monkeypatch.delenv(THREADS_VARIABLE)
+    assert thread_limit() is None
+    assert thread_count() >= 1

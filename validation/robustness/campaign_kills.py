@@ -26,8 +26,7 @@ from pathlib import Path
 
 import psutil
 
-from rtradar.clouds.sample_files import is_whole
-from rtradar.clouds.sample_index import INDEX, MADE_FROM
+from rtradar.clouds.sample_files import INDEX, MADE_FROM, is_whole
 from rtradar.validate.rows import Row, judged, main, reported
 
 RADAR = """

@@ -24,8 +24,7 @@ from rtradar.classify.recipes import LEAN
 from rtradar.classify.study import load_network, load_study
 from rtradar.classify.training import load_checkpoint
 from rtradar.clouds import Collection
-from rtradar.clouds.sample_files import Sample, write_sample
-from rtradar.clouds.sample_index import write_index
+from rtradar.clouds.sample_files import Sample, write_index, write_sample
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion
 from rtradar.radar import Radar

@@ -3,78 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
+from rtradar.clouds.arrays import TABLES, Array
 from rtradar.errors import InputError
-from rtradar.pipeline.output.truth import OF_PARTS, TRUTH, Parts, truth_axes, truth_of
-from rtradar.system.files import LastingFile
+from rtradar.pipeline.output.truth import Parts, truth_axes, truth_of
+from rtradar.system.hdf5 import LastingFile, netcdf_array
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SINCE = "since the start of the capture"
-_AXES = {
-    "time": ("s", f"centre of the processing window {_SINCE}"),
-    "slow_time": ("s", f"centre of the averaged cycles {_SINCE}"),
-    "spectrogram_time": ("s", f"centre of the spectrogram's window {_SINCE}"),
-    "range": ("m", "half the path from Tx to Rx"),
-    "velocity": ("m/s", "rate of range, positive receding"),
-    "spectrogram_velocity": ("m/s", "rate of range, positive receding"),
-    "azimuth": (
-        "rad",
-        "atan2(y, x) in the radar's frame, positive to the left; "
-        "without a z-line asin(y / r), the cone angle",
-    ),
-    "elevation": ("rad", "asin(z / r) in the radar's frame, positive upward"),
-}
 _TRUTH = "truth"
 _GROWING = ("time", "slow_time", "spectrogram_time")
-
-
-class _Map(NamedTuple):
-    axes: tuple[str, ...]
-    meaning: str
-    dtype: type = np.float32
-    unit: str = "m2"
-    sparse: bool = False  # mostly of one value, which costs nothing once compressed
-
-
-_CELLS = "power summed over detected cells"
-_FRAME = ("time", "range", "velocity")
-_SLOW = ("spectrogram_time", "spectrogram_velocity")
-_COLUMNS_MEAN = "power averaged over channels and a few cycles"
-_MAPS = {
-    "range_doppler": _Map(_FRAME, "power summed over all channels"),
-    "detections": _Map(_FRAME, "1 where a target is detected", np.uint8, "1", sparse=True),
-    "source": _Map(
-        _FRAME,
-        "index of the person, or after them the object, that returned most of a detected cell; "
-        "-1: the room, or nobody",
-        np.int16,
-        "1",
-        sparse=True,
-    ),
-    "range_time": _Map(("slow_time", "range"), _COLUMNS_MEAN),
-    "spectrogram": _Map(_SLOW, "power of one channel summed over range"),
-    "range_azimuth": _Map(("time", "range", "azimuth"), _CELLS, sparse=True),
-    "range_elevation": _Map(("time", "range", "elevation"), _CELLS, sparse=True),
-}
-_BEFORE = "{} window before clutter was removed"
-_MARKED = "1 where a target is detected in range_doppler_received"
-_SINGLE = {
-    "range_doppler_received": _Map(_FRAME[1:], _BEFORE.format("range_doppler of one")),
-    "detections_received": _Map(_FRAME[1:], _MARKED, np.uint8, "1"),
-    "range_azimuth_received": _Map(("range", "azimuth"), _BEFORE.format("range_azimuth of that")),
-}
 _MOST_WAITING = 2_000_000  # bytes of maps that are not yet written
-_STEPS_A_CHUNK = 64  # time steps written together, for maps with few numbers a step
+_STEPS_A_CHUNK = (1024, 64)  # time steps written together, of axes and of rows; 1 of maps
 
 
 class MapStore:
@@ -107,58 +56,42 @@ class MapStore:
         self._waiting_bytes = 0
         self._file.attrs.update(attributes)
         for name in _GROWING:
-            self._scale(name, data=np.zeros(0), maxshape=(None,), chunks=(1024,))
+            self._growing(name, TABLES["axes"][name])
         for name, values in fixed.items():
-            self._scale(name, data=values)
-        for name, kind in _MAPS.items():
-            if name in left_out or any(axis not in fixed for axis in kind.axes[1:]):
+            self._make(name, TABLES["axes"][name], data=values)
+        said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
+        for name, kind in TABLES["maps"].items():
+            if name in left_out or any(axis not in fixed for axis in kind.dims[1:]):
                 continue
-            shape = tuple(len(fixed[axis]) for axis in kind.axes[1:])
-            steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
-            chunk_bytes = steps * math.prod(shape) * np.dtype(kind.dtype).itemsize
-            options: dict[str, Any] = {"maxshape": (None, *shape), "chunks": (steps, *shape)}
-            # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
-            options["rdcc_nbytes"] = 0 if steps == 1 else chunk_bytes
-            if kind.sparse:
-                options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-            data = self._file.create_dataset(name, (0, *shape), kind.dtype, **options)
-            removal = (clutter_removal or {}).get(kind.axes[0], "none")
-            said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
-            self._describe(data, kind, clutter_removal=removal, **said)
+            removal = (clutter_removal or {}).get(kind.dims[0], "none")
+            shape = tuple(len(fixed[axis]) for axis in kind.dims[1:])
+            self._growing(name, kind, shape, clutter_removal=removal, **said)
         if parts is not None:
-            self._make_truth(parts)
+            # A group with axes of its own.
+            self._growing(f"{_TRUTH}/time", TABLES["axes"]["time"])
+            self._make(f"{_TRUTH}/part", TABLES["names"]["part"], data=list(parts.names))
+            for name, kind in TABLES["parts"].items():
+                self._growing(f"{_TRUTH}/{name}", kind, (len(parts.names),))
+            self._make(f"{_TRUTH}/person", TABLES["owners"]["person"], data=parts.person)
 
-    def _make_truth(self, parts: Parts) -> None:
-        """Make the group of what is true of each part, with axes of its own."""
-        self._scale(f"{_TRUTH}/time", data=np.zeros(0), maxshape=(None,), chunks=(1024,))
-        self._names(f"{_TRUTH}/part", parts.names)
-        axes, n_parts = (f"{_TRUTH}/time", f"{_TRUTH}/part"), len(parts.names)
-        for name, (dtype, unit, meaning) in OF_PARTS.items():
-            # HDF5 has no chunks of nothing.
-            sizes = (None, n_parts or None), (_STEPS_A_CHUNK, n_parts or 1)
-            options: dict[str, Any] = dict(zip(("maxshape", "chunks"), sizes, strict=True))
-            data = self._file.create_dataset(f"{_TRUTH}/{name}", (0, n_parts), dtype, **options)
-            self._describe(data, _Map(axes, meaning, dtype, unit))
-        data = self._file.create_dataset(f"{_TRUTH}/person", data=parts.person)
-        self._describe(data, _Map(axes[1:], "number of the person; -1: an object", np.int64, "1"))
+    def _growing(self, name: str, kind: Array, shape: tuple[int, ...] = (), **said: object) -> None:
+        """Make an array of no steps of this shape yet."""
+        steps = _STEPS_A_CHUNK[len(shape)] if len(shape) < 2 else 1
+        chunk = steps, *(size or 1 for size in shape)  # HDF5 has no chunks of nothing
+        options: dict[str, Any] = {"maxshape": (None, *(size or None for size in shape))}
+        # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
+        chunk_bytes = math.prod(chunk) * np.dtype(kind.dtype).itemsize
+        options |= {"chunks": chunk, "rdcc_nbytes": 0 if steps == 1 else chunk_bytes}
+        if kind.sparse:
+            options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+        self._make(name, kind, said, shape=(0, *shape), **options)
 
-    def _scale(self, name: str, **options: Any) -> None:
-        axis, own = self._file.create_dataset(name, **options), name.rpartition("/")[2]
-        axis.make_scale(own)
-        axis.attrs["units"], axis.attrs["long_name"] = _AXES[own]
-
-    def _names(self, name: str, names: Sequence[str]) -> None:
-        """Make an axis of names."""
-        own = name.rpartition("/")[2]
-        axis = self._file.create_dataset(name, data=list(names), dtype=h5py.string_dtype())
-        axis.make_scale(own)
-        axis.attrs.update({"units": "1", "long_name": f"name of the {own}"})
-
-    def _describe(self, data: Any, kind: _Map, **attributes: Any) -> None:
+    def _make(self, name: str, kind: Array, said: Any = (), **options: Any) -> None:
+        """Make an array with its unit, its meaning and what is ``said``, and its axes."""
+        dtype = h5py.string_dtype() if kind.dtype == "text" else kind.dtype
         unit = f"{self._unit}2" if kind.unit == "m2" else kind.unit
-        data.attrs.update({"units": unit, "long_name": kind.meaning, **attributes})
-        for number, axis in enumerate(kind.axes):
-            data.dims[number].attach_scale(self._file[axis])
+        data = netcdf_array(self._file, name, kind.dims, unit, kind.meaning, dtype=dtype, **options)
+        data.attrs.update(said)
 
     def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
         """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it.
@@ -173,7 +106,7 @@ class MapStore:
             self._write()
 
     def extend_truth(self, time_s: float, of_parts: Mapping[str, NDArray[Any]]) -> None:
-        """Append the arrays (part,) of `OF_PARTS` at a time to the group ``truth``."""
+        """Append the arrays (part,) of `truth_of_parts` at a time to the group ``truth``."""
         added = {f"{_TRUTH}/{name}": values[None] for name, values in of_parts.items()}
         self.extend(f"{_TRUTH}/time", [time_s], **added)
 
@@ -188,19 +121,16 @@ class MapStore:
     def put(self, time_s: float, **maps: ArrayLike) -> None:
         """Write maps of a single time [s], which do not grow."""
         for name, values in maps.items():
-            kind = _SINGLE[name]
-            data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind.dtype))
-            self._describe(data, kind, clutter_removal="none", time_s=time_s)
+            said = {"clutter_removal": "none", "time_s": time_s}
+            self._make(name, TABLES["received"][name], said, data=values)
 
     def put_truth(self, body: Body) -> None:
         """Write what is true of each person of a body at the times of the frames."""
         self._write()
         for name, names in truth_axes(body).items():
-            self._names(name, names)
+            self._make(name, TABLES["names"][name], data=list(names))
         for name, values in truth_of(body, self._file["time"][:]).items():
-            axes, unit, meaning = TRUTH[name]
-            data = self._file.create_dataset(name, data=values)
-            self._describe(data, _Map(axes, meaning, np.float64, unit))
+            self._make(name, TABLES["people"][name], data=values)
 
     def close(self) -> None:
         """Write what is buffered and close the file; may be called again."""
@@ -211,6 +141,7 @@ class MapStore:
             self._file.close()
             if self._owned:
                 self._raw.close()
+                self._raw.check()
 
 
 def read_maps(file: Path | BinaryIO) -> h5py.File:

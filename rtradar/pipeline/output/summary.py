@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rtradar.description import versions
 from rtradar.pipeline.capture import Capture
@@ -17,14 +18,20 @@ from rtradar.pipeline.processing import Clouds, Processing
 from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.radar import Radar
 from rtradar.scatter import account_of
+from rtradar.scatter.multipath.ghosts import ghosts
 from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions, RunSettings
 from rtradar.system.clock import Moment
 
-
-def cost_of(capture: Capture, started: Moment) -> dict[str, Any]:
-    """Return the cost of a run so far, see `cost`."""
-    return cost(capture.processing, capture.n_chirps, started)
+_SINGLE_REFLECTIONS = {
+    "name": "single_reflections",
+    "share": None,
+    "message": "what parts of a body reflect to one another is left out, which near each other "
+    "changes both by decibels; bounces=2 (--model-option bounces=2) adds it",
+}
+"""A limit of every run without it, whose share only such a run could tell."""
+_REST_BINS = 2
+"""Doppler bins on either side of zero that hold what does not move: the lobe of a Hann window."""
 
 
 def cost(processing: Processing, n_chirps: int, started: Moment) -> dict[str, Any]:
@@ -62,7 +69,7 @@ def summary_of(capture: Capture, clouds: Clouds, started: Moment) -> dict[str, A
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
-        **cost_of(capture, started),
+        **cost(capture.processing, capture.n_chirps, started),
         **_found(radar, capture.n_chirps, clouds),
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
@@ -182,15 +189,6 @@ def _plain(value: object) -> Any:
     raise TypeError(f"a {type(value).__name__} has no place in summary.json")
 
 
-_SINGLE_REFLECTIONS = {
-    "name": "single_reflections",
-    "share": None,
-    "message": "what parts of a body reflect to one another is left out, which near each other "
-    "changes both by decibels; bounces=2 (--model-option bounces=2) adds it",
-}
-"""A limit of every run without it, whose share only such a run could tell."""
-
-
 def _limits(capture: Capture) -> list[dict[str, Any]]:
     of_room = capture.room.limits if capture.room else ()
     limits = [dataclasses.asdict(limit) for limit in (*capture.link_budget.limits, *of_room)]
@@ -214,3 +212,51 @@ def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
     )
     share = ranges.side_lobes / ranges.detections
     return [dataclasses.asdict(Limit("range_side_lobes", share, message))]
+
+
+def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
+    """Return what the maps of a room add to ``summary["room"]``; nothing without a room.
+
+    ``maps`` are those of the run, open. The keys are ``ghosts``, with ``time_s`` and ``paths``, a
+    list of path, range [m], velocity [m/s], azimuth [deg] and power [m^2]; and ``clutter``, to
+    which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least, and of
+    a room in which nobody and nothing moves ``false_alarm_rate``, that of a cell.
+    """
+    if capture.room is None:
+        return {}
+    times = np.asarray(maps["time"])
+    if "range_doppler_received" in maps:
+        time_s = float(maps["range_doppler_received"].attrs["time_s"])
+        frame = int(np.abs(times - time_s).argmin())
+    else:
+        frame = int(np.asarray(maps["detections"]).sum(axis=(1, 2)).argmax())
+        time_s = float(times[frame])
+    paths = [
+        {
+            "path": ghost.path,
+            "range_m": ghost.range_m,
+            "velocity_mps": ghost.velocity_mps,
+            "azimuth_deg": math.degrees(ghost.azimuth_rad),
+            "power_m2": ghost.power_m2,
+        }
+        for ghost in ghosts(capture.room.model, capture.radar, time_s)
+    ]
+    clutter = dict(capture.room.summary["clutter"])
+    if not (capture.people or capture.scene.objects):
+        clutter["false_alarm_rate"] = float(np.asarray(maps["detections"]).mean())
+    before_db = clutter["signal_to_clutter_db"]
+    if "range_doppler_received" in maps and before_db is not None:
+        velocity = np.asarray(maps["velocity"])
+        received, left = (
+            at_rest(np.asarray(power), velocity)
+            for power in (maps["range_doppler_received"], maps["range_doppler"][frame])
+        )
+        if received > 0 and left > 0:
+            clutter["after_removal_db"] = before_db + 10 * math.log10(received / left)
+    return {"ghosts": {"time_s": time_s, "paths": paths}, "clutter": clutter}
+
+
+def at_rest(power: NDArray[np.floating], velocity: NDArray[np.float64]) -> float:
+    """Sum the power of a map (range, velocity) [m^2] within two Doppler bins of rest."""
+    bins = velocity / (velocity[1] - velocity[0]) if len(velocity) > 1 else velocity
+    return float(power[:, np.abs(bins) < _REST_BINS + 0.5].sum(dtype=np.float64))

@@ -24,7 +24,8 @@ from rtradar.report.figures.maps import thinned
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import DAMAGE, Snapshots, load_snapshots, refused
 from rtradar.system.checks import printable
-from rtradar.system.files import open_regular, read_arrays, read_json, stored
+from rtradar.system.files import open_regular, read_arrays, read_json
+from rtradar.system.hdf5 import stored
 from rtradar.system.output_folder import check_whole
 
 _MAX_ROWS, _MAX_COLUMNS = 256, 200

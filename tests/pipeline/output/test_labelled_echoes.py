@@ -10,7 +10,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.pipeline.output.labelled_echoes import CYCLES_COMPARED
+from rtradar.pipeline.output.truth import CYCLES_COMPARED
 
 RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=0, rx_y=3, rx_z=0)
 KICK = rt.synthetic_motion("kick", duration_s=0.5)

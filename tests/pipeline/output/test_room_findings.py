@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline.output.room_findings import at_rest
+from rtradar.pipeline.output.summary import at_rest
 
 
 def test_power_at_rest_is_that_within_two_bins() -> None:
