@@ -107,18 +107,6 @@ def test_order_kills_and_damage_leave_the_same_bytes(
     assert contents(folder) == contents(undisturbed)
 
 
-def test_a_damaged_sample_is_found_and_made_anew(tmp_path: Path) -> None:
-    for recipe in RECIPES[:2]:
-        make_and_store(recipe, str(tmp_path), fake)
-    path = sample_path(tmp_path, RECIPES[0].identity)
-    whole = path.read_bytes()
-    path.write_bytes(whole[:-10])
-    (missing,), damaged = missing_of(RECIPES[:2], tmp_path)
-    assert damaged == 1
-    make_and_store(missing, str(tmp_path), fake)
-    assert path.read_bytes() == whole
-
-
 def test_a_sample_that_cannot_be_made_does_not_stop_the_others(
     client: Client, tmp_path: Path
 ) -> None:

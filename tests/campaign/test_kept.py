@@ -87,7 +87,8 @@ def test_maps_are_those_of_a_run(built: rt.Collection, folder: Path, tmp_path: P
         for plan in plan_samples(read_spec(folder / "set.toml"))
         if plan.identity == built.ids[0]
     )
-    rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", **vars(plan.run_settings()))
+    settings = vars(plan.run_settings())
+    rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", pictures=False, **settings)
     with h5py.File(tmp_path / "run" / "maps.h5") as file:
         for name in ("spectrogram", "range_doppler", "range_azimuth"):
             np.testing.assert_array_equal(maps[name], file[name])
@@ -159,13 +160,18 @@ def test_nothing_more_is_kept_unless_asked_for(tmp_path: Path) -> None:
     assert "keep" not in made.sample.provenance
 
 
-def test_without_angles_the_other_clouds_are_the_same(tmp_path: Path) -> None:
-    made = []
-    for text in ("angles = true\n", "angles = false\n"):
-        plans = plan_samples(read_spec(write(tmp_path, text + SPEC)))
+def made_with(folder: Path, *texts: str) -> list[Any]:
+    """Make one sample of each specification, of the same take."""
+    found = []
+    for text in texts:
+        plans = plan_samples(read_spec(write(folder, text + SPEC)))
         plans.sort(key=lambda plan: str(plan.parameters["recording"]))
-        made.append(make_sample(plans[0].packed()))
-    with_angles, without = made
+        found.append(make_sample(plans[0].packed()))
+    return found
+
+
+def test_without_angles_the_other_clouds_are_the_same(here: None, tmp_path: Path) -> None:
+    with_angles, without = made_with(tmp_path, "angles = true\n", "angles = false\n")
     np.testing.assert_array_equal(with_angles.sample.points, without.sample.points)
     assert len(with_angles.spatial) > 0
     assert without.spatial.shape == (0, 3)
@@ -176,14 +182,9 @@ def test_without_angles_the_other_clouds_are_the_same(tmp_path: Path) -> None:
     assert all(clouds.spatial(index).shape == (0, 3) for index in range(3))
 
 
-def test_without_clouds_what_is_kept_is_the_same(tmp_path: Path) -> None:
+def test_without_clouds_what_is_kept_is_the_same(here: None, tmp_path: Path) -> None:
     kept = 'keep = ["spectrograms", "joints"]\n'
-    made = []
-    for text in ("", "clouds = false\n"):
-        plans = plan_samples(read_spec(write(tmp_path, text + kept + SPEC)))
-        plans.sort(key=lambda plan: str(plan.parameters["recording"]))
-        made.append(make_sample(plans[0].packed()))
-    whole, alone = made
+    whole, alone = made_with(tmp_path, kept, "clouds = false\n" + kept)
     assert alone.sample.points.shape == alone.spatial.shape == (0, 3)
     assert alone.sample.provenance["clouds"] is False
     assert whole.maps.keys() == alone.maps.keys()

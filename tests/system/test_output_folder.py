@@ -495,9 +495,7 @@ KILLED = """
 import json, os, pathlib, sys
 from rtradar.system.output_folder import atomic_folder
 from tests_kind import KIND
-out, last = pathlib.Path(sys.argv[1]), int(sys.argv[2])
-calls = 0
-def killed_at(real):
+def killed_at(last, real):
     def call(*places, **named):
         global calls
         if calls == last:
@@ -505,15 +503,20 @@ def killed_at(real):
         calls += 1
         return real(*places, **named)
     return call
-for name in ("rename", "replace", "rmdir", "unlink", "mkdir"):
-    setattr(os, name, killed_at(getattr(os, name)))
-with atomic_folder(out, KIND) as folder:
-    for name in ("clouds", "maps"):
-        (folder / name).write_text("second")
-    (folder / "store.zarr" / "c").mkdir(parents=True)
-    (folder / "store.zarr" / "c" / "2").write_text("second")
-    (folder / "list.json").write_text(json.dumps({"files": KIND.list_of(folder)}))
-print("whole")
+for last in range(int(sys.argv[2])):
+    if (child := os.fork()):
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+        continue
+    calls = 0
+    for name in ("rename", "replace", "rmdir", "unlink", "mkdir"):
+        setattr(os, name, killed_at(last, getattr(os, name)))
+    with atomic_folder(pathlib.Path(sys.argv[1]) / str(last), KIND) as folder:
+        for name in ("clouds", "maps"):
+            (folder / name).write_text("second")
+        (folder / "store.zarr" / "c").mkdir(parents=True)
+        (folder / "store.zarr" / "c" / "2").write_text("second")
+        (folder / "list.json").write_text(json.dumps({"files": KIND.list_of(folder)}))
+    os._exit(0)
 """
 
 
@@ -521,16 +524,15 @@ print("whole")
 def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_folder_that_says_so(
     tmp_path: Path,
 ) -> None:
-    new = {"clouds": "second", "maps": "second", "store.zarr/c/2": "second"}
-    ends = []
-    for last in range(40):
+    count, ends = 30, []
+    for last in range(count):
+        make(tmp_path / str(last), "first", "plan.png")
+        (tmp_path / str(last) / "mine").write_text("mine")
+    words, environment = command(tmp_path, KILLED, str(tmp_path), str(count))
+    done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True, env=environment)
+    status = [int(word) for word in done.stdout.split()]
+    for last in range(status.index(0) + 1):
         out = tmp_path / str(last)
-        make(out, "first", "plan.png")
-        (out / "mine").write_text("mine")
-        words, environment = command(tmp_path, KILLED, str(out), str(last))
-        done = subprocess.run(
-            words, stdout=subprocess.PIPE, text=True, check=False, env=environment
-        )
         killed = contents(out)
         if "unfinished" in json.loads((out / "list.json").read_text()):
             ends.append("says so")
@@ -541,20 +543,17 @@ def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_
             shown = {name: text for name, text in unlisted(out).items() if not name.startswith(".")}
             ends.append("old" if shown == made("first", "plan.png") | {"mine": "mine"} else "new")
             if ends[-1] == "new":
+                new = dict.fromkeys(("clouds", "maps", "store.zarr/c/2"), "second")
                 assert shown == new | {"mine": "mine"}
         assert contents(out) == killed  # who reads it changes nothing
         with atomic_folder(out, KIND) as folder:
             (folder / "maps").write_text("third")
             finish(folder)
-        assert unlisted(out) == {
-            "maps": "third",
-            "mine": "mine",
-        }  # what the killed one had still to move is gone, too
+        # What the killed one had still to move is gone, too.
+        assert unlisted(out) == {"maps": "third", "mine": "mine"}
         make(out, "second")
         assert unlisted(out) == made("second") | {"mine": "mine"}
-        if done.stdout:
-            break
-    assert done.returncode == 0
+    assert set(status) == {0, 9}
     assert ends == sorted(ends, key=["old", "says so", "new"].index)
     assert min(ends.count("old"), ends.count("new")) >= 2
     assert ends.count("says so") >= 7  # seven files move or go
