@@ -21,6 +21,7 @@ from rtradar.campaign.augmentation import VARIED
 from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
+from rtradar.clouds.arrays import TABLES as ARRAY_TABLES
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
@@ -401,7 +402,19 @@ def drawn() -> str:
     return pipe_table(["name under `[drawn]`", "range if left out", "allowed"], rows)
 
 
+def arrays() -> str:
+    """Data sets of the file of maps, with their axes and units."""
+    groups = {"maps": "", "received": "", "people": "", "parts": "truth/", "owners": "truth/"}
+    rows = [
+        [f"`{place}{name}`", ", ".join(one.dims), one.unit.replace("m2", "m²"), one.meaning]
+        for group, place in groups.items()
+        for name, one in ARRAY_TABLES[group].items()
+    ]
+    return pipe_table(["data set", "axes", "unit", "content"], rows)
+
+
 TABLES: dict[str, Callable[[], str]] = {
+    "arrays": arrays,
     "radar-keys": lambda: keys(Radar),
     "antenna-keys": lambda: keys(Antenna),
     "receiver-keys": lambda: keys(Receiver),

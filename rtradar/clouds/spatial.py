@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,8 +67,9 @@ class SpatialCloud:
         for field, given in vars(self).items():
             if given is None:
                 continue
-            kind = np.int64 if field in ("source", "part") else np.float64
-            values = np.asarray(given, dtype=kind)
+            values: NDArray[Any] = np.asarray(
+                given, dtype=np.int64 if field in ("source", "part") else np.float64
+            )
             object.__setattr__(self, field, values)
             if values.shape != ((count, 3) if field == "points" else (count,)):
                 raise InputError(

@@ -56,8 +56,10 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
             data = file.create_dataset("if_samples", (*rest[::-1], chirps), _COMPLEX, chunks=chunk)
             data.attrs["MATLAB_class"] = np.bytes_("single")
             for first, block in recording.blocks("writing"):
-                turned = np.ascontiguousarray(block.T).view(_COMPLEX)
-                data[..., first : first + len(block)] = turned
+                whole = np.zeros(chunk, dtype=np.complex64)  # the last chunk is stored whole too
+                whole[..., : len(block)] = block.T
+                # Directly, for HDF5 would keep some of what it writes in memory.
+                data.id.write_direct_chunk((0, 0, 0, first), whole.tobytes())
                 written.check()
             for name, quantity in recording.quantities().items():
                 _put(file, name, np.atleast_2d(quantity.values))
@@ -163,22 +165,24 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
             meaning = "0, 1, 2 are x, y, z" if name == "xyz" else f"number of the {name}"
             netcdf_array(file, name, (name,), "1", meaning, data=np.arange(length))
-        kept: dict[str, Any] = {"shape": shape, "dtype": "<f4"}
-        kept["chunks"] = (recording.step, *shape[1:])
+        chunk = (recording.step, *shape[1:])
+        kept: dict[str, Any] = {"shape": shape, "dtype": "<f4", "chunks": chunk}
         parts = [
             netcdf_array(file, name, IF_AXES, IF_UNIT, f"{kind} part of the IF samples", **kept)
             for name, kind in _PARTS.items()
         ]
         for name, quantity in recording.quantities().items():
-            axes, values, unit, meaning = quantity
-            netcdf_array(file, name, axes, unit, meaning, data=values)
+            axes, data, unit, meaning = quantity
+            netcdf_array(file, name, axes, unit, meaning, data=data)
         for part in parts:
             part.attrs["coordinates"] = "chirp_time sample_time"
         file.attrs.update(recording.waveform())
         file.attrs["title"], file.attrs["radar"] = recording.name, recording.radar_text
         for first, block in recording.blocks("writing"):
             for part, values in zip(parts, (block.real, block.imag), strict=True):
-                part[first : first + len(block)] = values
+                whole = np.zeros(chunk, dtype=np.float32)  # the last chunk is stored whole too
+                whole[: len(block)] = values
+                part.id.write_direct_chunk((first, 0, 0, 0), whole.tobytes())
             written.check()
     return {"variables": list(_PARTS), "type": "float32"}
 
