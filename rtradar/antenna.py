@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number
+from rtradar.system.checks import brief
+from rtradar.system.fields import Limits, check_fields
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
-_PATTERNS = ("isotropic", "cosine", "dipole", "table")
-_CUTS = ("azimuth_deg", "azimuth_db", "elevation_deg", "elevation_db")
-_LIMITS = {"exponent": (0.0, 1e4), "gain_dbi": (-100.0, 100.0)}
+_Angles = Annotated[tuple[float, ...], Limits(-180, 180)]
+_Levels = Annotated[tuple[float, ...], Limits(-300, 0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,54 +45,53 @@ class Antenna:
     """
 
     pattern: Literal["isotropic", "cosine", "dipole", "table"] = "isotropic"
-    exponent: float | None = None
-    gain_dbi: float | None = None
-    azimuth_deg: tuple[float, ...] = ()
-    azimuth_db: tuple[float, ...] = ()
-    elevation_deg: tuple[float, ...] = ()
-    elevation_db: tuple[float, ...] = ()
+    exponent: Annotated[float | None, Limits(0, 1e4)] = None
+    gain_dbi: Annotated[float | None, Limits(-100, 100)] = None
+    azimuth_deg: _Angles = ()
+    azimuth_db: _Levels = ()
+    elevation_deg: _Angles = ()
+    elevation_db: _Levels = ()
 
     def __post_init__(self) -> None:
-        if self.pattern not in _PATTERNS:
-            raise InputError(
-                f"antenna: pattern = {brief(self.pattern)}; allowed: {', '.join(_PATTERNS)}"
-            )
-        if (self.exponent is not None) != (self.pattern == "cosine"):
-            raise InputError(
-                f"antenna: pattern = '{self.pattern}' with exponent = {brief(self.exponent)}; only "
-                "'cosine' has one, and needs it"
-            )
-        for key, (least, most) in _LIMITS.items():
-            if (value := getattr(self, key)) is not None:
-                object.__setattr__(self, key, check_number("antenna", key, value, least, most))
-        if self.gain_dbi is None and self.pattern == "table":
-            raise InputError("antenna: pattern = 'table' needs gain_dbi, the gain at its peak")
-        for cut in _CUTS:
-            values = getattr(self, cut)
-            if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
-                raise InputError(
-                    f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is "
-                    f"{brief(values)}"
+        check_fields(self, "antenna: ")
+        cuts = {
+            name: (getattr(self, f"{name}_deg"), getattr(self, f"{name}_db"))
+            for name in ("azimuth", "elevation")
+        }
+        listed = self.pattern == "table"
+        for wrong, complaint in (
+            (
+                (self.exponent is None) == (self.pattern == "cosine"),
+                f"pattern = '{self.pattern}' with exponent = {brief(self.exponent)}; only "
+                "'cosine' has one, and needs it",
+            ),
+            (
+                listed and self.gain_dbi is None,
+                "pattern = 'table' needs gain_dbi, the gain at its peak",
+            ),
+            (
+                any(angles or levels for angles, levels in cuts.values()) != listed,
+                f"pattern = '{self.pattern}'; 'table' needs azimuth_deg and azimuth_db, or "
+                "elevation_deg and elevation_db, and others have none of these lists",
+            ),
+            *(
+                (
+                    len(angles) != len(levels) or list(angles) != sorted(set(angles)),
+                    f"{name}_deg and {name}_db must be as many, and the angles ascend",
                 )
-            limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
-            checked = tuple(check_number("antenna", cut, value, *limits) for value in values)
-            object.__setattr__(self, cut, checked)
-        for name in ("azimuth", "elevation"):
-            angles, levels = getattr(self, f"{name}_deg"), getattr(self, f"{name}_db")
-            if len(angles) != len(levels) or (np.diff(angles) <= 0).any():
-                raise InputError(
-                    f"antenna: {name}_deg and {name}_db must be as many, and the angles ascend"
+                for name, (angles, levels) in cuts.items()
+            ),
+            *(
+                (
+                    max(levels, default=0) < 0,
+                    f"the largest of {name}_db is {max(levels, default=0):g} dB; it must be 0, "
+                    "for gain_dbi is the gain there",
                 )
-            if levels and max(levels) < 0:
-                raise InputError(
-                    f"antenna: the largest of {name}_db is {max(levels):g} dB; it must be 0, for "
-                    "gain_dbi is the gain there"
-                )
-        if self.pattern == "table" and not (self.azimuth_deg or self.elevation_deg):
-            raise InputError(
-                "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and "
-                "elevation_db"
-            )
+                for name, (_, levels) in cuts.items()
+            ),
+        ):
+            if wrong:
+                raise InputError(f"antenna: {complaint}")
 
     @property
     def peak_gain(self) -> float:

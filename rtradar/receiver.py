@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_keys, check_number
-from rtradar.system.seeds import check_seed
+from rtradar.system.fields import Limits, check_fields
+from rtradar.system.seeds import Seed
 
-_LEVEL_DBM = (-300.0, 100.0)
-_LIMITS = {
-    "iq_gain_db": (-20.0, 20.0),
-    "iq_phase_deg": (-80.0, 80.0),
-    "adc_full_scale_dbm": _LEVEL_DBM,
-    "leakage_db": (-200.0, 0.0),
-    "leakage_length_m": (0.0, 100.0),
-    "dc_dbm": _LEVEL_DBM,
-}
-_LIST_LIMITS = {
-    "phase_noise_hz": (1.0, 1e12),
-    "phase_noise_dbc_hz": (-300.0, 0.0),
-    "highpass_hz": (1.0, 1e12),
-}
-_CHANNEL_LIMITS = {"channel_gain_db": (-60.0, 60.0), "channel_phase_deg": (-360.0, 360.0)}
-_MOST_BITS = 24
+_Dbm = Annotated[float, Limits(-300, 100)]
+_Ramp = Annotated[float, Limits(1e-9, 1e3)]
+_RightAngle = Annotated[float, Limits(-90, 90)]
+_Hertz = Annotated[tuple[float, ...], Limits(1, 1e12)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,27 +42,17 @@ class Interferer:
         Where a value has no meaning.
     """
 
-    start_frequency_hz: float
-    slope_hz_per_s: float
-    ramp_s: float
-    period_s: float
-    power_dbm: float
-    start_s: float = 0.0
-    azimuth_deg: float = 0.0
-    elevation_deg: float = 0.0
+    start_frequency_hz: Annotated[float, Limits(1, 1e15)]
+    slope_hz_per_s: Annotated[float, Limits(-1e18, 1e18)]
+    ramp_s: _Ramp
+    period_s: _Ramp
+    power_dbm: _Dbm
+    start_s: Annotated[float, Limits(0, 1e6)] = 0.0
+    azimuth_deg: _RightAngle = 0.0
+    elevation_deg: _RightAngle = 0.0
 
     def __post_init__(self) -> None:
-        limits = {
-            "start_frequency_hz": (1.0, 1e15),
-            "slope_hz_per_s": (-1e18, 1e18),
-            "ramp_s": (1e-9, 1e3),
-            "period_s": (1e-9, 1e3),
-            "power_dbm": _LEVEL_DBM,
-            "start_s": (0.0, 1e6),
-            "azimuth_deg": (-90.0, 90.0),
-            "elevation_deg": (-90.0, 90.0),
-        }
-        _check(self, "receiver: interferer", limits)
+        check_fields(self, "receiver: interferer: ")
         if self.period_s < self.ramp_s:
             raise InputError(
                 f"receiver: interferer: period_s = {self.period_s:g} is shorter than its ramp of "
@@ -121,56 +97,36 @@ class Receiver:
         Where a value has no meaning.
     """
 
-    phase_noise_hz: tuple[float, ...] = ()
-    phase_noise_dbc_hz: tuple[float, ...] = ()
-    iq_gain_db: float = 0.0
-    iq_phase_deg: float = 0.0
-    adc_bits: int | None = None
-    adc_full_scale_dbm: float | None = None
-    leakage_db: float | None = None
-    leakage_length_m: float = 0.0
-    dc_dbm: float | None = None
-    channel_gain_db: float | tuple[float, ...] = 0.0
-    channel_phase_deg: float | tuple[float, ...] = 0.0
-    seed: int = 0
-    highpass_hz: tuple[float, ...] = ()
+    phase_noise_hz: _Hertz = ()
+    phase_noise_dbc_hz: Annotated[tuple[float, ...], Limits(-300, 0)] = ()
+    iq_gain_db: Annotated[float, Limits(-20, 20)] = 0.0
+    iq_phase_deg: Annotated[float, Limits(-80, 80)] = 0.0
+    adc_bits: Annotated[int | None, Limits(1, 24)] = None
+    adc_full_scale_dbm: _Dbm | None = None
+    leakage_db: Annotated[float | None, Limits(-200, 0)] = None
+    leakage_length_m: Annotated[float, Limits(0, 100)] = 0.0
+    dc_dbm: _Dbm | None = None
+    channel_gain_db: (
+        Annotated[float, Limits(0, 60)] | Annotated[tuple[float, ...], Limits(-60, 60)]
+    ) = 0.0
+    channel_phase_deg: (
+        Annotated[float, Limits(0, 360)] | Annotated[tuple[float, ...], Limits(-360, 360)]
+    ) = 0.0
+    seed: Seed = 0
+    highpass_hz: _Hertz = ()
     interferer: Interferer | None = None
 
     def __post_init__(self) -> None:
-        _check(self, "receiver", _LIMITS)
-        for key, (least, most) in _LIST_LIMITS.items():
-            object.__setattr__(self, key, _numbers(key, getattr(self, key), least, most))
-        for key, (least, most) in _CHANNEL_LIMITS.items():
-            value = getattr(self, key)
-            if isinstance(value, Sequence) and not isinstance(value, str):
-                object.__setattr__(self, key, _numbers(key, value, least, most))
-            else:
-                object.__setattr__(self, key, check_number("receiver", key, value, 0.0, most))
-        check_seed("receiver: ", self.seed)
+        check_fields(self, "receiver: ")
         offsets = self.phase_noise_hz
         if len(offsets) != len(self.phase_noise_dbc_hz) or list(offsets) != sorted(set(offsets)):
             raise InputError(
                 "receiver: phase_noise_hz and phase_noise_dbc_hz must be as many, and the offsets "
                 "ascend"
             )
-        if self.adc_bits is not None:
-            bits = check_number("receiver", "adc_bits", self.adc_bits, 1, _MOST_BITS)
-            if bits != int(bits) or self.adc_full_scale_dbm is None:
-                raise InputError(
-                    "receiver: adc_bits is a whole number and needs adc_full_scale_dbm; here they "
-                    f"are {bits:g} and {self.adc_full_scale_dbm}"
-                )
-            object.__setattr__(self, "adc_bits", int(bits))
-        table: Any = self.interferer
-        if isinstance(table, Mapping):
-            fields = dataclasses.fields(Interferer)
-            needed = [one.name for one in fields if one.default is dataclasses.MISSING]
-            optional = [one.name for one in fields if one.name not in needed]
-            check_keys("receiver: interferer: ", table, tuple(needed), tuple(optional))
-            object.__setattr__(self, "interferer", Interferer(**table))
-        elif not isinstance(table, Interferer | None):
+        if self.adc_bits is not None and self.adc_full_scale_dbm is None:
             raise InputError(
-                f"receiver: interferer = {brief(table)}; it must be a table of its fields"
+                f"receiver: adc_bits = {self.adc_bits} needs adc_full_scale_dbm; give both"
             )
 
     @property
@@ -194,16 +150,3 @@ class Receiver:
             "highpass_hz": self.highpass_hz,
         }
         return tuple(name for name, value in named.items() if value)
-
-
-def _check(values: Any, where: str, limits: Mapping[str, tuple[float, float]]) -> None:
-    """Check the numbers of a dataclass, and set them as floats."""
-    for key, (least, most) in limits.items():
-        if (value := getattr(values, key)) is not None:
-            object.__setattr__(values, key, check_number(where, key, value, least, most))
-
-
-def _numbers(key: str, values: object, least: float, most: float) -> tuple[float, ...]:
-    if not isinstance(values, Sequence) or isinstance(values, str):
-        raise InputError(f"receiver: {key} = {brief(values)}; it must be a list of numbers")
-    return tuple(check_number("receiver", key, value, least, most) for value in values)

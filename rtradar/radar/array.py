@@ -3,42 +3,68 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar.ambiguity import LinePattern
-from rtradar.radar.waveform import Waveform
+from rtradar.radar.waveform import MOST, Waveform, positive
+from rtradar.system.fields import Angle, Limits
 
 Places = tuple[tuple[float, float, float], ...]
+
+MOST_CHIRPS = 2**31
+_MOST_ANTENNAS, _MOST_PLACE_M = 1024, 100.0
+
+_Count = Annotated[int, Limits(0, MOST)]
+_Spacing = Annotated[float, positive()]
+_WITHIN = f"it must be a list of 1 to {_MOST_ANTENNAS} places [x, y, z], within {_MOST_PLACE_M:g} m"
+_ListedPlaces = Annotated[
+    Places | None, Limits(-_MOST_PLACE_M, _MOST_PLACE_M, _WITHIN, (1, _MOST_ANTENNAS))
+]
 
 
 class UsualPlace(tuple[float, float, float]):
     """Place of a radar that neither its file nor its caller has said; a scene may say another."""
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Array(Waveform):
-    """What of a radar follows from the places of its antennas; `Radar` has the fields."""
+    """The antennas of a radar, and what follows from their places; `Radar` documents the fields."""
 
-    tx_y: int
-    tx_z: int
-    rx_y: int
-    rx_z: int
-    tx_spacing_wavelengths: float
-    rx_spacing_wavelengths: float
-    tx_positions_m: Places | None
-    rx_positions_m: Places | None
-    tx_order: tuple[int, ...] | None
-    channels: Literal["pairs", "all"]
-    position_m: tuple[float, float, float]
-    yaw_deg: float
-    pitch_deg: float
-    roll_deg: float
-    path_times_s: tuple[float, ...] | None
-    path_m: Places | None
-    path_angles_deg: Places | None
+    tx_y: _Count = 6
+    tx_z: _Count = 6
+    rx_y: _Count = 8
+    rx_z: _Count = 8
+    tx_spacing_wavelengths: _Spacing = 4.0
+    rx_spacing_wavelengths: _Spacing = 0.5
+    tx_positions_m: _ListedPlaces = None
+    rx_positions_m: _ListedPlaces = None
+    tx_order: Annotated[
+        tuple[int, ...] | None,
+        Limits(wanted="it must be a list of whole numbers, each Tx once"),
+    ] = None
+    channels: Literal["pairs", "all"] = "pairs"
+    position_m: Annotated[
+        tuple[float, float, float], Limits(wanted="it must be three finite numbers [m]")
+    ] = UsualPlace((-4.0, 1.0, 1.0))
+    yaw_deg: Angle = 0.0
+    pitch_deg: Angle = 0.0
+    roll_deg: Angle = 0.0
+    path_times_s: Annotated[
+        tuple[float, ...] | None,
+        Limits(wanted="it must be a list of times [s]"),
+    ] = None
+    path_m: _ListedPlaces = None
+    path_angles_deg: Annotated[
+        Places | None,
+        Limits(
+            counts=(0, MOST_CHIRPS), wanted="it must be a list of [yaw, pitch, roll] in degrees"
+        ),
+    ] = None
 
     @property
     def is_cross(self) -> bool:

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from rtradar.antenna import Antenna
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError
 from rtradar.radar.schedule import Schedule
 from rtradar.receiver import Receiver
+from rtradar.system.fields import Limits, MaybeEmpty
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Powers(Schedule):
-    """What of a radar follows from what it transmits and receives; `Radar` has the fields."""
+    """What a radar transmits and receives, and what follows; `Radar` documents the fields."""
 
-    name: str
-    polarization: Literal["v", "h"]
-    transmit_power_dbm: float | None
-    noise_figure_db: float | None
-    noise_temperature_k: float
-    tx_antenna: Antenna | None
-    rx_antenna: Antenna | None
-    receiver: Receiver | None
+    name: MaybeEmpty = "custom"
+    polarization: Literal["v", "h"] = "v"
+    transmit_power_dbm: Annotated[float | None, Limits(-200, 200)] = None
+    noise_figure_db: Annotated[float | None, Limits(0, 100)] = None
+    noise_temperature_k: Annotated[float, Limits(0, 1e6)] = 290.0
+    tx_antenna: Antenna | None = None
+    rx_antenna: Antenna | None = None
+    receiver: Receiver | None = None
 
     @property
     def watts_per_m2(self) -> float:

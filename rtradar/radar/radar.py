@@ -12,18 +12,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
 from rtradar.radar import display
-from rtradar.radar.array import Places, UsualPlace
-from rtradar.radar.checks import check_rules, checked_fields
+from rtradar.radar.checks import check_rules
 from rtradar.radar.powers import Powers
 from rtradar.radar.schedule import FollowingCount
-from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, printable
+from rtradar.system.fields import check_fields
 from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table
 
 if TYPE_CHECKING:
@@ -145,50 +143,8 @@ class Radar(Powers):
     48
     """
 
-    name: str = "custom"
-    start_frequency_hz: float = 12e9
-    bandwidth_hz: float = 4e9
-    chirp_duration_s: float = 62.5e-6
-    samples_per_chirp: int = 256
-    idle_s: float = 0.0
-    adc_start_s: float = 0.0
-    adc_rate_hz: float | None = None
-    tx_y: int = 6
-    tx_z: int = 6
-    rx_y: int = 8
-    rx_z: int = 8
-    tx_spacing_wavelengths: float = 4.0
-    rx_spacing_wavelengths: float = 0.5
-    tx_positions_m: Places | None = None
-    rx_positions_m: Places | None = None
-    tx_order: tuple[int, ...] | None = None
-    position_m: tuple[float, float, float] = UsualPlace((-4.0, 1.0, 1.0))
-    yaw_deg: float = 0.0
-    pitch_deg: float = 0.0
-    roll_deg: float = 0.0
-    path_times_s: tuple[float, ...] | None = None
-    path_m: Places | None = None
-    path_angles_deg: Places | None = None
-    channels: Literal["pairs", "all"] = "pairs"
-    frame_duration_s: float = 0.1
-    frame_hop_s: float = 0.025
-    frame_period_s: float | None = None
-    chirps_per_frame: int = None  # type: ignore[assignment]  # resolved below
-    multiplexing: Literal["tdm", "fdm", "ddm", "bpm"] = "tdm"
-    carrier_step_hz: float | None = None
-    doppler_bands: int | None = None
-    polarization: Literal["v", "h"] = "v"
-    transmit_power_dbm: float | None = None
-    noise_figure_db: float | None = None
-    noise_temperature_k: float = 290.0
-    tx_antenna: Antenna | None = None
-    rx_antenna: Antenna | None = None
-    receiver: Receiver | None = None
-
     def __post_init__(self) -> None:
-        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        for field, value in checked_fields(given).items():
-            object.__setattr__(self, field, value)
+        check_fields(self, f"radar {brief(self.name)}: ")
         check_rules(self)
         following: dict[str, float] = {}
         whole = self.cycles_per_frame * self.n_tx

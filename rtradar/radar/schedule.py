@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Self, TypeVar
+from typing import Annotated, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.radar.array import Array
+from rtradar.radar.array import MOST_CHIRPS, Array
+from rtradar.radar.waveform import MOST, positive
+from rtradar.system.fields import Limits
 
 _Number = TypeVar("_Number", NDArray[np.int64], NDArray[np.float64])
 
@@ -22,17 +25,18 @@ class FollowingCount(int):
     """Number of chirps that follows from other fields, and anew where these are replaced."""
 
 
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Schedule(Array):
-    """What of a radar follows from the times of its chirps; `Radar` has the fields."""
+    """The chirps of a radar, and what follows from their times; `Radar` documents the fields."""
 
-    idle_s: float
-    frame_duration_s: float
-    frame_hop_s: float
-    frame_period_s: float | None
-    chirps_per_frame: int
-    multiplexing: Literal["tdm", "fdm", "ddm", "bpm"]
-    carrier_step_hz: float | None
-    doppler_bands: int | None
+    idle_s: Annotated[float, Limits(0, 1e3)] = 0.0
+    frame_duration_s: Annotated[float, positive()] = 0.1
+    frame_hop_s: Annotated[float, positive()] = 0.025
+    frame_period_s: Annotated[float | None, positive()] = None
+    chirps_per_frame: Annotated[int | None, Limits(1, MOST_CHIRPS)] = None
+    multiplexing: Literal["tdm", "fdm", "ddm", "bpm"] = "tdm"
+    carrier_step_hz: Annotated[float | None, positive()] = None
+    doppler_bands: Annotated[int | None, Limits(1, MOST)] = None
 
     @property
     def chirp_period_s(self) -> float:

@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.system.fields import Limits
+
+MOST = 65536
+"""Largest count of samples, of antennas on a line, and of bands."""
 
 
+def positive(least: float = 1e-15, most: float = 1e15) -> Limits:
+    """Return the limits of a number above 0, far outside of every radar where none are given.
+
+    Inside, no product or ratio of two of them leaves the range of float64.
+    """
+    given = "" if (least, most) == (1e-15, 1e15) else f", {least:g} to {most:g}"
+    return Limits(least, most, f"it must be a positive, finite number{given}")
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Waveform:
-    """What of a radar follows from its sweep; `Radar` has the fields."""
+    """The sweep of a radar, and what follows from it; `Radar` documents the fields."""
 
-    start_frequency_hz: float
-    bandwidth_hz: float
-    chirp_duration_s: float
-    samples_per_chirp: int
-    adc_start_s: float
-    adc_rate_hz: float | None
+    start_frequency_hz: Annotated[float, positive(1e9, 300e9)] = 12e9
+    bandwidth_hz: Annotated[float, positive(1e6, 100e9)] = 4e9
+    chirp_duration_s: Annotated[float, positive(1e-15, 0.1)] = 62.5e-6
+    samples_per_chirp: Annotated[int, Limits(1, MOST)] = 256
+    adc_start_s: Annotated[float, Limits(0, 0.1)] = 0.0
+    adc_rate_hz: Annotated[float | None, positive()] = None
 
     @property
     def slope_hz_per_s(self) -> float:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, is_whole
+from rtradar.system.fields import Limits
 
 if TYPE_CHECKING:
     import numpy as np
 
 MOST_SEED = 2**63 - 1
 """Largest seed, which fits the integers of every file format."""
+
+Seed = Annotated[int, Limits(0, MOST_SEED)]
 
 _WORD = 2**32
 """Seeds below it are single words of the entropy that NumPy mixes."""

@@ -1,0 +1,265 @@
+"""What the fields of a dataclass may hold, by their annotations, from a file or from Python.
+
+The type of a field and its `Limits`, in ``Annotated``, are all that is said of its values: by them
+`check_fields` converts and refuses what a constructor is given, `read_table` makes an object of a
+table of a TOML file, and the pages list what is allowed. Types are ``float``, ``int``, ``bool``,
+``str`` (one line), ``Literal``, tuples, other such dataclasses (or a table of their fields), any
+other class, and unions of these. What fields must be to each other is left to their class.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import get_type_hints as hints_of
+
+from rtradar.errors import InputError
+from rtradar.system.checks import Table, brief, check_keys, is_real, is_whole
+
+_Thing = TypeVar("_Thing")
+_FINITE = 1e15
+_SMALLER_UNITS = {"hz": (9, 6), "_s": (-6, -3)}
+"""Powers of ten of the units in which frequencies and times are often written."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a type does not say of a value.
+
+    Parameters
+    ----------
+    least, most : float
+        Least and largest value of a number, or of each number of a list.
+    wanted : str
+        What is allowed, in words for messages; by default it follows from type and limits.
+    counts : (int, int)
+        Least and largest number of entries of a list.
+    """
+
+    least: float = -_FINITE
+    most: float = _FINITE
+    wanted: str = ""
+    counts: tuple[int, int] = (0, 2**31)
+
+
+@dataclass(frozen=True)
+class Help:
+    """What a field means, in a sentence for the help of a command and the page of its class."""
+
+    text: str
+    kind: str = ""
+
+
+Angle = Annotated[float, Limits(-360, 360)]
+"""Angle of up to a turn either way [deg]."""
+Point = Annotated[tuple[float, float, float], Limits(-1000, 1000)]
+"""Place or vector of a scene."""
+MaybeEmpty = Annotated[str, Limits(wanted="it must be one line of text")]
+
+
+class Rule(NamedTuple):
+    """How a value is read, with a ValueError where it is not allowed, and what is."""
+
+    read: Callable[[Any], Any]
+    wanted: str
+
+    def check(self, where: str, key: str, value: Any) -> Any:
+        """Return the value in its type; InputError if it is not allowed."""
+        try:
+            return self.read(value)
+        except InputError as error:  # of a table in it
+            raise InputError(f"{where}{key}: {error}") from None
+        except ValueError:
+            hint = self._in_units(key, value)
+            raise InputError(f"{where}{key} = {brief(value)}; {self.wanted}{hint}") from None
+
+    def _in_units(self, key: str, value: Any) -> str:
+        """Ask whether a frequency or a time is meant that is allowed in another unit."""
+        powers = _SMALLER_UNITS.get(key[-2:], ()) if is_real(value) and abs(value) < _FINITE else ()
+        for power in powers:
+            try:
+                self.read(value * 10.0**power)
+            except ValueError:
+                continue
+            return f"; is that {value:g}e{power}?"
+        return ""
+
+
+@cache
+def rules_of(kind: type) -> Mapping[str, Rule]:
+    """Return the rule of each field of a dataclass."""
+    hints = annotations_of(kind)
+    return {field.name: _rule(hints[field.name]) for field in dataclasses.fields(kind)}
+
+
+def annotations_of(kind: type) -> dict[str, Any]:
+    """Return the annotations of a class, with what is in ``Annotated``."""
+    unknown: dict[str, Any] = {}
+    while True:
+        try:
+            return hints_of(kind, localns=unknown, include_extras=True)
+        except NameError as error:  # a class that is imported for checkers of types alone
+            unknown[error.name] = Any
+
+
+def check_fields(thing: Any, where: str = "") -> None:
+    """Check the fields of a frozen dataclass, and set them in their types.
+
+    ``where`` begins the message of an `InputError`, which names the field and what is allowed.
+    """
+    for key, rule in rules_of(type(thing)).items():
+        object.__setattr__(thing, key, rule.check(where, key, getattr(thing, key)))
+
+
+def keys_of(kind: type, *, without: Sequence[str] = ()) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the keys of the table of a dataclass: those that must be given, and the others."""
+    fields = [one for one in dataclasses.fields(kind) if one.init and one.name not in without]
+    missing = dataclasses.MISSING
+    needed = [one.name for one in fields if one.default is one.default_factory is missing]
+    return tuple(needed), tuple(one.name for one in fields if one.name not in needed)
+
+
+def read_table(kind: type[_Thing], where: str, table: Table) -> _Thing:
+    """Make an object of a table whose keys are its fields; ``where`` begins the messages."""
+    check_keys(where, table, *keys_of(kind))
+    return kind(**table)
+
+
+def _rule(hint: Any, limits: Limits | None = None) -> Rule:
+    """Make the rule of a type."""
+    own, args = get_origin(hint) or hint, get_args(hint)
+    if own is Annotated:
+        given = [one for one in args[1:] if isinstance(one, Limits)]
+        return _rule(args[0], given[0] if given else limits)
+    bounds = limits or Limits()
+    if own in (Union, UnionType):
+        found = _any_of(
+            [_rule(one, limits) for one in args if one is not NoneType], NoneType in args
+        )
+    elif own is tuple:
+        found = _list_of(args, limits)
+    elif own is float:
+        found = Rule(_numbers(is_real, bounds, float), _range("a number", bounds))
+    elif own is int:
+        found = Rule(_numbers(is_whole, bounds, int), _range("a whole number", bounds))
+    elif own in _READERS:
+        found = Rule(*_READERS[own](bounds, args))
+    elif dataclasses.is_dataclass(own) and isinstance(own, type):
+        found = _table_of(own)
+    else:
+        found = Rule(
+            lambda value: value if own is Any else _tested(isinstance(value, own), value),
+            f"it must be a {getattr(own, '__name__', own)}",
+        )
+    return found._replace(wanted=bounds.wanted or found.wanted)
+
+
+def _tested(right: bool, value: Any) -> Any:
+    if not right:
+        raise ValueError
+    return value
+
+
+def _range(noun: str, limits: Limits) -> str:
+    if -limits.least == limits.most == _FINITE:
+        return f"it must be {noun}"
+    return f"it must be {noun} from {_shown(limits.least)} to {_shown(limits.most)}"
+
+
+def _shown(limit: float) -> str:
+    return f"{limit}" if isinstance(limit, int) else f"{limit:g}"
+
+
+def _numbers(
+    right: Callable[[object], bool], limits: Limits, convert: type
+) -> Callable[[Any], Any]:
+    least, most = limits.least, limits.most
+
+    def read(value: Any) -> Any:
+        if not right(value) or not least <= value <= most:
+            raise ValueError
+        # A kind of int stays what it is.
+        return value if isinstance(value, convert) else convert(value)
+
+    return read
+
+
+def _truth(_: Limits, __: Any) -> tuple[Callable[[Any], Any], str]:
+    return (
+        lambda value: bool(_tested(type(value).__name__ in ("bool", "bool_"), value)),
+        "it must be true or false",
+    )
+
+
+def _line(limits: Limits, _: Any) -> tuple[Callable[[Any], Any], str]:
+    return (
+        lambda value: _tested(
+            isinstance(value, str)
+            and value.isprintable()
+            and (bool(value.strip()) or bool(limits.wanted)),
+            value,
+        ),
+        "it must be a string of one line, not empty",
+    )
+
+
+def _choice(_: Limits, allowed: Any) -> tuple[Callable[[Any], Any], str]:
+    return (
+        lambda value: _tested(isinstance(value, str) and value in allowed, value),
+        f"allowed: {', '.join(allowed)}",
+    )
+
+
+_READERS: Mapping[Any, Callable[[Limits, Any], tuple[Callable[[Any], Any], str]]] = {
+    bool: _truth,
+    str: _line,
+    Literal: _choice,
+}
+
+
+def _any_of(rules: Sequence[Rule], or_none: bool) -> Rule:
+    def read(value: Any) -> Any:
+        if or_none and value is None:
+            return None
+        for rule in rules[:-1]:
+            try:
+                return rule.read(value)
+            except InputError:
+                raise
+            except ValueError:
+                continue
+        return rules[-1].read(value)
+
+    first, *others = (rule.wanted for rule in rules)
+    return Rule(read, " or ".join([first, *(one.removeprefix("it must be ") for one in others)]))
+
+
+def _list_of(args: tuple[Any, ...], limits: Limits | None) -> Rule:
+    rule, even = _rule(args[0], limits and dataclasses.replace(limits, wanted="")), Ellipsis in args
+    least, most = (limits or Limits()).counts if even else (len(args), len(args))
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            value = _tested(hasattr(value, "tolist"), value).tolist()  # an array of NumPy
+        if not isinstance(value, list | tuple) or not least <= len(value) <= most:
+            raise ValueError
+        found = tuple(map(rule.read, value))
+        # A kind of tuple stays what it is.
+        return value if isinstance(value, tuple) and type(value) is not tuple else found
+
+    several = "a list" if even else str(most)
+    each = rule.wanted.removeprefix("it must be ").removeprefix("a ").replace("number", "numbers")
+    return Rule(read, f"it must be {several} {'of ' if even else ''}{each}")
+
+
+def _table_of(kind: type) -> Rule:
+    def read(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return read_table(kind, "", value)
+        return _tested(isinstance(value, kind), value)
+
+    return Rule(read, f"it must be a table of the fields of {kind.__name__}")
