@@ -22,7 +22,7 @@ from typing import Any
 import rtradar as rt
 from rtradar.campaign.spec_file import read_spec
 from rtradar.classify.recipes import RECIPES
-from rtradar.cli import _parser
+from rtradar.cli.parser import parser as whole_parser
 from rtradar.errors import InputError
 from rtradar.scene import MATERIALS
 from rtradar.scene.scene import KEYS
@@ -119,7 +119,7 @@ def command_lines(text: str) -> Iterator[list[str]]:
 @cache
 def parsers() -> dict[tuple[str, ...], argparse.ArgumentParser]:
     """Parser of each command by its words, with its options filled in."""
-    found: dict[tuple[str, ...], argparse.ArgumentParser] = {(): _parser()}
+    found: dict[tuple[str, ...], argparse.ArgumentParser] = {(): whole_parser()}
     waiting = [()]
     while waiting:
         words: tuple[str, ...] = waiting.pop()

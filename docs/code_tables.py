@@ -7,7 +7,7 @@ import inspect
 import re
 import runpy
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,6 @@ from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
 from rtradar.campaign.spec import DRAWN, RUN_KEYS
 from rtradar.campaign.spec_file import EACH, RUN_LIMITS
 from rtradar.clouds.arrays import TABLES as ARRAY_TABLES
-from rtradar.conventions import PERSON_LIMITS
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.receiver import Interferer, Receiver
@@ -37,10 +36,10 @@ from rtradar.scene import (
     own_material,
     room_walls,
 )
-from rtradar.scene.materials import OWN_LIMITS
-from rtradar.scene.objects import FURNITURE_LIMITS, ROOM_LIMITS, SURFACE_LIMITS
+from rtradar.scene.materials import PowerLaw
 from rtradar.scene.scene import KEYS
 from rtradar.settings import RunSettings
+from rtradar.system.fields import Limits, annotations_of, found_in
 
 SCENES = Path(__file__).parents[1] / "scenes"
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -60,19 +59,19 @@ PAPER = {
 """Limits of a radar: name, value in the paper's Table 2, and format."""
 
 
-SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[float, float]]]] = {
-    "top": (Scene, "", {}),
-    "[radar]": (Scene, "radar_", {}),
-    "[person]": (Scene, "person_", PERSON_LIMITS),
-    "[room]": (room_walls, "", ROOM_LIMITS),
-    "a side of a room": (Surface, "", SURFACE_LIMITS),
-    "[[walls]]": (Wall, "", SURFACE_LIMITS),
-    "[[furniture]]": (Furniture, "", FURNITURE_LIMITS),
-    "[[objects]]": (Object, "", FURNITURE_LIMITS),
-    "[[people]]": (Person, "", PERSON_LIMITS),
-    "[materials.NAME]": (own_material, "", OWN_LIMITS),
+SCENE_TABLES: dict[str, tuple[Callable[..., object], str]] = {
+    "top": (Scene, ""),
+    "[radar]": (Scene, "radar_"),
+    "[person]": (Scene, "person_"),
+    "[room]": (room_walls, ""),
+    "a side of a room": (Surface, ""),
+    "[[walls]]": (Wall, ""),
+    "[[furniture]]": (Furniture, ""),
+    "[[objects]]": (Object, ""),
+    "[[people]]": (Person, ""),
+    "[materials.NAME]": (own_material, ""),
 }
-"""What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
+"""What makes a table of a scene file: the code, and a prefix of its parameters."""
 
 READ_AS = {
     "up": "axis of the recording that is up: `x`, `y`, `z`, `-x`, `-y` or `-z`; found if left out",
@@ -256,7 +255,8 @@ def toml(value: object) -> str:
 def scene_keys() -> str:
     """Keys of all tables of a scene file, with their ranges and defaults."""
     rows = []
-    for table, (thing, prefix, limits) in SCENE_TABLES.items():
+    for table, (thing, prefix) in SCENE_TABLES.items():
+        limits = annotations_of(PowerLaw if thing is own_material else thing)
         parameters = inspect.signature(thing).parameters
         texts = {
             name: meaning
@@ -271,8 +271,9 @@ def scene_keys() -> str:
             name = prefix + key if prefix + key in parameters else key
             default = parameters[name].default if name in parameters else None
             usual = "must be given" if key in needed and name in parameters else toml(default)
-            least, most = (toml(limit).strip("`") for limit in limits.get(key, (0, 0)))
-            allowed = f"{least} to {most}" if key in limits else ""
+            own = found_in(limits.get(name), Limits) or Limits()
+            least, most = (toml(limit).strip("`") for limit in (own.least, own.most))
+            allowed = f"{least} to {most}" if own.most < Limits().most else ""
             rows.append([f"`{table}`", f"`{key}`", texts[name], allowed, usual])
     return pipe_table(["table", "key", "meaning", "allowed", "default"], rows)
 

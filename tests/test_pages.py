@@ -13,12 +13,10 @@ from typing import get_args, get_type_hints
 import pytest
 
 import rtradar as rt
-from rtradar.antenna import _PATTERNS
 from rtradar.classify.recipes import RECIPES
 from rtradar.classify.splits import SCHEMES
-from rtradar.cli import _parser
-from rtradar.cli.captures import _FLAGS
-from rtradar.cli.listing import _KINDS as LISTED
+from rtradar.cli.listing import KINDS as LISTED
+from rtradar.cli.parser import parser
 from rtradar.clouds.arrays import KINDS
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import models_that
@@ -69,7 +67,7 @@ def test_costs_and_errors_of_the_readme_are_those_of_the_page_of_levels(level: l
 def test_defaults_of_the_page_for_beginners_are_those_of_the_settings() -> None:
     compared = 0
     for options, _, shown in rows("docs/start.md", "| option | meaning | default"):
-        for name, (flag, _) in _FLAGS.items():
+        for name, flag in flags().items():
             default, text = getattr(RunSettings(), name), shown.strip("`")
             if not re.search(rf"`{flag}[ `]", options) or name in ("start_s", "duration_s"):
                 continue
@@ -88,7 +86,7 @@ def test_defaults_of_the_page_for_beginners_are_those_of_the_settings() -> None:
 
 def options_of_run() -> ArgumentParser:
     """Parser of ``rtradar run``, with its options."""
-    (commands,) = (action for action in _parser()._actions if action.dest == "==SUPPRESS==")
+    (commands,) = (action for action in parser()._actions if action.dest == "==SUPPRESS==")
     run: ArgumentParser = commands.choices["run"]  # type: ignore[index]
     run.format_help()
     return run
@@ -109,6 +107,17 @@ def limit_names() -> set[str]:
     return {name for names in found for name in names if name} | {*ast.literal_eval(concerned[1])}
 
 
+def flags() -> dict[str, str]:
+    """Option of each setting of a run."""
+    settings = RunSettings.__dataclass_fields__
+    actions = options_of_run()._option_string_actions.items()
+    return {
+        action.dest: flag
+        for flag, action in actions
+        if action.dest in settings and not flag.startswith("--no-")
+    }
+
+
 def choices(option: str) -> tuple[str, ...]:
     return tuple(options_of_run()._option_string_actions[option].choices or ())
 
@@ -117,7 +126,7 @@ TABLES: dict[tuple[str, str], Callable[[], Iterable[str]]] = {
     ("README.md", "| level | what it"): lambda: MODELS.built_in,
     ("docs/choosing-a-level.md", "| level | 12 GHz: complex error"): lambda: MODELS.built_in,
     ("docs/limits.md", "| name in `limits`"): limit_names,
-    ("docs/radar.md", "| `pattern` |"): lambda: _PATTERNS,
+    ("docs/radar.md", "| `pattern` |"): lambda: get_args(get_type_hints(rt.Antenna)["pattern"]),
     ("docs/radar.md", "| `multiplexing` |"): lambda: MULTIPLEXING,
     ("docs/scenes.md", "| kind | keys"): lambda: MOTIONS,
     ("docs/scenes.md", "| name | what is taken out"): lambda: choices("--clutter-removal"),

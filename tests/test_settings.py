@@ -24,7 +24,7 @@ def test_the_options_of_run_are_the_fields_of_its_settings() -> None:
         ({"snr_db": -math.inf}, "snr_db = -inf"),
         ({"snr_db": "physical", "spreading": False}, "needs the loss with distance"),
         ({"noise_power_m2": math.inf}, "noise_power_m2 = inf"),
-        ({"breathing": (3, 0.25)}, "breathing = .*give rt.Breathing"),
+        ({"breathing": (3, 0.25)}, "breathing = .*fields of Breathing"),
         ({"pfa": 0.0}, "pfa = 0"),
         ({"pfa": "1e-3"}, "pfa = '1e-3'; a false-alarm rate is a number"),
         ({"snr_db": [3]}, r"snr_db = \[3\]"),

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.cli import _parser, main
+from rtradar.cli import main
+from rtradar.cli.parser import parser
 from rtradar.system.registries import MODELS, scene_files
 
 LESS = {  # levels that take minutes for a second, with few rays and facets
@@ -156,7 +157,7 @@ def test_every_other_command(
 def test_no_command_is_left_out() -> None:
     (commands,) = (
         action.choices
-        for action in _parser()._actions
+        for action in parser()._actions
         if isinstance(action, argparse._SubParsersAction)
     )
     assert set(commands) == HERE | {words[0] for words in ON_A_RUN.values()}

@@ -267,14 +267,14 @@ def _drawn_others(others: Others, seed: int, place: tuple[float, float]) -> list
     random = np.random.default_rng(stream(seed, _OTHERS_STREAM))
     low, high = np.transpose([others.x_m, others.y_m])
     places, found = [np.asarray(place)], []
-    for _ in range(others.people):
+    for _ in range(others.count):
         for _ in range(_TRIES):
             drawn = np.round(low + (high - low) * random.random(2), 4)
             if min(float(np.linalg.norm(drawn - other)) for other in places) >= APART_M:
                 break
         else:
             raise InputError(
-                f"[others] count = {others.people}: x_m and y_m hold no place {APART_M:g} m from "
+                f"[others] count = {others.count}: x_m and y_m hold no place {APART_M:g} m from "
                 "everyone; widen them"
             )
         places.append(drawn)

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from rtradar.campaign.augmentation import Augmented
 from rtradar.campaign.intervals import Intervals
 from rtradar.campaign.kept import sizes
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
-from rtradar.process import CLUTTER_REMOVALS, DETECTORS, measured_angles
+from rtradar.process import measured_angles
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
+from rtradar.system.fields import Limits, check_fields, within
+from rtradar.system.registries import ACTIVITY_NAMES
 
 DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "heading_deg": ((0.0, 0.0), -360.0, 360.0),
@@ -31,15 +34,10 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 MOST_SAMPLES = 1_000_000
 """Largest number of samples of a data set, all of whose plans are in memory."""
 
-NAMED = {
-    "clutter_removal": CLUTTER_REMOVALS,
-    "detector": DETECTORS,
-    "body_material": BODY_MATERIALS,
-}
-WINDOWS = ("range_window", "doppler_window")
-SWITCHES = ("keep_all", "spreading")
-SPECTROGRAM = ("spectrogram_window_s", "spectrogram_overlap")
-RUN_KEYS = ("pfa", *NAMED, *WINDOWS, *SPECTROGRAM, "order", *SWITCHES)
+RUN_KEYS = (
+    "pfa", "clutter_removal", "detector", "body_material", "range_window", "doppler_window",
+    "spectrogram_window_s", "spectrogram_overlap", "order", "keep_all", "spreading",
+)  # fmt: skip
 """Settings of a run that a file may give for all samples."""
 
 
@@ -77,27 +75,33 @@ class Combination(NamedTuple):
     snr_db: float | None
 
 
-class Others(NamedTuple):
+MOST_OTHERS, APART_M = 8, 1.0
+"""Most people beside the one of the label, and the least distance of their places [m]."""
+
+_Place = Annotated[tuple[float, float], within(*PERSON_LIMITS["position_m"])]
+
+
+@dataclass(frozen=True)
+class Others:
     """People beside the one of the label: how many, what they do, and where, from least to most.
 
     Synthetic actors whose mean places are at least `APART_M` from each other and from that one.
     """
 
-    people: int
-    labels: tuple[str, ...]
-    x_m: tuple[float, float]
-    y_m: tuple[float, float]
+    count: Annotated[int, Limits(1, MOST_OTHERS)]
+    labels: Annotated[
+        tuple[str, ...],
+        Limits(
+            allowed=ACTIVITY_NAMES,
+            wanted=f"it must be a list of: {', '.join(ACTIVITY_NAMES)}",
+            counts=(1, 2**31),
+        ),
+    ] = ("walk", "stand")
+    x_m: _Place = (-1.0, 1.0)
+    y_m: _Place = (-1.5, 1.5)
 
-
-OTHERS: Mapping[str, list[Any]] = {
-    "labels": ["walk", "stand"],
-    "x_m": [-1.0, 1.0],
-    "y_m": [-1.5, 1.5],
-}
-"""Keys of ``[others]`` beside ``count``, with their defaults."""
-
-MOST_OTHERS, APART_M = 8, 1.0
-"""Most people beside the one of the label, and the least distance of their places [m]."""
+    def __post_init__(self) -> None:
+        check_fields(self, "[others] ")
 
 
 class Spec(NamedTuple):

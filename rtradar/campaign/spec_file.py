@@ -10,9 +10,10 @@ import itertools
 import math
 import os
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from rtradar.campaign.augmentation import VARIED, Augmented
 from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
@@ -20,12 +21,7 @@ from rtradar.campaign.kept import KEPT
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (
     DRAWN,
-    MOST_OTHERS,
-    NAMED,
-    OTHERS,
     RUN_KEYS,
-    SWITCHES,
-    WINDOWS,
     Actor,
     Combination,
     Others,
@@ -35,11 +31,10 @@ from rtradar.campaign.spec import (
     check_samples,
 )
 from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
-from rtradar.conventions import PERSON_LIMITS
-from rtradar.description import MOST_FILES, check_files, versions
+from rtradar.description import MOST_FILES, check_files, path_from, versions
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES
-from rtradar.process import WindowFunctions
+from rtradar.process import DETECTORS, WindowFunctions
 from rtradar.radar import Radar
 from rtradar.recordings import SAID, said_of
 from rtradar.scatter import MODELS
@@ -50,10 +45,6 @@ from rtradar.system.checks import (
     Table,
     brief,
     check_keys,
-    check_number,
-    check_order,
-    check_text,
-    check_vector,
     inside,
     is_whole,
     read_toml,
@@ -61,8 +52,8 @@ from rtradar.system.checks import (
     tables_at,
     wrong_keys,
 )
+from rtradar.system.fields import Limits, annotations_of, read_range, read_table, read_value
 from rtradar.system.files import digest_of
-from rtradar.system.seeds import check_seed
 
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
 """Limits of settings of a run, narrower than those of the settings themselves."""
@@ -78,13 +69,12 @@ EACH: Mapping[str, list[Any]] = {
 }
 """Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
-_YES_OR_NO = {"skip_short": False, "random_rooms": False, "clouds": True}
+_YES_OR_NO = {"angles": True, "skip_short": False, "random_rooms": False, "clouds": True}
 _TOP = (
     "seed",
     *RUN_KEYS,
     "keep",
     *_YES_OR_NO,
-    "angles",
     "folder",
     "windows",
     "each",
@@ -94,12 +84,16 @@ _TOP = (
     "synthetic",
     "recordings",
 )
+_COUNT, _MANY = Annotated[int, Limits(0, 1_000_000)], Annotated[int, Limits(1, 1_000_000)]
+_PFA = Annotated[float, Limits(*RUN_LIMITS["pfa"])]
+_KEPT = Annotated[
+    tuple[str, ...], Limits(allowed=tuple(KEPT), wanted=f"it must be a list of: {', '.join(KEPT)}")
+]
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = (
     ("file",),
     ("label", "subject", "licence", "skeleton", *SAID, *INTERVAL_KEYS),
 )
-_MOST = 1_000_000
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
@@ -125,7 +119,8 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     try:
         # The path is absolute, because other processes read the meshes of scenes.
         beside = path.resolve().parent
-        folder = (beside / check_text("data set", "root", given.get("root", "."))).resolve()
+        root = read_value(str, "data set: ", "root", given.get("root", "."))
+        folder = (beside / root).resolve()
         spec = _spec(table, folder)
         if "root" in given:
             # Only files of which the digest was known may be anywhere.
@@ -163,14 +158,16 @@ def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
     folder = (spec_path.resolve().parent / given.get("root", ".")).resolve()
     files = sorted(_files(spec, table, folder))
-    listed = [{"path": _from(file, out), "sha256": digest_of(file)} for file in files]
+    listed = [
+        {"path": path_from(out.resolve(), str(file)), "sha256": digest_of(file)} for file in files
+    ]
     table |= {"shard": list(spec.shard)} if spec.shard[1] > 1 else {}
-    table |= {"root": _from(folder, out), "files": listed[:MOST_FILES], "versions": versions()}
+    table |= {
+        "root": path_from(out.resolve(), str(folder)),
+        "files": listed[:MOST_FILES],
+        "versions": versions(),
+    }
     write_durably(path, (head + tomli_w.dumps(table)).encode())
-
-
-def _from(path: Path, out: Path) -> str:
-    return Path(os.path.relpath(path, out.resolve())).as_posix()
 
 
 def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
@@ -191,13 +188,16 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
 
 def _spec(table: Table, folder: Path) -> Spec:
     wrong = Complaints()
-    wrong.lines += wrong_keys("", table, (), _TOP)
     drawn_table, each, windows = (
         wrong.of(table_at, key, table) or {} for key in ("drawn", "each", "windows")
     )
-    wrong.lines += wrong_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
-    wrong.lines += wrong_keys("[each] ", each, (), tuple(EACH))
-    wrong.lines += wrong_keys("[windows] ", windows, (), INTERVAL_KEYS)
+    for where, own, keys in (
+        ("", table, _TOP),
+        ("[drawn] ", drawn_table, tuple(DRAWN)),
+        ("[each] ", each, tuple(EACH)),
+        ("[windows] ", windows, INTERVAL_KEYS),
+    ):
+        wrong.lines += wrong_keys(where, own, (), keys)
     wrong.lines += [
         f"{key} is under [each] and under [drawn]; give it once"
         for key in drawn_table
@@ -214,30 +214,31 @@ def _spec(table: Table, folder: Path) -> Spec:
         )
     lists = _lists(each, folder, wrong)
     drawn = {
-        key: wrong.of(_range, key, drawn_table.get(key, usual), least, most) or (0.0, 0.0)
+        key: wrong.of(read_range, "[drawn] ", key, drawn_table.get(key, usual), least, most)
+        or (0.0, 0.0)
         for key, (usual, least, most) in DRAWN.items()
     }
-    wrong.lines += [
-        f"{key} = {brief(table[key])}; allowed: true, false"
-        for key in _YES_OR_NO
-        if not isinstance(table.get(key, False), bool)
-    ]
+    switches = {
+        key: bool(wrong.of(read_value, bool, "", key, table.get(key, usual)))
+        for key, usual in _YES_OR_NO.items()
+    }
+    kinds = wrong.of(read_value, _KEPT, "", "keep", table.get("keep", [])) or ()
+    keep = tuple(kind for kind in KEPT if kind in kinds)
     if table.get("clouds") is False and not table.get("keep"):
         wrong.lines.append("clouds = false, and keep is empty; nothing would be left")
+    if table.get("angles") is False and "range_azimuth" in keep:
+        wrong.lines.append("angles = false, and keep has range_azimuth; leave one of them out")
     if table.get("random_rooms") and each.keys() & {"scene", "radar_position_m"}:
         wrong.lines.append(
             "random_rooms = true draws rooms and where the radar stands; leave scene and "
             "radar_position_m under [each] out"
         )
-    keep = wrong.of(_keep, table) or ()
-    angles = wrong.of(_angles, table, keep)
     run = wrong.of(_run_settings, table)
     others = wrong.of(_others, table)
     augmented = wrong.of(_augmented, table)
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
-    assert angles is not None
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.most(intervals.needed_s)
     copies = 1 + (augmented.copies if augmented else 0)
@@ -258,49 +259,15 @@ def _spec(table: Table, folder: Path) -> Spec:
         keep,
         others,
         augmented,
-        angles,
-        *(table.get(key, usual) for key, usual in _YES_OR_NO.items()),
+        **switches,
     )
-
-
-def _keep(table: Table) -> tuple[str, ...]:
-    """Return the kinds of arrays to keep, in the order of `KEPT`."""
-    kinds = _names("keep", table.get("keep", []), KEPT)
-    return tuple(kind for kind in KEPT if kind in kinds)
-
-
-def _angles(table: Table, keep: Collection[str]) -> bool:
-    """Return whether angles are computed, for spatial clouds and for what is kept."""
-    angles = table.get("angles", True)
-    if not isinstance(angles, bool):
-        raise InputError(f"angles = {brief(angles)}; allowed: true, false")
-    if not angles and "range_azimuth" in keep:
-        raise InputError("angles = false, and keep has range_azimuth; leave one of them out")
-    return angles
-
-
-def _names(key: str, value: object, allowed: Collection[str]) -> list[str]:
-    """Return a list of allowed names as it is."""
-    if isinstance(value, list) and all(isinstance(one, str) and one in allowed for one in value):
-        return value
-    raise InputError(f"{key} = {brief(value)}; it must be a list of: {', '.join(allowed)}")
 
 
 def _others(table: Table) -> Others | None:
     """Return who is there beside the person of the label, if there is a table ``[others]``."""
     if "others" not in table:
         return None
-    given = table_at("others", table)
-    check_keys("[others] ", given, ("count",), tuple(OTHERS))
-    count = _whole("[others] ", "count", given["count"], 1, MOST_OTHERS)
-    labels = _names("[others] labels", given.get("labels", OTHERS["labels"]), ACTIVITIES)
-    if not labels:
-        raise InputError("[others] labels = []; give at least one")
-    low, high = PERSON_LIMITS["position_m"]
-    x_m, y_m = (
-        _range(key, given.get(key, OTHERS[key]), low, high, "[others]") for key in ("x_m", "y_m")
-    )
-    return Others(count, tuple(labels), x_m, y_m)
+    return read_table(Others, "[others] ", table_at("others", table))
 
 
 def _augmented(table: Table) -> Augmented | None:
@@ -309,49 +276,36 @@ def _augmented(table: Table) -> Augmented | None:
         return None
     given = table_at("augmented", table)
     check_keys("[augmented] ", given, ("copies",), tuple(VARIED))
-    copies = _whole("[augmented] ", "copies", given["copies"], 1, 1000)
+    copies = read_value(Annotated[int, Limits(1, 1000)], "[augmented] ", "copies", given["copies"])
     ranges = {
-        key: _range(key, given.get(key, usual), least, most, "[augmented]")
+        key: read_range("[augmented] ", key, given.get(key, usual), least, most)
         for key, (usual, least, most) in VARIED.items()
     }
     return Augmented(copies, ranges)
 
 
 def _run_settings(table: Table) -> RunSettings:
-    wrong, given = Complaints(), {key: table[key] for key in RUN_KEYS if key in table}
-    for key, allowed in NAMED.items():
-        value = given.get(key)
-        if key in given and not (isinstance(value, str) and value in allowed):
-            wrong.lines.append(f"{key} = {brief(value)}; allowed: {', '.join(allowed)}")
-    for key in SWITCHES:
-        if not isinstance(given.get(key, True), bool):
-            wrong.lines.append(f"{key} = {brief(given[key])}; allowed: true, false")
-    for key in WINDOWS:
-        value = given.get(key, "")
-        if not isinstance(value[0] if isinstance(value, list) and value else value, str):
-            wrong.lines.append(
-                f"{key} = {brief(value)}; it must be a name, or a list of a name and a number"
-            )
-            del given[key]
-    if "pfa" in given:
-        given["pfa"] = wrong.of(check_number, "data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
-    if "order" in given:
-        wrong.of(check_order, given["order"])
-    seed = wrong.of(check_seed, "", table.get("seed", 0))
-    named = {
-        axis: given[f"{axis}_window"] for axis in ("range", "doppler") if f"{axis}_window" in given
-    }
-    windows = wrong.of(lambda: WindowFunctions(**named))
+    wrong, hints = Complaints(), annotations_of(RunSettings)
+    given = {}
+    for key in ("seed", *RUN_KEYS):
+        if key in table:
+            hint = _PFA if key == "pfa" else hints[key]
+            given[key] = wrong.of(read_value, hint, "", key, table[key])
+    if isinstance(detector := given.get("detector"), str):
+        wrong.of(DETECTORS.check, detector)
+    named = {axis: given.get(f"{axis}_window") for axis in ("range", "doppler")}
+    windows = wrong.of(
+        lambda: WindowFunctions(**{axis: own for axis, own in named.items() if own is not None})
+    )
     wrong.check()
     assert windows is not None  # for else there are complaints
-    assert seed is not None
-    run = RunSettings(seed=seed, **given)
+    run = RunSettings(**given)
     return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
 
 
 def _folder(table: Table, beside: Path) -> Path:
     """Folder of the recordings, below the file's own or below that of an environment variable."""
-    named = check_text("data set", "folder", table.get("folder", "."))
+    named = read_value(str, "data set: ", "folder", table.get("folder", "."))
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
@@ -374,21 +328,19 @@ def _folder(table: Table, beside: Path) -> Path:
 
 def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]:
     """Return the values under ``[each]``, checked; radars and scenes are loaded."""
-
-    def number(key: str) -> Callable[[object], float]:
-        return lambda value: check_number("[each]", key, value, *DRAWN[key][1:])
-
-    def place(key: str, size: int) -> Callable[[object], tuple[float, ...]]:
-        return lambda value: check_vector("[each]", key, value, size, 100.0)
-
     readers: dict[str, Callable[[Any], Any]] = {
         "radar": lambda value: _loaded("radar", value, folder, Radar.load),
         "scene": lambda value: _loaded("scene", value, folder, Scene.load),
         "fidelity": _fidelity,
-        "heading_deg": number("heading_deg"),
-        "snr_db": number("snr_db"),
-        "person_position_m": place("person_position_m", 2),
-        "radar_position_m": place("radar_position_m", 3),
+        **{
+            key: partial(read_value, hint, "[each] ", key)
+            for key, hint in {
+                "heading_deg": Annotated[float, Limits(*DRAWN["heading_deg"][1:])],
+                "snr_db": Annotated[float, Limits(*DRAWN["snr_db"][1:])],
+                "person_position_m": Annotated[tuple[float, float], Limits(-100, 100)],
+                "radar_position_m": Annotated[tuple[float, float, float], Limits(-100, 100)],
+            }.items()
+        },
     }
     lists = {key: wrong.of(_several, each, key, usual) or [] for key, usual in EACH.items()}
     # A default of None stays: it is no value of the file.
@@ -402,12 +354,11 @@ def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]
 
 
 def _fidelity(value: object) -> str:
-    model = check_text("[each]", "fidelity", value)
-    MODELS.refuse_gone(model)
-    if model not in MODELS:
-        raise InputError(
-            f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"
-        )
+    model: str = read_value(str, "[each] ", "fidelity", value)
+    try:
+        MODELS.check(model)
+    except InputError as error:
+        raise InputError(f"[each] {error}") from None
     return model
 
 
@@ -451,7 +402,7 @@ def _comparable(value: object) -> object:
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
-    source = check_text("[each]", key, table.get("base", table.get("board")))
+    source = read_value(str, "[each] ", key, table.get("base", table.get("board")))
     if source.endswith((".toml", ".cfg")):
         if inside(folder, source) is None:
             raise InputError(
@@ -481,7 +432,7 @@ def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
 
 def _actor(where: str, table: Table) -> Actor:
     wrong = Complaints()
-    label = wrong.of(check_text, where.strip(), "label", table["label"])
+    label = wrong.of(read_value, str, where, "label", table["label"])
     if label is not None and label not in ACTIVITIES:
         wrong.lines.append(
             f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
@@ -499,17 +450,14 @@ def _actor(where: str, table: Table) -> Actor:
 def _numbers(where: str, key: str, table: Table) -> Sequence[int]:
     """Return a list of whole numbers as it is, or for a count all numbers below it."""
     value = table[key]
-    if isinstance(value, list) and value and len(set(map(str, value))) == len(value):
-        return tuple(_whole(where, key, number) for number in value)
-    if isinstance(value, list):
+    if not isinstance(value, list):
+        return range(read_value(_MANY, where, key, value))
+    if not value or len(set(map(str, value))) < len(value):
         raise InputError(
             f"{where}{key} = {brief(value)}; "
             "it must be a list of different whole numbers, not empty"
         )
-    count = _whole(where, key, value)
-    if count == 0:
-        raise InputError(f"{where}{key} = 0; it must be at least 1")
-    return range(count)
+    return tuple(read_value(_COUNT, where, key, number) for number in value)
 
 
 def _recordings(
@@ -528,7 +476,7 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Re
     """Return the recordings of one table: those of its pattern, or the one that it names."""
     wrong, place = Complaints(), where.strip()
     texts = {
-        key: wrong.of(check_text, place, key, table[key]) or ""
+        key: wrong.of(read_value, str, where, key, table[key]) or ""
         for key in ("file", "label", "subject", "licence", "skeleton")
         if key in table
     }
@@ -550,27 +498,8 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Re
             skeleton = wrong.of(file_in, where, "skeleton", named, folder)
         about = {key: values[key] for key in ("label", "subject", "licence")}
         for key in fields:
-            wrong.of(check_text, place, key, fields[key])
+            wrong.of(read_value, str, where, key, fields[key])
         path = folder / name
         found.append(Recorded(name, path, skeleton, intervals=intervals, said=said, **about))
     wrong.check()
     return found
-
-
-def _range(
-    key: str, value: object, least: float, most: float, where: str = "[drawn]"
-) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise InputError(f"{where} {key} = {brief(value)}; it must be a range: [least, most]")
-    low, high = (check_number(where, key, end, least, most) for end in value)
-    if low > high:
-        raise InputError(f"{where} {key} = {brief(value)}; the least must come first")
-    return low, high
-
-
-def _whole(where: str, key: str, value: object, least: int = 0, most: int = _MOST) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise InputError(
-            f"{where}{key} = {brief(value)}; it must be a whole number from {least} to {most}"
-        )
-    return value

@@ -1,6 +1,7 @@
 """The command line: ``rtradar run``, ``validate`` and all that ``rtradar --help`` lists.
 
-Each module here adds commands to the parser; the packages that do the work are imported on use.
+The table ``commands.toml`` has all commands with their options; the function that does what one
+says, and the packages that do the work, are imported on use.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that tells what is wrong,
 where, what is allowed and how to mend it. 130: stopped by Ctrl-C.
@@ -15,9 +16,9 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
-from typing import TextIO
+from typing import Any, TextIO
 
 from rtradar.errors import BackendError, CampaignError, ExtensionError, InputError
 
@@ -67,6 +68,7 @@ def _flushed(status: int) -> int:
 def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     # After the first moments, in which a signal would still show a traceback.
     from rtradar.cli.ending import INTERRUPTED
+    from rtradar.cli.parser import parser
     from rtradar.cli.values import fail
     from rtradar.system.files import DISK_ERRORS
 
@@ -74,7 +76,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     # Without a folder of its own it makes a temporary one, and would log two lines each time.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
-        _parser().parse_args(arguments, options)
+        parser().parse_args(arguments, options)
     except SystemExit as stop:
         return int(stop.code or 0)
     try:
@@ -97,15 +99,21 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
 
 
 def _done(options: argparse.Namespace) -> int:
+    """Do what the command says: it gives its exit status, or what ``--json`` writes."""
     from rtradar.cli.ending import stay_if_ending
+    from rtradar.system.files import check_place, write_json
 
     try:
         with _only_errors() if getattr(options, "quiet", False) else nullcontext():
-            status: int = options.command(options)
+            place = getattr(options, "json", None)
+            check_place(place)
+            found: int | Mapping[str, Any] | None = options.command(options)
+            if place is not None and isinstance(found, Mapping):
+                write_json(place, found)
     except BaseException:
         stay_if_ending()  # it may have failed because its files are being removed
         raise
-    return status
+    return found if isinstance(found, int) else 0
 
 
 @contextmanager
@@ -133,36 +141,3 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     print(f"rtradar: warning: {message}", file=file or sys.stderr)
-
-
-def _parser() -> argparse.ArgumentParser:
-    from rtradar import __version__
-    from rtradar.cli import (
-        captures,
-        checks,
-        inspecting,
-        learning,
-        listing,
-        paper,
-        results,
-        samples,
-    )
-    from rtradar.cli.values import OneLineParser
-
-    parser = OneLineParser(
-        prog="rtradar",
-        description="From motion capture to what a 4D MIMO FMCW radar would receive, "
-        "and to point clouds.",
-        examples=(
-            "rtradar run synthetic:walk --out out/walk       # then open out/walk/report.html",
-            "rtradar run walk.bvh --scene living-room --out out/room",
-            "rtradar view out/walk                           # the run over time, in the browser",
-            "rtradar compare synthetic:kick --out out/kick   # several models beside each other",
-            "rtradar COMMAND --help                          # options of a command, with examples",
-        ),
-    )
-    parser.add_argument("--version", action="version", version=f"rtradar {__version__}")
-    commands = parser.commands()
-    for module in (captures, samples, inspecting, listing, results, learning, checks, paper):
-        module.add(commands)
-    return parser

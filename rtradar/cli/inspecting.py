@@ -5,57 +5,25 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rtradar.cli.values import add_command, add_files, add_radar, add_reading, path
 from rtradar.system.checks import read_toml
-from rtradar.system.files import check_place, write_json
 from rtradar.system.registries import READERS
-
-if TYPE_CHECKING:
-    from rtradar.cli.values import OneLineParser, Subcommands
 
 _OF_RADARS = ("range_bin_m", "max_range_m", "velocity_bin_mps", "max_velocity_mps", "n_tx", "n_rx")
 
 
-def add(commands: Subcommands) -> None:
-    """Add the command."""
-    add_command(
-        commands,
-        "inspect",
-        "say what a recording, a radar, a scene or IF samples mean: unit, axis, rate, sizes",
-        _add_inspect,
-        (
-            "rtradar inspect walk.bvh",
-            "rtradar inspect walk.amc --skeleton walk.asf --json walk.json",
-            "rtradar inspect profile.cfg",
-        ),
-    )
-
-
-def _add_inspect(command: OneLineParser) -> None:
-    command.option(
-        "file", "FILE", "a recording, a radar (TOML or .cfg), a scene (TOML) or IF samples"
-    )
-    command.option("--skeleton", "ASF", "the .asf file that an .amc recording needs", type=path)
-    add_reading(command)
-    add_radar(command, "the radar that received IF samples")
-    add_files(command, json="write what was found there as JSON")
-    command.set_defaults(command=_inspect)
-
-
-def _inspect(options: argparse.Namespace) -> int:
-    check_place(options.json)
+def inspect(options: argparse.Namespace) -> Mapping[str, Any]:
+    """Do ``rtradar inspect``."""
     file = Path(options.file)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         kind, found, text = _look(file, options)
     said = [str(warning.message) for warning in caught]
     print("\n".join([text, *(f"warning: {line}" for line in said)]))
-    if options.json is not None:
-        write_json(options.json, {"file": str(file), "kind": kind, **found, "warnings": said})
-    return 0
+    return {"file": str(file), "kind": kind, **found, "warnings": said}
 
 
 def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:

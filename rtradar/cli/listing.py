@@ -6,56 +6,28 @@ import argparse
 import inspect
 import shutil
 import textwrap
-from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import add_command, add_files
 from rtradar.errors import ExtensionError
-from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
-    from rtradar.cli.values import OneLineParser, Subcommands
     from rtradar.system.registry import Registry
 
 Described = Iterator[tuple[str, str]]
 """Names, each with its description."""
 
 
-def add(commands: Subcommands) -> None:
-    """Add the command."""
-    add_command(
-        commands,
-        "list",
-        "list the scenes, radars, materials, fidelity levels, detectors or activities by name",
-        _add_list,
-        ("rtradar list scenes", "rtradar list fidelities --json levels.json"),
-    )
-
-
-def _add_list(command: OneLineParser) -> None:
-    lists = command.commands("KIND")
-    for kind, (text, _) in _KINDS.items():
-        add_command(lists, kind, text, _add_kind, (f"rtradar list {kind}",))
-        lists.choices[kind].set_defaults(kind=kind)
-
-
-def _add_kind(kind: OneLineParser) -> None:
-    add_files(kind, json="write names and descriptions there as JSON")
-    kind.set_defaults(command=_list)
-
-
-def _list(options: argparse.Namespace) -> int:
-    check_place(options.json)
-    found = dict(_KINDS[options.kind][1]())
-    if options.json is not None:
-        rows = [{"name": name, "description": text} for name, text in found.items()]
-        write_json(options.json, {options.kind: rows})
+def show(options: argparse.Namespace) -> Mapping[str, Any]:
+    """Do ``rtradar list``."""
+    found = dict(KINDS[options.kind]())
     width = max(map(len, found)) + 2
     columns = max(shutil.get_terminal_size().columns, width + 40)
     for name, text in found.items():
         lines = textwrap.wrap(text, columns - width, break_on_hyphens=False) or [""]
         print(name.ljust(width) + f"\n{' ' * width}".join(lines))
-    return 0
+    rows = [{"name": name, "description": text} for name, text in found.items()]
+    return {options.kind: rows}
 
 
 def _scenes() -> Described:
@@ -122,12 +94,12 @@ def _documented(registry: Registry) -> Described:
         yield name, " ".join(first.split()).removeprefix(f"`{name}`: ").replace("`", "")
 
 
-_KINDS: dict[str, tuple[str, Callable[[], Described]]] = {
-    "scenes": ("list the scenes that come with rtradar, for --scene", _scenes),
-    "radars": ("list the radars that have a name, for --radar", _radars),
-    "materials": ("list the materials of walls, furniture and bodies", _materials),
-    "fidelities": ("list the echo models, cheapest first, for --fidelity", _fidelities),
-    "detectors": ("list the detectors, for --detector", _detectors),
-    "activities": ("list what synthetic actors do, for synthetic:NAME", _activities),
+KINDS: Mapping[str, Callable[[], Described]] = {
+    "scenes": _scenes,
+    "radars": _radars,
+    "materials": _materials,
+    "fidelities": _fidelities,
+    "detectors": _detectors,
+    "activities": _activities,
 }
-"""What can be listed: its help text, and the function that gives the names."""
+"""What can be listed, and the function that gives the names."""

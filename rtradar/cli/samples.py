@@ -4,114 +4,16 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.captures import add_amount, add_settings, tell
-from rtradar.cli.values import add_command, add_files, add_radar, path, there, whole
+from rtradar.cli.captures import tell
 from rtradar.errors import InputError
-from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
-    from rtradar.cli.values import OneLineParser, Subcommands
     from rtradar.exchange import Dca1000Layout
     from rtradar.radar import Radar
-
-
-def add(commands: Subcommands) -> None:
-    """Add both commands."""
-    add_command(
-        commands,
-        "process",
-        "make maps, clouds, pictures and a report of IF samples, measured or simulated",
-        _add_process,
-        (
-            "rtradar process adc_data.bin --radar iwr1443 --out out/measured",
-            "rtradar process adc_data.bin --radar profile.cfg --out out/measured",
-            "rtradar process out/walk --detector ca-cfar --out out/again     # run with --save-if",
-        ),
-    )
-    add_command(
-        commands,
-        "export",
-        "write IF samples as a radar board records them, for MATLAB, xarray, NumPy or Zarr, "
-        "and clouds as PLY or PCD",
-        _add_export,
-        (
-            "rtradar export out/walk --out samples.mat       # of a run with --save-if",
-            "rtradar export out/walk --out adc.bin --format dca1000",
-            "rtradar export out/walk/cloud_xyz.npz --out cloud.pcd",
-        ),
-    )
-
-
-def _add_process(process: OneLineParser) -> None:
-    from rtradar.settings import ProcessingOptions
-    from rtradar.system.registries import RADARS
-
-    process.option(
-        "samples",
-        "SAMPLES",
-        "a .bin that a DCA1000 recorded, a .npy, .zarr, .nc or .mat file, or the folder of a run "
-        "with --save-if",
-        type=there,
-    )
-    add_radar(
-        process,
-        f"radar: {', '.join(RADARS)}, a TOML file, or a .cfg file of TI's mmWave SDK, which also "
-        "says the order of a DCA1000's words (default: the one that the samples name)",
-    )
-    _add_layout(process)
-    add_settings(process, ProcessingOptions.__annotations__)
-    add_files(process, out="folder for the results", json="write the summary there too")
-    process.flag("--open", "open the page of the results in the browser")
-    add_amount(process)
-    process.set_defaults(command=_process)
-
-
-def _add_export(export: OneLineParser) -> None:
-    export.option(
-        "source",
-        "SOURCE",
-        "folder that rtradar run --save-if made, or a cloud: .npz, .ply or .pcd",
-        type=there,
-    )
-    export.option(
-        "--out",
-        "FILE",
-        "its suffix gives the format: .mat, .nc, .bin, .npy or .zarr of IF samples; "
-        ".ply, .pcd or .npz of a cloud",
-        type=path,
-        required=True,
-    )
-    export.add_argument(
-        "--format",
-        choices=("int16", "dca1000"),
-        help="what a .bin file holds: an array (chirp, tx, rx, sample, IQ), or what a DCA1000 "
-        "records (default: int16)",
-    )
-    _add_layout(export)
-    add_files(export, json="write there as JSON what was written")
-    export.set_defaults(command=_export)
-
-
-def _add_layout(command: OneLineParser) -> None:
-    """Add the order of the words of a DCA1000."""
-    command.add_argument(
-        "--lanes",
-        type=int,
-        choices=(2, 4),
-        help="LVDS lanes of the chip, for a DCA1000 (default: 4 of xWR12xx, 14xx and 22xx by the "
-        "radar's name, else 2)",
-    )
-    command.flag("--real", "the chip sends real samples, twice as many, to a DCA1000")
-    command.flag("--q-first", "the chip sends Q before I to a DCA1000, as the mmWave SDK sets it")
-    command.option(
-        "--rx-mask",
-        "N",
-        "bits of the Rx that are on, with 4 lanes (default: the first)",
-        type=whole,
-    )
 
 
 def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
@@ -156,8 +58,8 @@ def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca100
     return said.radar, layout
 
 
-def _process(options: argparse.Namespace) -> int:
-    check_place(options.json)
+def process(options: argparse.Namespace) -> Mapping[str, Any]:
+    """Do ``rtradar process``."""
     from rtradar.settings import ProcessingOptions, RunSettings
 
     given = vars(options)
@@ -181,22 +83,20 @@ def _process(options: argparse.Namespace) -> int:
             **settings,
         )
     tell(options, found.summary)
-    return 0
+    return found.summary
 
 
-def _export(options: argparse.Namespace) -> int:
-    check_place(options.json)
+def export(options: argparse.Namespace) -> Mapping[str, Any]:
+    """Do ``rtradar export``."""
     if options.format == "int16" and _layout(options) is not None:
         raise InputError("--format int16 is no file of a DCA1000; leave its options out")
-    from rtradar.exchange import export
+    from rtradar import exchange
 
-    written = export(options.source, options.out, dca1000=_layout(options))
-    if options.json is not None:
-        write_json(options.json, written)
+    written = exchange.export(options.source, options.out, dca1000=_layout(options))
     axes, shape = written["axes"], written["shape"]
     if len(axes) == len(shape):
         size = ", ".join(f"{axis} {length}" for axis, length in zip(axes, shape, strict=True))
     else:
         size = f"{shape[0]} points: {', '.join(axes)}"
     print(f"{size}; {written['type']}; see {options.out}")
-    return 0
+    return written

@@ -14,8 +14,9 @@ from rtradar.recordings import SYNTHETIC
 from rtradar.scene import Scene
 from rtradar.scene.people import people_of
 from rtradar.scene.scene import files_of, rooted
-from rtradar.settings import Breathing, RunSettings
+from rtradar.settings import RunSettings
 from rtradar.system.checks import Table, brief, check_keys, printable, table_at, tables_at
+from rtradar.system.fields import read_table
 from rtradar.system.registries import scene_table
 
 KEYS = ("people", "radar", "scene", "settings", "versions", "files", "missing")
@@ -67,17 +68,11 @@ def parts_of(table: Table, folder: Path) -> Parts:
 def settings_of_table(table: Table, folder: Path = Path()) -> RunSettings:
     """Make the settings of the table ``[settings]``, whose paths start from a folder."""
     given = dict(table)
-    check_keys("[settings] ", given, (), tuple(RunSettings.__dataclass_fields__))
     if "breathing" in given:
-        breath = table_at("breathing", given, "settings.")
-        check_keys("[settings] breathing: ", breath, ("amplitude_mm", "rate_hz"), ("phase_deg",))
-        given["breathing"] = Breathing(**breath)
+        given["breathing"] = table_at("breathing", given, "settings.")
     if isinstance(background := given.get("background"), str):
         given["background"] = str((folder / background).absolute())
-    for key in ("range_window", "doppler_window"):
-        if isinstance(given.get(key), list):
-            given[key] = tuple(given[key])
-    return RunSettings(**given)
+    return read_table(RunSettings, "[settings] ", given)
 
 
 def _radar(table: Table, folder: Path) -> Radar:

@@ -17,7 +17,8 @@ from rtradar.motion.formats.saved import load_saved, save_motion
 from rtradar.motion.synthetic import ACTORS
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene.scene import files_of
-from rtradar.system.checks import Table, brief, check_keys, check_text, read_toml, tables_at
+from rtradar.system.checks import Table, brief, check_keys, read_toml, tables_at
+from rtradar.system.fields import read_value
 from rtradar.system.files import digest_of
 
 _PACKAGES = (
@@ -91,7 +92,7 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
     found = copy.copy(dict(table))
     found["people"] = [dict(entry) for entry in table["people"]]
     # What they were when they were read.
-    digests = {_from(place, entry["path"]): entry["sha256"] for entry in table.get("files", ())}
+    digests = {path_from(place, entry["path"]): entry["sha256"] for entry in table.get("files", ())}
     for number, entry in enumerate(found["people"], start=1):
         if isinstance(motion := entry["motion"], Motion):
             entry["motion"] = f"person-{number}.motion"
@@ -100,23 +101,23 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
     found["scene"] = copy.deepcopy(found["scene"])
     for tables in (found, found["scene"]):
         for _, key, entry in files_of(tables):
-            path, entry[key] = entry[key], _from(place, entry[key])
+            path, entry[key] = entry[key], path_from(place, entry[key])
             if entry[key] not in digests and os.path.isabs(path) and os.path.isfile(path):
                 digests[entry[key]] = digest_of(path)
     if background := found["settings"].get("background"):
-        found["settings"] = {**found["settings"], "background": _from(place, background)}
+        found["settings"] = {**found["settings"], "background": path_from(place, background)}
         # Of a folder what it was made from, for its samples follow from that.
         for path in (background, os.path.join(background, "run.toml")):
             if os.path.isfile(path):
-                digests[_from(place, path)] = digest_of(path)
+                digests[path_from(place, path)] = digest_of(path)
     files = [{"path": path, "sha256": digest} for path, digest in sorted(digests.items())]
     found |= {"versions": versions()} | ({"files": files} if files else {})
     (folder / "run.toml").write_text(_HEAD + tomli_w.dumps(found), encoding="utf-8")
     return found
 
 
-def _from(place: Path, path: str) -> str:
-    """An absolute path from the folder of the run file on, where there is a way."""
+def path_from(place: Path, path: str) -> str:
+    """Return an absolute path from a folder on, where there is a way."""
     if not os.path.isabs(path):
         return path
     try:
@@ -221,7 +222,7 @@ def check_files(told: str, folder: Path, table: Table, *, changed: bool = False)
     found = set()
     for where, entry in tables_at("files", table, most=MOST_FILES):
         check_keys(f"{told}: {where}", entry, ("path", "sha256"), ())
-        text = check_text(f"{told}: {where.strip()}", "path", entry["path"])
+        text = read_value(str, f"{told}: {where}", "path", entry["path"])
         found.add((folder / text).resolve())
         if changed:
             continue

@@ -20,17 +20,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, pi
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number, check_text
+from rtradar.system.checks import brief
+from rtradar.system.fields import Limits, checked, read_value
 
 VACUUM_PERMITTIVITY_FPM = 8.8541878188e-12
 """Permittivity of vacuum [F/m], CODATA 2022.
 
 P.2040-3 rounds 1e-9 / (2 pi eps_0) = 17.975 to 17.98."""
+
+
+_Frequency = Annotated[float, Limits(1e6, 1e12)]
+_Power = Annotated[float, Limits(-10, 10)]
 
 
 @dataclass(frozen=True)
@@ -40,12 +46,12 @@ class PowerLaw:
     The limits of the measured band belong to it.
     """
 
-    low_hz: float
-    high_hz: float
-    a: float
-    b: float
-    c: float
-    d: float
+    low_hz: _Frequency
+    high_hz: _Frequency
+    a: Annotated[float, Limits(0, 1e4)]
+    b: _Power = 0.0
+    c: Annotated[float, Limits(0, 1e9)] = 0.0
+    d: _Power = 0.0
 
     def eta(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
@@ -230,16 +236,6 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 """Materials by their names. ``metal`` is that of the Recommendation, with 1e7 S/m; the body of the
 paper is a ``perfect-conductor``."""
 
-OWN_LIMITS: Mapping[str, tuple[float, float]] = {
-    "low_hz": (1e6, 1e12),
-    "high_hz": (1e6, 1e12),
-    "a": (0.0, 1e4),
-    "b": (-10.0, 10.0),
-    "c": (0.0, 1e9),
-    "d": (-10.0, 10.0),
-}
-"""Least and largest value of each number of a material of one's own."""
-
 
 def material(name: str) -> Material:
     """Find the material of a name among `MATERIALS`.
@@ -299,20 +295,19 @@ def own_material(
         Where a value has no physical meaning, or the source is not named.
     """
     where = f"material {brief(name)}"
-    check_text(where, "its name", name)
+    read_value(str, f"{where}: ", "its name", name)
     if name in MATERIALS:
         raise InputError(
             f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your "
             "own figures"
         )
-    check_text(where, "source", source)
-    low = check_number(where, "low_hz", low_hz, *OWN_LIMITS["low_hz"])
-    high = check_number(where, "high_hz", high_hz, low, OWN_LIMITS["high_hz"][1])
-    given = {"a": a, "b": b, "c": c, "d": d}
-    constants = [check_number(where, key, given[key], *OWN_LIMITS[key]) for key in given]
-    law = PowerLaw(low, high, *constants)
+    read_value(str, f"{where}: ", "source", source)
+    given = {"low_hz": low_hz, "high_hz": high_hz, "a": a, "b": b, "c": c, "d": d}
+    law = PowerLaw(**checked(PowerLaw, f"{where}: ", given))
+    if law.low_hz > law.high_hz:
+        raise InputError(f"{where}: high_hz = {brief(high_hz)}; it must be low_hz or more")
     # A power law is monotonic, so its ends suffice.
-    ends = law.eta(np.array([low, high]))
+    ends = law.eta(np.array([law.low_hz, law.high_hz]))
     if not all(value.real >= 1.0 and isfinite(abs(value)) for value in ends):
         raise InputError(
             f"{where}: a = {brief(a)}, b = {brief(b)} give a permittivity of {ends[0].real:.3g} to "

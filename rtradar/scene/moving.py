@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.scene.materials import material
 from rtradar.scene.mesh_files import Triangles, checked_triangles
-from rtradar.scene.objects import Furniture, Limits
-from rtradar.system.checks import Vector, brief, check_keys, check_number, check_vector
+from rtradar.scene.objects import Furniture
+from rtradar.system.checks import Vector, brief, check_keys
+from rtradar.system.fields import Angle, Limits, Point, check_fields, keys_of
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -30,13 +31,14 @@ _LEAST_AXIS = 1e-9
 _MOST_FACES = 200_000
 """Triangles of a mesh that moves, fewer than of one that stands: each has many places at once."""
 MOST_WAY_POINTS = 10_000
-MOTION_LIMITS: Limits = {
-    "rate_hz": (-1000.0, 1000.0),
-    "phase_deg": (-360.0, 360.0),
-    "amplitude_deg": (0.0, 180.0),
-    "period_s": (1e-3, 1e4),
-}
-"""Least and largest value of each number of a motion; velocities are up to 1 km/s."""
+
+_Rate = Annotated[float, Limits(-1000, 1000)]
+_Points = Annotated[
+    tuple[Vector, ...] | None,
+    Limits(
+        -1000, 1000, f"it must be a list of 2 to {MOST_WAY_POINTS} way-points", (2, MOST_WAY_POINTS)
+    ),
+]
 
 
 class RigidMotion:
@@ -70,18 +72,14 @@ class RigidMotion:
 class _AboutAxis(RigidMotion, ABC):
     """Rotation about an axis through the pivot, by an angle that depends on the time."""
 
-    axis: Vector = (0.0, 0.0, 1.0)
-    phase_deg: float = 0.0
+    axis: Point = (0.0, 0.0, 1.0)
+    phase_deg: Angle = 0.0
 
     def __post_init__(self) -> None:
-        where = f"motion {type(self).__name__}"
-        axis = check_vector(where, "axis", self.axis, 3)
-        if np.linalg.norm(axis) < _LEAST_AXIS:
-            raise InputError(f"{where}: axis = {brief(self.axis)}; it must have a direction")
-        object.__setattr__(self, "axis", axis)
-        for key, limits in MOTION_LIMITS.items():
-            if hasattr(self, key):
-                object.__setattr__(self, key, check_number(where, key, getattr(self, key), *limits))
+        where = f"motion {type(self).__name__}: "
+        check_fields(self, where)
+        if np.linalg.norm(self.axis) < _LEAST_AXIS:
+            raise InputError(f"{where}axis = {brief(self.axis)}; it must have a direction")
 
     @abstractmethod
     def _angle_rad(self, times: Array) -> Array:
@@ -123,7 +121,7 @@ class Turning(_AboutAxis):
     np.float64(1.0)
     """
 
-    rate_hz: float = 1.0
+    rate_hz: _Rate = 1.0
 
     def _angle_rad(self, times: Array) -> Array:
         turns = self.rate_hz * times + self.phase_deg / 360
@@ -152,8 +150,8 @@ class Swinging(_AboutAxis):
         Where a value has no meaning.
     """
 
-    amplitude_deg: float = 45.0
-    period_s: float = 4.0
+    amplitude_deg: Annotated[float, Limits(0, 180)] = 45.0
+    period_s: Annotated[float, Limits(1e-3, 1e4)] = 4.0
 
     def _angle_rad(self, times: Array) -> Array:
         phase = 2 * np.pi * times / self.period_s + math.radians(self.phase_deg)
@@ -181,34 +179,23 @@ class FollowingPath(RigidMotion):
         Where neither or both ways are given, or a value has no meaning.
     """
 
-    velocity_mps: Vector | None = None
-    points_m: tuple[Vector, ...] | None = None
-    times_s: tuple[float, ...] | None = None
+    velocity_mps: Point | None = None
+    points_m: _Points = None
+    times_s: Annotated[tuple[float, ...] | None, Limits(-1e6, 1e6)] = None
 
     def __post_init__(self) -> None:
-        where = "motion FollowingPath"
+        where = "motion FollowingPath: "
+        check_fields(self, where)
         if (self.velocity_mps is None) == (self.points_m is None) or (self.points_m is None) != (
             self.times_s is None
         ):
-            raise InputError(f"{where}: give velocity_mps, or points_m with times_s")
-        if self.velocity_mps is not None:
-            velocity = check_vector(where, "velocity_mps", self.velocity_mps, 3)
-            object.__setattr__(self, "velocity_mps", velocity)
-        if self.points_m is None or self.times_s is None:
-            return
-        listed = isinstance(self.points_m, Sequence | np.ndarray)
-        count = len(self.points_m) if listed else 0
-        if not 2 <= count <= MOST_WAY_POINTS:
+            raise InputError(f"{where}give velocity_mps, or points_m with times_s")
+        times = self.times_s or ()
+        if len(times) != len(self.points_m or ()) or (np.diff(times) <= 0).any():
             raise InputError(
-                f"{where}: points_m = {brief(self.points_m)}; it must be a list of 2 to "
-                f"{MOST_WAY_POINTS} way-points"
+                f"{where}times_s = {brief(self.times_s)}; they must ascend, one for each of "
+                "points_m"
             )
-        points = tuple(check_vector(where, "points_m", point, 3) for point in self.points_m)
-        times = check_vector(where, "times_s", self.times_s, count, 1e6)
-        if min(np.diff(times)) <= 0:
-            raise InputError(f"{where}: times_s = {brief(self.times_s)}; they must ascend")
-        object.__setattr__(self, "points_m", points)
-        object.__setattr__(self, "times_s", times)
 
     def _shifts(self, times: Array) -> Array:
         if self.velocity_mps is not None:
@@ -220,13 +207,12 @@ class FollowingPath(RigidMotion):
         return np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
 
 
-_Keys = tuple[str, ...]
-_KINDS: Mapping[str, tuple[type[RigidMotion], _Keys, _Keys]] = {
-    "turning": (Turning, ("rate_hz",), ("axis", "phase_deg")),
-    "swinging": (Swinging, ("amplitude_deg", "period_s"), ("axis", "phase_deg")),
-    "path": (FollowingPath, (), ("velocity_mps", "points_m", "times_s")),
+_KINDS: Mapping[str, tuple[type[RigidMotion], tuple[str, ...]]] = {
+    "turning": (Turning, ("rate_hz",)),
+    "swinging": (Swinging, ("amplitude_deg", "period_s")),
+    "path": (FollowingPath, ()),
 }
-"""Motions by the ``kind`` that a scene file names, the keys that each needs, and the others."""
+"""Motions by the ``kind`` that a scene file names, and the keys that each needs there."""
 
 
 def kind_of(motion: RigidMotion) -> str | None:
@@ -241,8 +227,8 @@ def motion_of(table: object) -> RigidMotion:
         raise InputError(
             f"motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
         )
-    motion, needed, others = _KINDS[kind]
-    check_keys("motion: ", table, ("kind", *needed), others)
+    motion, needed = _KINDS[kind]
+    check_keys("motion: ", table, ("kind", *needed), keys_of(motion)[1])
     return motion(**{key: value for key, value in table.items() if key != "kind"})
 
 
@@ -290,9 +276,11 @@ class Object(Furniture):
     """
 
     _: KW_ONLY
-    position_m: Vector = (0.0, 0.0, 0.0)
-    pivot_m: Vector = (0.0, 0.0, 0.0)
-    motion: RigidMotion | None = None
+    position_m: Point = (0.0, 0.0, 0.0)
+    pivot_m: Point = (0.0, 0.0, 0.0)
+    motion: Annotated[
+        RigidMotion | None, Limits(wanted="allowed: Turning, Swinging, FollowingPath")
+    ] = None
 
     _kind: ClassVar[str] = "object"
 
@@ -306,13 +294,6 @@ class Object(Furniture):
                 "or a trimesh.Trimesh"
             )
         super().__post_init__()
-        pivot = check_vector(self._where, "pivot_m", self.pivot_m, 3)
-        object.__setattr__(self, "pivot_m", pivot)
-        if not isinstance(self.motion, RigidMotion | None):
-            raise InputError(
-                f"{self._where}: motion = {brief(self.motion)}; allowed: Turning, Swinging, "
-                "FollowingPath"
-            )
 
     @property
     def _settled(self) -> bool:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,31 +18,40 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
 from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, read_mesh
-from rtradar.system.checks import Vector, brief, check_number, check_text, check_vector
+from rtradar.system.checks import Vector, brief
+from rtradar.system.fields import Angle, Limits, Point, check_fields, read_value
 from rtradar.system.files import shipped_folder
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 """Sides at the least x, largest x, least y, largest y, z = 0 and the top."""
 
-Limits = Mapping[str, tuple[float, float]]
-
-SURFACE_LIMITS: Limits = {"thickness_m": (1e-4, 10.0), "roughness_m": (0.0, 0.1)}
-ROOM_LIMITS: Limits = {"size_m": (0.1, 100.0), "corner_m": (-100.0, 100.0)}
-FURNITURE_LIMITS: Limits = {
-    "yaw_deg": (-360.0, 360.0),
-    "scale": (1e-3, 1e3),
-    "metres_per_unit": (1e-6, 1e3),
-}
-"""Least and largest value of each key that is a number; other lengths may be up to 1 km."""
-
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
 """Limits of the size of furniture along its longest axis [m]."""
+
+_BOX = Annotated[
+    Vector,
+    Limits(
+        SMALLEST_M, LARGEST_M, f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
+    ),
+]
 
 _SHORTEST_M = 0.01
 """Least length of a wall's edge [m]."""
 
 Opening = tuple[float, float, float, float]
 """Rectangle in a wall: its beginning along both edges, its width and its height [m]."""
+
+_Thickness = Annotated[float, Limits(1e-4, 10)]
+_Roughness = Annotated[float, Limits(0, 0.1)]
+_Openings = Annotated[
+    tuple[Opening, ...],
+    Limits(-1000, 1000, "it must be a list of [u, v, width, height] in metres"),
+]
+_Material = Annotated[
+    Material, Limits(wanted="it must be a Material, as material('concrete') gives")
+]
+_Size = Annotated[Vector, Limits(0.1, 100)]
+_Corner = Annotated[tuple[float, float], Limits(-100, 100)]
 
 _SQUARE = 1e-6
 """Largest cosine between the edges of a rectangle: 1 um of skew a metre."""
@@ -81,19 +90,17 @@ class Wall:
     """
 
     name: str
-    corner_m: Vector
-    edge_u_m: Vector
-    edge_v_m: Vector
-    material: Material
-    thickness_m: float
-    roughness_m: float = 0.0
-    openings: tuple[Opening, ...] = ()
+    corner_m: Point
+    edge_u_m: Point
+    edge_v_m: Point
+    material: _Material
+    thickness_m: _Thickness
+    roughness_m: _Roughness = 0.0
+    openings: _Openings = ()
 
     def __post_init__(self) -> None:
-        check_text("wall", "name", self.name)
-        where = f"wall '{self.name}'"
-        for key in ("corner_m", "edge_u_m", "edge_v_m"):
-            object.__setattr__(self, key, check_vector(where, key, getattr(self, key), 3))
+        where = f"wall {brief(self.name)}"
+        check_fields(self, f"{where}: ")
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
                 raise InputError(
@@ -106,24 +113,13 @@ class Wall:
                 f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)} "
                 "are not at right angles; a wall is a rectangle"
             )
-        self._check_slab(where)
-        object.__setattr__(self, "openings", self._checked_openings(where))
+        self._check_openings(where)
 
-    def _check_slab(self, where: str) -> None:
-        _check(self, where, SURFACE_LIMITS)
-
-    def _checked_openings(self, where: str) -> tuple[Opening, ...]:
-        """Openings that lie in the wall, and nowhere in each other."""
+    def _check_openings(self, where: str) -> None:
+        """Refuse openings that do not lie in the wall, or lie in each other."""
         width, height = self.size_m
-        given: object = self.openings
-        if not isinstance(given, list | tuple):
-            raise InputError(
-                f"{where}: openings = {brief(given)}; it must be a list of "
-                "[u, v, width, height] in metres"
-            )
         found: list[Opening] = []
-        for opening in given:
-            u, v, wide, high = check_vector(where, "an opening", opening, 4)
+        for u, v, wide, high in self.openings:
             inside = min(u, v) >= 0 and u + wide <= width + 1e-9 and v + high <= height + 1e-9
             if not inside or min(wide, high) < _SHORTEST_M:
                 raise InputError(
@@ -138,7 +134,6 @@ class Wall:
                         f"{brief([u, v, wide, high])} overlap; make them one, or two apart"
                     )
             found.append((u, v, wide, high))
-        return tuple(found)
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:
@@ -239,14 +234,14 @@ class Surface:
         floor and the ceiling along x and y.
     """
 
-    material: Material
-    thickness_m: float
-    roughness_m: float = 0.0
-    openings: tuple[Opening, ...] = ()
+    material: _Material
+    thickness_m: _Thickness
+    roughness_m: _Roughness = 0.0
+    openings: _Openings = ()
 
 
 def room_walls(
-    size_m: Vector, corner_m: tuple[float, float], surfaces: Mapping[str, Surface]
+    size_m: _Size, corner_m: _Corner, surfaces: Mapping[str, Surface]
 ) -> tuple[Wall, ...]:
     """Make the six walls of a box, their fronts inward; its floor is z = 0.
 
@@ -269,14 +264,8 @@ def room_walls(
     InputError
         Where a size is not positive, or a surface has a value without meaning.
     """
-    x, y = check_vector("room", "corner_m", corner_m, 2, ROOM_LIMITS["corner_m"][1])
-    least, most = ROOM_LIMITS["size_m"]
-    lengths = check_vector("room", "size_m", size_m, 3, most)
-    if min(lengths) < least:
-        raise InputError(
-            f"room: size_m = {brief(size_m)}; each must be from {least:g} to {most:g} m"
-        )
-    a, b, h = lengths
+    x, y = read_value(_Corner, "room: ", "corner_m", corner_m)
+    a, b, h = read_value(_Size, "room: ", "size_m", size_m)
     faces: dict[str, tuple[Vector, Vector, Vector]] = {
         "near": ((x, y, 0.0), (0.0, b, 0.0), (0.0, 0.0, h)),
         "far": ((x + a, y + b, 0.0), (0.0, -b, 0.0), (0.0, 0.0, h)),
@@ -325,31 +314,21 @@ class Furniture:
 
     name: str
     mesh: Any  # str, Path or lengths; an `Object` may have a mesh itself
-    material: Material
+    material: _Material
     _: KW_ONLY
-    position_m: Vector
-    yaw_deg: float = 0.0
-    scale: float = 1.0
-    metres_per_unit: float | None = None
+    position_m: Point
+    yaw_deg: Angle = 0.0
+    scale: Annotated[float, Limits(1e-3, 1e3)] = 1.0
+    metres_per_unit: Annotated[float | None, Limits(1e-6, 1e3)] = None
     sheet: bool = False
 
     _kind: ClassVar[str] = "furniture"
 
     def __post_init__(self) -> None:
-        check_text(self._kind, "name", self.name)
         where = self._where
-        position = check_vector(where, "position_m", self.position_m, 3)
-        object.__setattr__(self, "position_m", position)
-        _check(self, where, FURNITURE_LIMITS)
-        if not isinstance(self.sheet, bool):
-            raise InputError(f"{where}: sheet = {brief(self.sheet)}; it must be true or false")
+        check_fields(self, f"{where}: ")
         if isinstance(self.mesh, list | tuple):
-            lengths = check_vector(where, "box", self.mesh, 3)
-            if not all(SMALLEST_M <= length <= LARGEST_M for length in lengths):
-                raise InputError(
-                    f"{where}: box = {brief(self.mesh)}; lengths are {SMALLEST_M:g} to "
-                    f"{LARGEST_M:g} m each"
-                )
+            lengths = read_value(_BOX, f"{where}: ", "box", self.mesh)
             object.__setattr__(self, "mesh", lengths)
         if not self._settled and not isinstance(self.mesh, str | Path):
             raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be a name or a file")
@@ -372,7 +351,7 @@ class Furniture:
 
     @property
     def _where(self) -> str:
-        return f"{self._kind} '{self.name}'"
+        return f"{self._kind} {brief(self.name)}"
 
     @property
     def _built_in(self) -> bool:
@@ -448,16 +427,3 @@ class Furniture:
         vertices = np.array(box.vertices)
         vertices[:, 2] += self.mesh[2] / 2
         return Triangles(vertices, np.array(box.faces, dtype=np.int64), closed=True)
-
-
-def _check(thing: Any, where: str, limits: Limits) -> None:
-    """Check the material of a wall or a piece of furniture, and its numbers."""
-    if not isinstance(thing.material, Material):
-        raise InputError(
-            f"{where}: material = {brief(thing.material)}; it must be a Material, as "
-            "material('concrete') gives"
-        )
-    for key, (least, most) in limits.items():
-        value = getattr(thing, key)
-        if value is not None or key != "metres_per_unit":
-            object.__setattr__(thing, key, check_number(where, key, value, least, most))

@@ -18,6 +18,7 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
+from rtradar.system.fields import read_table
 
 if TYPE_CHECKING:
     from rtradar.body import Person
@@ -79,8 +80,7 @@ def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
         try:
             if "breathing" in entry:
                 breath = table_at("breathing", entry)
-                check_keys("breathing: ", breath, ("amplitude_mm", "rate_hz"), ("phase_deg",))
-                own["breathing"] = Breathing(**breath)
+                own["breathing"] = read_table(Breathing, "breathing: ", breath)
             found.append(Person(_motion(entry, folder), **own))
         except InputError as error:
             raise InputError(f"{where}{error}") from None

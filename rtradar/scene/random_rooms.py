@@ -7,13 +7,13 @@ near wall. What a person needs to walk toward it stays free, and so does half a 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from rtradar.errors import InputError
 from rtradar.scene.mesh_files import read_mesh
-from rtradar.system.checks import Table, brief, check_keys, is_real, is_whole
+from rtradar.system.checks import Table, check_keys
+from rtradar.system.fields import read_value, within
 from rtradar.system.files import shipped_folder
 from rtradar.system.seeds import check_seed
 
@@ -55,7 +55,15 @@ def random_room(table: Table) -> dict[str, Any]:
     check_keys("[random] ", table, ("seed",), tuple(RANDOM))
     check_seed("[random] ", table["seed"])
     ranges = {
-        key: _range(key, table.get(key, usual), limits) for key, (usual, limits) in RANDOM.items()
+        key: read_value(
+            Annotated[tuple[int, int], within(*limits, "whole numbers")]
+            if key == "furniture"
+            else Annotated[tuple[float, float], within(*limits)],
+            "[random] ",
+            key,
+            table.get(key, usual),
+        )
+        for key, (usual, limits) in RANDOM.items()
     }
     draw = np.random.default_rng(table["seed"])
 
@@ -111,20 +119,6 @@ def random_room(table: Table) -> dict[str, Any]:
         **({"walls": walls} if walls else {}),
         **({"furniture": furniture} if furniture else {}),
     }
-
-
-def _range(key: str, value: Any, limits: tuple[float, float]) -> tuple[float, float]:
-    right = is_whole if key == "furniture" else is_real
-    given = value if isinstance(value, list | tuple) else ()
-    if len(given) == 2 and all(map(right, given)):
-        low, high = map(float, given)
-        if limits[0] <= low <= high <= limits[1]:
-            return low, high
-    kind = "whole numbers" if key == "furniture" else "numbers"
-    raise InputError(
-        f"[random] {key} = {brief(value)}; it must be two {kind}, the least and the largest, from "
-        f"{limits[0]:g} to {limits[1]:g}"
-    )
 
 
 def _against(mesh: str, side: str, low: Any, high: Any, along: float) -> tuple[list[float], Any]:

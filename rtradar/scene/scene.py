@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
@@ -36,14 +36,13 @@ from rtradar.system.checks import (
     Vector,
     brief,
     check_keys,
-    check_number,
     check_text,
-    check_vector,
     inside,
     printable,
     table_at,
     tables_at,
 )
+from rtradar.system.fields import Angle, Limits, MaybeEmpty, Point, check_fields
 from rtradar.system.registries import RANDOM_SCENE, scene_table
 
 if TYPE_CHECKING:
@@ -82,6 +81,10 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     )
 }
 """Keys of each table of a scene file: those that must be given, and the others."""
+
+
+def _tuple_of(kind: str) -> Limits:
+    return Limits(wanted=f"it must be a tuple of {kind}")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -128,56 +131,38 @@ class Scene:
     ['near', 'far']
     """
 
-    name: str = "free-space"
-    description: str = "nothing but the person"
-    walls: tuple[Wall, ...] = ()
-    furniture: tuple[Furniture, ...] = ()
-    objects: tuple[Object, ...] = ()
-    people: tuple[Person, ...] = ()
-    radar_position_m: Vector | None = None
-    radar_yaw_deg: float | None = None
-    radar_pitch_deg: float | None = None
-    radar_roll_deg: float | None = None
-    person_position_m: tuple[float, float] = (0.0, 0.0)
-    heading_deg: float = 0.0
+    name: MaybeEmpty = "free-space"
+    description: MaybeEmpty = "nothing but the person"
+    walls: Annotated[tuple[Wall, ...], _tuple_of("Wall")] = ()
+    furniture: Annotated[tuple[Furniture, ...], _tuple_of("Furniture")] = ()
+    objects: Annotated[tuple[Object, ...], _tuple_of("Object")] = ()
+    people: Annotated[tuple[Person, ...], _tuple_of("Person")] = ()
+    radar_position_m: Point | None = None
+    radar_yaw_deg: Angle | None = None
+    radar_pitch_deg: Angle | None = None
+    radar_roll_deg: Angle | None = None
+    person_position_m: Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])] = (
+        0.0,
+        0.0,
+    )
+    heading_deg: Annotated[float, Limits(*PERSON_LIMITS["heading_deg"])] = 0.0
     source: Table | None = field(default=None, init=False, compare=False)
 
     def __post_init__(self) -> None:
-        for key in ("name", "description"):
-            if not isinstance(getattr(self, key), str):
-                raise InputError(f"scene: {key} = {brief(getattr(self, key))}; it must be a string")
-        where = f"scene '{self.name}'"
-        for key, kind in (("walls", Wall), ("furniture", Furniture), ("objects", Object)):
-            given = getattr(self, key)
-            pieces = tuple(given) if isinstance(given, Iterable) else ()
-            # An object is a piece of furniture that moves, and has a list of its own.
-            fits = [
-                isinstance(piece, kind) and isinstance(piece, Object) == (kind is Object)
-                for piece in pieces
-            ]
-            if not isinstance(given, Iterable) or not all(fits):
-                raise InputError(f"{where}: {key} must be a tuple of {kind.__name__}")
-            names = [piece.name for piece in pieces]
+        where = f"scene {brief(self.name)}: "
+        check_fields(self, where)
+        if any(isinstance(piece, Object) for piece in self.furniture):
+            raise InputError(
+                f"{where}furniture must be a tuple of Furniture; what moves is of objects"
+            )
+        for key in ("walls", "furniture", "objects"):
+            names = [piece.name for piece in getattr(self, key)]
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise InputError(
-                    f"{where}: {key} has two of the name '{twice[0]}'; give each its own"
+                    f"{where}{key} has two of the name '{twice[0]}'; give each its own"
                 )
-            object.__setattr__(self, key, pieces)
-        object.__setattr__(self, "people", people.checked(where, self.people))
-        if self.radar_position_m is not None:
-            position = check_vector(where, "radar position_m", self.radar_position_m, 3)
-            object.__setattr__(self, "radar_position_m", position)
-        for key in _ANGLES:
-            if (angle := getattr(self, f"radar_{key}")) is not None:
-                angle = check_number(where, f"radar {key}", angle, -360, 360)
-                object.__setattr__(self, f"radar_{key}", angle)
-        most = PERSON_LIMITS["position_m"][1]
-        place = check_vector(where, "person position_m", self.person_position_m, 2, most)
-        object.__setattr__(self, "person_position_m", place)
-        limits = PERSON_LIMITS["heading_deg"]
-        heading = check_number(where, "person heading_deg", self.heading_deg, *limits)
-        object.__setattr__(self, "heading_deg", heading)
+        object.__setattr__(self, "people", people.checked(where.rstrip(": "), self.people))
 
     def __repr__(self) -> str:
         return text_card("Scene", self.name, display.brief_rows(self))
@@ -500,9 +485,6 @@ def _fields(table: Table) -> dict[str, Any]:
     texts = KEYS["top"][1]
     tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects", "people")
     check_keys("", table, (), (*texts, *tables))
-    for key in texts:
-        if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
-            raise InputError(f"{key} = {brief(table[key])}; it must be a string of one line")
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
     room = _room(table["room"], materials) if "room" in table else ()
     fields: dict[str, Any] = {

@@ -10,7 +10,7 @@ other class, and unions of these. What fields must be to each other is left to t
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import NoneType, UnionType
@@ -38,27 +38,28 @@ class Limits:
         What is allowed, in words for messages; by default it follows from type and limits.
     counts : (int, int)
         Least and largest number of entries of a list.
+    allowed : tuple of str
+        What a text may be; anything of one line if left out.
+    may_be_empty : bool
+        Whether a text may be empty.
+    rising : bool
+        Whether the entries of a list may not fall.
     """
 
     least: float = -_FINITE
     most: float = _FINITE
     wanted: str = ""
     counts: tuple[int, int] = (0, 2**31)
-
-
-@dataclass(frozen=True)
-class Help:
-    """What a field means, in a sentence for the help of a command and the page of its class."""
-
-    text: str
-    kind: str = ""
+    allowed: tuple[str, ...] = ()
+    may_be_empty: bool = False
+    rising: bool = False
 
 
 Angle = Annotated[float, Limits(-360, 360)]
 """Angle of up to a turn either way [deg]."""
 Point = Annotated[tuple[float, float, float], Limits(-1000, 1000)]
 """Place or vector of a scene."""
-MaybeEmpty = Annotated[str, Limits(wanted="it must be one line of text")]
+MaybeEmpty = Annotated[str, Limits(wanted="it must be one line of text", may_be_empty=True)]
 
 
 class Rule(NamedTuple):
@@ -113,6 +114,37 @@ def check_fields(thing: Any, where: str = "") -> None:
     """
     for key, rule in rules_of(type(thing)).items():
         object.__setattr__(thing, key, rule.check(where, key, getattr(thing, key)))
+
+
+def checked(kind: type, where: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of some fields of a dataclass in their types; see `check_fields`."""
+    return {key: rules_of(kind)[key].check(where, key, value) for key, value in values.items()}
+
+
+def read_value(hint: Any, where: str, key: str, value: Any) -> Any:
+    """Return a value that is allowed by an annotation; see `check_fields`."""
+    return _rule(hint).check(where, key, value)
+
+
+def within(least: float, most: float, kind: str = "numbers") -> Limits:
+    """Return the limits of a range, which is given by its least and its largest value."""
+    wanted = f"it must be a range [least, most] of {kind} from {least:g} to {most:g}"
+    return Limits(least, most, wanted, rising=True)
+
+
+def read_range(where: str, key: str, value: Any, least: float, most: float) -> tuple[float, float]:
+    """Return the least and the largest value of a range, which lies within limits."""
+    found: tuple[float, float] = read_value(
+        Annotated[tuple[float, float], within(least, most)], where, key, value
+    )
+    return found
+
+
+def found_in(hint: Any, what: type[_Thing]) -> _Thing | None:
+    """Return what an annotation has of a class in ``Annotated``, such as its `Limits`."""
+    given = [one for one in get_args(hint) if isinstance(one, what)]
+    below = (found_in(one, what) for one in get_args(hint))
+    return next((one for one in (*given, *below) if one is not None), None)
 
 
 def keys_of(kind: type, *, without: Sequence[str] = ()) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -196,11 +228,13 @@ def _truth(_: Limits, __: Any) -> tuple[Callable[[Any], Any], str]:
 
 
 def _line(limits: Limits, _: Any) -> tuple[Callable[[Any], Any], str]:
+    if limits.allowed:
+        return _choice(limits, limits.allowed)
     return (
         lambda value: _tested(
             isinstance(value, str)
             and value.isprintable()
-            and (bool(value.strip()) or bool(limits.wanted)),
+            and (limits.may_be_empty or bool(value.strip())),
             value,
         ),
         "it must be a string of one line, not empty",
@@ -239,21 +273,31 @@ def _any_of(rules: Sequence[Rule], or_none: bool) -> Rule:
 
 
 def _list_of(args: tuple[Any, ...], limits: Limits | None) -> Rule:
-    rule, even = _rule(args[0], limits and dataclasses.replace(limits, wanted="")), Ellipsis in args
+    below = limits and dataclasses.replace(limits, wanted="")
+    even = Ellipsis in args
+    rules = [_rule(one, below) for one in args if one is not Ellipsis]
     least, most = (limits or Limits()).counts if even else (len(args), len(args))
 
     def read(value: Any) -> Any:
-        if not isinstance(value, list | tuple):
-            value = _tested(hasattr(value, "tolist"), value).tolist()  # an array of NumPy
-        if not isinstance(value, list | tuple) or not least <= len(value) <= most:
+        listed = isinstance(value, Sequence | Iterator) and not isinstance(value, str | bytes)
+        if not listed and not hasattr(value, "tolist"):  # which an array of NumPy has
             raise ValueError
-        found = tuple(map(rule.read, value))
+        own = tuple(value if listed else _tested(value.ndim > 0, value))
+        if not least <= len(own) <= most:
+            raise ValueError
+        found = tuple(map(rules[0].read, own) if even else map(_read_by, rules, own))
+        if limits and limits.rising and sorted(found) != list(found):
+            raise ValueError
         # A kind of tuple stays what it is.
         return value if isinstance(value, tuple) and type(value) is not tuple else found
 
-    several = "a list" if even else str(most)
-    each = rule.wanted.removeprefix("it must be ").removeprefix("a ").replace("number", "numbers")
-    return Rule(read, f"it must be {several} {'of ' if even else ''}{each}")
+    several = "a list of" if even else str(most)
+    each = rules[0].wanted.removeprefix("it must be ").removeprefix("a ")
+    return Rule(read, f"it must be {several} {each.replace('number', 'numbers')}")
+
+
+def _read_by(rule: Rule, value: Any) -> Any:
+    return rule.read(value)
 
 
 def _table_of(kind: type) -> Rule:

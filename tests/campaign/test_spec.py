@@ -171,20 +171,20 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         ("seed = true" + SMALL, "seed = True; it must be a whole number"),
         ("pfa = 2" + SMALL, "pfa = 2; it must be a number"),
         ('clutter_removal = "magic"' + SMALL, "clutter_removal = 'magic'; allowed: none, mean"),
-        ("detector = 'eye'" + SMALL, "detector = 'eye'; allowed: os-cfar"),
+        ("detector = 'eye'" + SMALL, "detector 'eye' is unknown; allowed: os-cfar"),
         ("body_material = 'wood'" + SMALL, "body_material = 'wood'; allowed: perfect-conductor"),
         ("range_window = 'square'" + SMALL, "range window 'square' is unknown; allowed: "),
         ("doppler_window = [1, 2]" + SMALL, "doppler_window = [1, 2]; it must be a name"),
         (
             "order = 4" + SMALL,
-            "order = 4 of reflections at walls; it must be a whole number from 0 to 3",
+            "order = 4; it must be a whole number from 0 to 3",
         ),
-        ("keep_all = 1" + SMALL, "keep_all = 1; allowed: true, false"),
+        ("keep_all = 1" + SMALL, "keep_all = 1; it must be true or false"),
         ("windows = 3", "windows = 3; it must be a table"),
         (SMALL + "colour = 1", "[[synthetic]] number 1 unknown key 'colour'"),
         (SMALL + "seeds = [1]", "give count or seeds, one of them"),
         (SMALL.replace("count = 3", ""), "give count or seeds, one of them"),
-        (SMALL.replace("count = 3", "count = 0"), "count = 0; it must be at least 1"),
+        (SMALL.replace("count = 3", "count = 0"), "count = 0; it must be a whole number from 1 to"),
         (
             SMALL.replace("count = 3", "seeds = [1, 1]"),
             "seeds = [1, 1]; it must be a list of different whole numbers",
@@ -220,11 +220,11 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (SMALL + "[each]\nradar = []", "[each] radar = []; it must be a list, not empty"),
         (SMALL + "[each]\nradar = ['paper-13ghz']", "[each] radar: radar 'paper-13ghz' is unknown"),
         (SMALL + "[each]\nradar = ['none.toml']", "No such file"),
-        (SMALL + "[each]\nradar = [1]", "[each]: radar = 1; it must be a string"),
+        (SMALL + "[each]\nradar = [1]", "[each] radar = 1; it must be a string"),
         (SMALL + "[each]\nscene = ['moon']", "[each] scene: scene 'moon' is unknown"),
         (
             SMALL + "[each]\nfidelity = ['perfect']",
-            "fidelity = 'perfect' is unknown; allowed: analytic-paper",
+            "[each] fidelity 'perfect' is unknown; allowed: analytic-paper",
         ),
         (SMALL + "[each]\nsnr_db = [1, 1]", "a value is given twice"),
         (SMALL + "[each]\nsnr_db = ['loud']", "snr_db = 'loud'; it must be a number"),
@@ -237,14 +237,14 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             "snr_db is under [each] and under [drawn]",
         ),
         (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
-        (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range: [least, most]"),
+        (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range [least, most]"),
         (
             SMALL + "[drawn]\ntempo = [1.2, 0.8]",
-            "[drawn] tempo = [1.2, 0.8]; the least must come first",
+            "[drawn] tempo = [1.2, 0.8]; it must be a range [least, most]",
         ),
         (
             SMALL + "[drawn]\ntempo = [1.2, 9]",
-            "[drawn]: tempo = 9; it must be a number from 0.4 to 2",
+            "[drawn] tempo = [1.2, 9]; it must be a range [least, most] of numbers from 0.4 to 2",
         ),
         (RECORDING, "[[recordings]] number 1 file = 'walk.bvh': there is no such file"),
         (
@@ -258,7 +258,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (RECORDING.replace("walk.bvh", "*" * 11), "10 wildcards are allowed"),
         (
             RECORDING.replace('"her"', "7"),
-            "[[recordings]] number 1: subject = 7; it must be a string",
+            "[[recordings]] number 1 subject = 7; it must be a string",
         ),
         ('folder = "none"' + SMALL, "folder = 'none': there is no such folder"),
         ('folder = "${RTRADAR_NOWHERE}"' + SMALL, "the environment has no such variable"),
@@ -305,7 +305,7 @@ subject = 7
         "unknown key 'colour'", "snr_db is under [each] and under [drawn]", "duration_s = -1",
         "label = 'dance'", "count = 0", "number 2 : give count or seeds", "subject = 7",
         "label is missing", "matches no file", "radar 'moon' is unknown", "none.toml",
-        "snr_db = 'loud'", "tempo = 3", "keep = ['sound']", "range_window = 7", "pfa = 2",
+        "snr_db = 'loud'", "tempo = [3, 1]", "keep = ['sound']", "range_window = 7", "pfa = 2",
     ]  # fmt: skip
     assert [one for one in says if not any(one in line for line in caught.value.lines)] == []
     assert len(caught.value.lines) == len(says)

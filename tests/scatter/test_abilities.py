@@ -6,8 +6,7 @@ import inspect
 
 import pytest
 
-from rtradar.cli import captures
-from rtradar.cli.values import OneLineParser
+from rtradar.cli.parser import parser
 from rtradar.scatter import MODELS, takes_backend
 from rtradar.scatter.echo_models import affordable_models, models_that
 
@@ -24,10 +23,8 @@ def test_models_are_listed_cheapest_first() -> None:
 
 
 def test_the_help_of_run_names_every_model(capsys: pytest.CaptureFixture[str]) -> None:
-    parser = OneLineParser()
-    captures.add(parser.add_subparsers(parser_class=OneLineParser))
     with pytest.raises(SystemExit):
-        parser.parse_args(["run", "--help"])
+        parser().parse_args(["run", "--help"])
     words = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
     listed = words.partition("--fidelity NAME echo model: ")[2].partition(" (default")[0]
     assert listed.split(", ") == list(MODELS.built_in)

@@ -79,7 +79,7 @@ def test_a_mesh_in_memory_is_a_closed_body_or_a_sheet_by_itself() -> None:
         (lambda: rt.Object("a", "fann", "metal"), "object 'a': mesh = 'fann' is unknown"),
         (lambda: rt.Object("a", None, "metal", metres_per_unit=1), "mesh = None; it must be"),
         (lambda: rt.FollowingPath(points_m=5, times_s=(0, 1)), "points_m = 5; it must be a list"),
-        (lambda: rt.Scene(objects=5), "objects must be a tuple of Object"),
+        (lambda: rt.Scene(objects=5), "must be a tuple of Object"),
         (lambda: rt.Scene(furniture=(rt.Object("a", "fan", "metal"),)), "tuple of Furniture"),
     ],
 )

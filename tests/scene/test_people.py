@@ -72,5 +72,5 @@ def test_what_has_no_meaning_is_refused(
 def test_people_of_a_scene_are_people() -> None:
     walk = rt.synthetic_motion("walk", duration_s=0.5)
     for people in ((walk,), rt.Person(walk), None):
-        with pytest.raises(InputError, match="people must be a tuple of Person"):
+        with pytest.raises(InputError, match="must be a tuple of Person"):
             rt.Scene(people=people)  # type: ignore[arg-type]

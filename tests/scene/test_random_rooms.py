@@ -63,8 +63,8 @@ def test_ranges_are_kept_to() -> None:
     ("words", "message"),
     [
         ({"seed": -1}, "[random] seed = -1"),
-        ({"seed": 1, "furniture": (3, 2)}, "[random] furniture = (3, 2); it must be two whole"),
-        ({"seed": 1, "furniture": (0.5, 2)}, "two whole numbers"),
+        ({"seed": 1, "furniture": (3, 2)}, "[random] furniture = (3, 2); it must be a range"),
+        ({"seed": 1, "furniture": (0.5, 2)}, "of whole numbers"),
         ({"seed": 1, "length_m": (1, 2)}, "from 5.5 to 30"),
     ],
 )
