@@ -9,32 +9,62 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rtradar import classify, exchange, process, rcs, signal
-    from rtradar.antenna import Antenna
-    from rtradar.body import Body, Ellipsoids, HumanMesh, Person
-    from rtradar.clouds import Collection
-    from rtradar.echoes import Echoes
-    from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
-    from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
-    from rtradar.pipeline import (
-        Comparison,
-        Experiment,
-        Result,
-        Simulation,
-        Sweep,
-        compare,
-        compare_recordings,
-        process_samples,
-        run,
-        simulate,
-        sweep,
+    from rtradar import (
+        classify as classify,
+        exchange as exchange,
+        process as process,
+        rcs as rcs,
+        signal as signal,
     )
-    from rtradar.process import register_detector
-    from rtradar.radar import Radar, register_radar
-    from rtradar.receiver import Interferer, Receiver
-    from rtradar.scatter import register_model, scattering_length
-    from rtradar.scene import FollowingPath, Object, Scene, Swinging, Turning
-    from rtradar.settings import Breathing, RunSettings
+    from rtradar.antenna import Antenna as Antenna
+    from rtradar.body import (
+        Body as Body,
+        Ellipsoids as Ellipsoids,
+        HumanMesh as HumanMesh,
+        Person as Person,
+    )
+    from rtradar.clouds import Collection as Collection
+    from rtradar.echoes import Echoes as Echoes
+    from rtradar.errors import (
+        BackendError as BackendError,
+        ExtensionError as ExtensionError,
+        InputError as InputError,
+        ValidityWarning as ValidityWarning,
+    )
+    from rtradar.motion import (
+        Motion as Motion,
+        load_motion as load_motion,
+        register_reader as register_reader,
+        synthetic_motion as synthetic_motion,
+    )
+    from rtradar.pipeline import (
+        Comparison as Comparison,
+        Experiment as Experiment,
+        Result as Result,
+        Simulation as Simulation,
+        Sweep as Sweep,
+        compare as compare,
+        compare_recordings as compare_recordings,
+        process_samples as process_samples,
+        run as run,
+        simulate as simulate,
+        sweep as sweep,
+    )
+    from rtradar.process import register_detector as register_detector
+    from rtradar.radar import Radar as Radar, register_radar as register_radar
+    from rtradar.receiver import Interferer as Interferer, Receiver as Receiver
+    from rtradar.scatter import (
+        register_model as register_model,
+        scattering_length as scattering_length,
+    )
+    from rtradar.scene import (
+        FollowingPath as FollowingPath,
+        Object as Object,
+        Scene as Scene,
+        Swinging as Swinging,
+        Turning as Turning,
+    )
+    from rtradar.settings import Breathing as Breathing, RunSettings as RunSettings
 
 __version__ = "0.2.0"
 
@@ -57,53 +87,7 @@ _NAMES = {
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = ("classify", "exchange", "process", "rcs", "signal")
 
-__all__ = [
-    "Antenna",
-    "BackendError",
-    "Body",
-    "Breathing",
-    "Collection",
-    "Comparison",
-    "Echoes",
-    "Ellipsoids",
-    "Experiment",
-    "ExtensionError",
-    "FollowingPath",
-    "HumanMesh",
-    "InputError",
-    "Interferer",
-    "Motion",
-    "Object",
-    "Person",
-    "Radar",
-    "Receiver",
-    "Result",
-    "RunSettings",
-    "Scene",
-    "Simulation",
-    "Sweep",
-    "Swinging",
-    "Turning",
-    "ValidityWarning",
-    "classify",
-    "compare",
-    "compare_recordings",
-    "exchange",
-    "load_motion",
-    "process",
-    "process_samples",
-    "rcs",
-    "register_detector",
-    "register_model",
-    "register_radar",
-    "register_reader",
-    "run",
-    "scattering_length",
-    "signal",
-    "simulate",
-    "sweep",
-    "synthetic_motion",
-]
+__all__ = sorted([*_HOME, *_MODULES])
 
 
 if not TYPE_CHECKING:  # checkers of types refuse names that are not imported above

@@ -5,39 +5,21 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Mapping
+from functools import cache
 from html import escape
+from pathlib import Path
 
 from rtradar.system.checks import printable
 
 MOST_LINES, MOST_COLUMNS = 10, 100
 """Largest size of a text; what is beyond it is cut."""
 
-# Colours of the notebook or page around the card where it names them, else of the system's theme.
-_STYLE = """\
-.rtradar-card { --rtradar-ink: #1a2230; --rtradar-faint: #5d6878; --rtradar-line: #dde2ea;
-  color: var(--jp-content-font-color1, var(--vscode-editor-foreground, \
-var(--color-foreground-primary, var(--rtradar-ink))));
-  font: 14px/1.45 system-ui, -apple-system, "Segoe UI", Roboto, Arial, sans-serif;
-  max-width: 900px; overflow-wrap: anywhere; }
-@media (prefers-color-scheme: dark) { .rtradar-card {
-  --rtradar-ink: #e4e9f1; --rtradar-faint: #9aa6b8; --rtradar-line: #303948; } }
-.rtradar-card .title { margin: 0 0 4px; font-size: 16px; }
-.rtradar-card .faint, .rtradar-card caption, .rtradar-card th {
-  color: var(--jp-content-font-color2, var(--color-foreground-secondary, var(--rtradar-faint))); }
-.rtradar-card .parts { display: flex; flex-wrap: wrap; gap: 4px 28px; align-items: flex-start; }
-.rtradar-card table { flex: 1 1 300px; max-width: min(100%, 560px); margin: 0 0 6px; border: 0;
-  border-collapse: collapse; font: inherit; table-layout: auto; }
-.rtradar-card caption { padding: 2px 0; font-weight: 600; text-align: left; caption-side: top; }
-.rtradar-card tr, .rtradar-card tbody tr:nth-child(n) { background: none; }
-.rtradar-card th, .rtradar-card td { padding: 2px 0; border: 0; text-align: left;
-  vertical-align: top; max-width: none; white-space: normal; font-weight: 400;
-  border-bottom: 1px solid var(--jp-border-color2, \
-var(--color-background-border, var(--rtradar-line))); }
-.rtradar-card th { padding-right: 14px; width: 10.5em; }
-.rtradar-card img { flex: 1 1 300px; min-width: 0; max-width: min(100%, 520px); height: auto; }
-.rtradar-card p { margin: 2px 0; }
-"""
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+@cache
+def _style() -> str:
+    return Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def html_card(
@@ -82,7 +64,7 @@ def html_card(
     title = f'<span class="faint">{escape(kind)}</span> <b>{escape(printable(name))}</b>'
     below = f'<p class="faint">{escape(printable(note))}</p>' if note else ""
     return (
-        f'<div class="rtradar-card"><style>{_STYLE}</style><p class="title">{title}</p>'
+        f'<div class="rtradar-card"><style>{_style()}</style><p class="title">{title}</p>'
         f'<div class="parts">{"".join(parts)}</div>{below}</div>'
     )
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+import tomllib
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,51 +29,13 @@ _MOST_BYTES, _MOST_CHIRPS = 1_000_000, 512
 _CEILING_DEG = 45.0
 """Tilt from which on a sensor looks down from a ceiling."""
 
-_BOARDS = {
-    "xwr14xx": "iwr1443",
-    "xwr16xx": "iwr1642",
-    "xwr18xx": "iwr1843",
-    "xwr22xx": "awr2243",
-    "xwr64xx": "iwr6843",
-    "xwr68xx": "iwr6843",
-    "xwr68xx_ods": "iwr6843ods",
-    "xwr64xx_aop": "iwr6843aop",
-    "xwr68xx_aop": "iwr6843aop",
-    "xwr294x": "awr2944",
-    "awr294x": "awr2944",
-    "xwrl6432": "iwrl6432",
-    "xwrl64xx": "iwrl6432",
-    "xwrl684x": "iwrl6432",
-    "xwrl6844": "iwrl6432",
-}
-"""Boards of the platforms that the first lines of a file name."""
-
-_GEOMETRIES: dict[tuple[int, ...], str] = {
-    (0, -1, -2, -3, -2, -3, -4, -5, -4, -5, -6, -7): "iwr6843",
-    (0, 0, -1, -1, -2, -2, -3, -3, -2, -2, -3, -3): "iwr6843ods",
-    (-1, -1, 0, 0, -3, -3, -2, -2, -1, -1, 0, 0): "iwr6843aop",
-}
-"""Boards by the places of their virtual antennas (antGeometry0), as people tracking is told."""
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_BOARDS, _PROCESSING, _REFUSED = (_TABLE[key] for key in ("boards", "processing", "refused"))
+_GEOMETRIES = {tuple(places): board for board, places in _TABLE["geometries"].items()}
+_COUNTS: dict[str, Sequence[int]] = {**_TABLE["counts"], "antGeometryCfg": range(2, 100)}
+"""Commands that are read, with the numbers of values that they may have."""
 
 _PLATFORM = re.compile(r"%\s*platform\s*:\s*(\S+)", re.IGNORECASE)
-
-_COUNTS: dict[str, Sequence[int]] = {
-    "profileCfg": (14,),
-    "chirpCfg": (8,),
-    "frameCfg": (6, 7, 8),
-    "channelCfg": (3, 5),
-    "adcCfg": (2,),
-    "adcbufCfg": (4, 5),
-    "dfeDataOutputMode": (1,),
-    "bpmCfg": (3, 4),
-    "ddmPhaseShiftAntOrder": (1, 2, 3, 4),
-    "antGeometry0": (8, 12),
-    "sensorPosition": (3,),
-    "chirpComnCfg": (7,),
-    "chirpTimingCfg": (5,),
-    "antGeometryCfg": range(2, 100),
-}
-"""Commands that are read, with the numbers of values that they may have."""
 
 _NEEDED = ("profileCfg", "chirpCfg", "frameCfg", "channelCfg", "adcCfg")
 _NEEDED_LOW_POWER = ("chirpComnCfg", "chirpTimingCfg", "frameCfg", "channelCfg")
@@ -83,25 +46,8 @@ _WITHOUT_EFFECT = re.compile(
     "(comp|measure)RangeBiasAndRxChanPhase|CQ(RxSat|SigImg)Monitor|lvdsStreamCfg|antGeometry1|"
     "antPhaseRot|factoryCalibCfg|adcDataSource|adcLogging|baudRate|runtimeCalibCfg"
 )
-_PROCESSING = {
-    "clutterRemoval": "--clutter-removal mean",
-    "cfarCfg": "--detector and --pfa",
-    "extendedMaxVelocity": "not simulated",
-    "aoaFovCfg": "not simulated",
-    "cfarFovCfg": "not simulated",
-    "multiObjBeamForming": "not simulated",
-    "nearFieldCfg": "beams are focused where the near field asks for it",
-    "peakGrouping": "--detector ti-oob",
-    "rangeSelCfg": "not simulated",
-}
-"""Commands of the processing on the chip, and what does it here; a last 0 switches one off."""
-
 _SWITCHES = ("clutterRemoval", "extendedMaxVelocity", "nearFieldCfg")
-_REFUSED = {
-    "advFrameCfg": "frames of several kinds (advFrameCfg) are not simulated; use frameCfg",
-    "subFrameCfg": "frames of several kinds (subFrameCfg) are not simulated; use frameCfg",
-    "contModeCfg": "continuous transmission is not simulated; use frameCfg",
-}
+"""Commands of the processing on the chip, of which a last 0 switches one off."""
 
 
 class _Line(NamedTuple):

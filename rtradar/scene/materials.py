@@ -1,8 +1,8 @@
 """Materials of rooms and people: complex relative permittivity over frequency.
 
 Each material names the source of its figures and the frequencies for which they are given. A new
-material is a row of ``_TABLE_3``, if the Recommendation has it, or is made by `own_material`, which
-is what a table ``[materials.NAME]`` of a scene file does.
+material is a row of ``materials.toml``, if the Recommendation has it, or is made by
+`own_material`, which is what a table ``[materials.NAME]`` of a scene file does.
 
 References
 ----------
@@ -16,9 +16,11 @@ four Cole-Cole terms.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, pi
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
 
@@ -190,28 +192,6 @@ def _inside(band: Band, frequency_hz: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 ITU = "ITU-R P.2040-3"
 
-_TABLE_3: dict[str, tuple[tuple[float, float, float, float, float, float], ...]] = {
-    # name: (from GHz, to GHz, a, b, c, d)
-    "vacuum": ((0.001, 100.0, 1.0, 0.0, 0.0, 0.0),),
-    "concrete": ((1.0, 100.0, 5.24, 0.0, 0.0462, 0.7822),),
-    "brick": ((1.0, 40.0, 3.91, 0.0, 0.0238, 0.16),),
-    "plasterboard": ((1.0, 100.0, 2.73, 0.0, 0.0085, 0.9395),),
-    "wood": ((0.001, 100.0, 1.99, 0.0, 0.0047, 1.0718),),
-    "glass": ((0.1, 100.0, 6.31, 0.0, 0.0036, 1.3394), (220.0, 450.0, 5.79, 0.0, 0.0004, 1.658)),
-    "ceiling-board": (
-        (1.0, 100.0, 1.48, 0.0, 0.0011, 1.0750),
-        (220.0, 450.0, 1.52, 0.0, 0.0029, 1.029),
-    ),
-    "chipboard": ((1.0, 100.0, 2.58, 0.0, 0.0217, 0.7800),),
-    "plywood": ((1.0, 40.0, 2.71, 0.0, 0.33, 0.0),),
-    "marble": ((1.0, 60.0, 7.074, 0.0, 0.0055, 0.9262),),
-    "floorboard": ((50.0, 100.0, 3.66, 0.0, 0.0044, 1.3515),),
-    "metal": ((1.0, 100.0, 1.0, 0.0, 1e7, 0.0),),
-    "very-dry-ground": ((1.0, 10.0, 3.0, 0.0, 0.00015, 2.52),),
-    "medium-dry-ground": ((1.0, 10.0, 15.0, -0.1, 0.035, 1.63),),
-    "wet-ground": ((1.0, 10.0, 30.0, -0.4, 0.15, 1.30),),
-}
-
 # Dry skin: of the four terms of the paper the last two have a step of zero.
 _SKIN = ColeCole(1e9, 100e9, 4.0, ((32.0, 7.234e-12, 0.0), (1100.0, 32.481e-9, 0.20)), 0.0002)
 
@@ -224,14 +204,15 @@ _OTHERS = (
 )
 
 
-def _of_table_3(name: str) -> Material:
-    rows = _TABLE_3[name]
-    laws = tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows)
-    return Material(name=name, source=ITU, bands=laws)
+def _of_table_3() -> Iterator[Material]:
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    for name, rows in table.items():
+        laws = tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows)
+        yield Material(name=name, source=ITU, bands=laws)
 
 
 MATERIALS: Mapping[str, Material] = MappingProxyType(
-    {known.name: known for known in (*map(_of_table_3, _TABLE_3), *_OTHERS)}
+    {known.name: known for known in (*_of_table_3(), *_OTHERS)}
 )
 """Materials by their names. ``metal`` is that of the Recommendation, with 1e7 S/m; the body of the
 paper is a ``perfect-conductor``."""
