@@ -5,7 +5,8 @@ The message of each error is one line, which the command line prints; only `Inpu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 
 class InputError(ValueError):
@@ -31,6 +32,17 @@ class InputErrors(InputError):  # noqa: N818 - several of them
 
     def __reduce__(self) -> tuple[type[InputErrors], tuple[tuple[str, ...]]]:
         return InputErrors, (self.lines,)
+
+
+@contextmanager
+def prefixed(where: str) -> Iterator[None]:
+    """Put ``where`` before each message of an `InputError` that is raised inside."""
+    try:
+        yield
+    except InputErrors as errors:
+        raise InputErrors([f"{where}{line}" for line in errors.lines]) from None
+    except InputError as error:
+        raise InputError(f"{where}{error}") from None
 
 
 class BackendError(RuntimeError):

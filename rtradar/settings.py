@@ -58,14 +58,6 @@ class Breathing:
         check_fields(self, "breathing: ")
 
 
-def check_breathing(where: str, value: object) -> None:
-    """Raise an `InputError` if this is neither a `Breathing` nor None."""
-    if value is not None and not isinstance(value, Breathing):
-        raise InputError(
-            f"{where}breathing = {brief(value)}; give rt.Breathing(amplitude_mm, rate_hz)"
-        )
-
-
 class _Seed(TypedDict, total=False):
     seed: int
 

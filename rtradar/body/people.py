@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +16,9 @@ from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError
 from rtradar.motion import Motion, place
 from rtradar.motion.placement import keep_place
-from rtradar.settings import Breathing, RunSettings, check_breathing
-from rtradar.system.checks import brief, check_number, check_text, check_vector
+from rtradar.settings import Breathing, RunSettings
+from rtradar.system.checks import brief, check_number
+from rtradar.system.fields import Limits, check_fields
 
 if TYPE_CHECKING:
     import trimesh
@@ -72,13 +73,13 @@ class Person:
     """
 
     motion: Motion
-    position_m: tuple[float, float] = (0.0, 0.0)
-    heading_deg: float = 0.0
+    position_m: Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])] = (0.0, 0.0)
+    heading_deg: Annotated[float, Limits(*PERSON_LIMITS["heading_deg"])] = 0.0
     start_s: float = 0.0
-    body: str = "ellipsoids"
+    body: Annotated[str, Limits(allowed=BODY_KINDS)] = "ellipsoids"
     material: str | None = None
     breathing: Breathing | None = None
-    placement: str = "standard"
+    placement: Annotated[str, Limits(allowed=PLACEMENTS)] = "standard"
 
     def __post_init__(self) -> None:
         given: object = self.motion
@@ -86,20 +87,8 @@ class Person:
             kind = type(given).__name__
             raise InputError(f"Person: motion is a {kind}; give what rt.load_motion returns")
         where = f"person '{self.motion.name}'"
-        most = PERSON_LIMITS["position_m"][1]
-        place_m = check_vector(where, "position_m", self.position_m, 2, most)
-        object.__setattr__(self, "position_m", place_m)
-        limits = PERSON_LIMITS["heading_deg"]
-        heading = check_number(where, "heading_deg", self.heading_deg, *limits)
-        object.__setattr__(self, "heading_deg", heading)
-        start = check_number(where, "start_s", self.start_s, 0.0, self.motion.duration_s)
-        object.__setattr__(self, "start_s", start)
-        for key, allowed in (("body", BODY_KINDS), ("placement", PLACEMENTS)):
-            if (value := getattr(self, key)) not in allowed:
-                raise InputError(f"{where}: {key} = {brief(value)}; allowed: {', '.join(allowed)}")
-        if self.material is not None:
-            check_text(where, "material", self.material)
-        check_breathing(f"{where}: ", self.breathing)
+        check_fields(self, f"{where}: ")
+        check_number(where, "start_s", self.start_s, 0.0, self.motion.duration_s)
 
     def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
         """Pose a mesh of human shape where the person is, whichever ``body`` they have.

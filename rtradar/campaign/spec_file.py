@@ -32,7 +32,7 @@ from rtradar.campaign.spec import (
 )
 from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
 from rtradar.description import MOST_FILES, check_files, path_from, versions
-from rtradar.errors import InputError, InputErrors
+from rtradar.errors import InputError, prefixed
 from rtradar.motion import ACTIVITIES
 from rtradar.process import DETECTORS, WindowFunctions
 from rtradar.radar import Radar
@@ -116,7 +116,7 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     given = read_toml(path, "data set", "give a TOML file")
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
     listed = check_files(f"data set file '{path}'", path.parent, given, changed=changed)
-    try:
+    with prefixed(f"data set file '{path}': "):
         # The path is absolute, because other processes read the meshes of scenes.
         beside = path.resolve().parent
         root = read_value(str, "data set: ", "root", given.get("root", "."))
@@ -127,10 +127,6 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
             for file in sorted(_files(spec, table, folder) - listed):
                 raise InputError(f"'{file}' is not among its files; build from the original file")
         return spec._replace(shard=check_shard(given.get("shard", [1, 1])))
-    except InputErrors as errors:
-        raise InputErrors([f"data set file '{path}': {line}" for line in errors.lines]) from None
-    except InputError as error:
-        raise InputError(f"data set file '{path}': {error}") from None
 
 
 def check_shard(value: object) -> tuple[int, int]:
@@ -355,10 +351,8 @@ def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]
 
 def _fidelity(value: object) -> str:
     model: str = read_value(str, "[each] ", "fidelity", value)
-    try:
+    with prefixed("[each] "):
         MODELS.check(model)
-    except InputError as error:
-        raise InputError(f"[each] {error}") from None
     return model
 
 
@@ -410,10 +404,8 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
                 "put it beside it or below"
             )
         source = str(folder / source)
-    try:
+    with prefixed(f"[each] {key}: "):
         return load({**table, "base": source} if table is value else source)
-    except InputError as error:
-        raise InputError(f"[each] {key}: {error}") from None
 
 
 def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:

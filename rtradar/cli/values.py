@@ -42,21 +42,44 @@ def fail(status: int, why: object) -> int:
 # -- values; argparse says "invalid <name of the function> value" ----------------------------------
 
 
-def _named(name: str) -> Callable[[Callable[[str], Any]], Callable[[str], Any]]:
-    def rename(read: Callable[[str], Any]) -> Callable[[str], Any]:
-        read.__name__ = name
-        return read
+def _named(name: str, read: Callable[[str], Any]) -> Callable[[str], Any]:
+    def named(text: str) -> Any:
+        return read(text)
 
-    return rename
+    named.__name__ = name
+    return named
 
 
-@_named("finite number")
-def number(text: str) -> float:
-    """Read a finite number."""
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError
-    return value
+def _numbers(
+    name: str, kind: Callable[[str], Any], least: float, most: float = math.inf
+) -> Callable[[str], Any]:
+    """A number within limits, infinite only where one is."""
+
+    def read(text: str) -> Any:
+        value = kind(text)
+        if not least <= value <= most:
+            raise ValueError
+        return value
+
+    return _named(name, read)
+
+
+_LARGEST = sys.float_info.max
+number = _numbers("finite number", float, -_LARGEST, _LARGEST)
+seconds = _numbers("number of seconds, not negative", float, 0, _LARGEST)
+decibels_below = _numbers("number of decibels, or -inf", float, -math.inf, _LARGEST)
+whole = _numbers("whole number, not negative", int, 0)
+count = _numbers("whole number, at least 1", int, 1)
+numbers = _named(
+    "list of whole numbers, such as 1,2,3", lambda text: [whole(part) for part in text.split(",")]
+)
+axis = _named(f"axis: {', '.join(UPWARD)}", lambda text: check_up("--up", text))
+unit = _named(
+    f"unit: {', '.join(UNITS_M)}, or the metres of one", lambda text: check_unit("--unit", text)
+)
+rate = _named(
+    "number of frames a second, 1 to 100000", lambda text: check_rate("--rate", float(text))
+)
 
 
 def setting(text: str) -> tuple[str, bool | int | float | str]:
@@ -91,7 +114,6 @@ def window(text: str) -> str | tuple[str, float]:
     return (name, number(value)) if colon else name
 
 
-@_named("place X,Y[,HEADING], such as -1,0.5 or 0,2,90")
 def place_at(text: str) -> dict[str, Any]:
     """Read where a person is, x and y [m], and the heading [degree] if there is one."""
     x, y, *heading = (number(part) for part in text.split(","))
@@ -100,32 +122,18 @@ def place_at(text: str) -> dict[str, Any]:
     return {"position_m": (x, y)} | ({"heading_deg": heading[0]} if heading else {})
 
 
-@_named("place X,Y,Z [m]")
+place_at.__name__ = "place X,Y[,HEADING], such as -1,0.5 or 0,2,90"
+
+
 def place_in_space(text: str) -> tuple[float, ...]:
     """Read a place, x, y and z [m]."""
     x, y, z = (number(part) for part in text.split(","))
     return x, y, z
 
 
-@_named(f"axis: {', '.join(UPWARD)}")
-def axis(text: str) -> str | None:
-    """Read the axis of a file that is up."""
-    return check_up("--up", text)
+place_in_space.__name__ = "place X,Y,Z [m]"
 
 
-@_named(f"unit: {', '.join(UNITS_M)}, or the metres of one")
-def unit(text: str) -> float | None:
-    """Read a length unit [m]."""
-    return check_unit("--unit", text)
-
-
-@_named("number of frames a second, 1 to 100000")
-def rate(text: str) -> float | None:
-    """Read the rate of a recording [Hz]."""
-    return check_rate("--rate", float(text))
-
-
-@_named("amplitude [mm] and rate [Hz], such as 3,0.25")
 def breathing(text: str) -> Breathing:
     """Read the amplitude [mm] and the rate [Hz] of a person's breath."""
     from rtradar.settings import Breathing
@@ -137,13 +145,9 @@ def breathing(text: str) -> Breathing:
         raise argparse.ArgumentTypeError(str(wrong)) from None
 
 
-@_named("number of seconds, not negative")
-def seconds(text: str) -> float:
-    """Read a time of at least 0 [s]."""
-    return _at_least(0, number(text))
+breathing.__name__ = "amplitude [mm] and rate [Hz], such as 3,0.25"
 
 
-@_named("number of decibels, inf or physical")
 def decibels(text: str) -> float | str:
     """Read a number of decibels, inf, or physical."""
     if text == "physical":
@@ -154,34 +158,9 @@ def decibels(text: str) -> float | str:
     return value
 
 
-@_named("number of decibels, or -inf")
-def decibels_below(text: str) -> float:
-    """Read a number of decibels that may be -inf."""
-    value = float(text)
-    if math.isnan(value) or value == math.inf:
-        raise ValueError
-    return value
+decibels.__name__ = "number of decibels, inf or physical"
 
 
-@_named("whole number, not negative")
-def whole(text: str) -> int:
-    """Read a whole number of at least 0."""
-    return _at_least(0, int(text))
-
-
-@_named("whole number, at least 1")
-def count(text: str) -> int:
-    """Read a whole number of at least 1."""
-    return _at_least(1, int(text))
-
-
-@_named("list of whole numbers, such as 1,2,3")
-def numbers(text: str) -> list[int]:
-    """Read whole numbers separated by commas."""
-    return [whole(part) for part in text.split(",")]
-
-
-@_named("shard I/N, such as 2/8")
 def shard(text: str) -> tuple[int, int]:
     """Read the number of a shard, from 1, and how many there are."""
     number, _, of = text.partition("/")
@@ -189,6 +168,9 @@ def shard(text: str) -> tuple[int, int]:
     if not 1 <= found[0] <= found[1]:
         raise ValueError
     return found
+
+
+shard.__name__ = "shard I/N, such as 2/8"
 
 
 def path(text: str) -> Path:
@@ -203,9 +185,3 @@ def there(text: str) -> Path:
     if not os.path.lexists(path(text)):
         raise argparse.ArgumentTypeError(f"there is no '{text}'; check the path")
     return Path(text)
-
-
-def _at_least(least: int, value: Any) -> Any:
-    if value < least:
-        raise ValueError
-    return value

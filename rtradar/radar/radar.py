@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.cards import html_card, text_card
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.radar import display
 from rtradar.radar.checks import check_rules
 from rtradar.radar.powers import Powers
@@ -220,10 +220,8 @@ class Radar(Powers):
         table = radar_table(source)
         path = Path(source)
         if table is not None:
-            try:
+            with prefixed(f"radar file '{path}': "):
                 return cls._of_table({"name": printable(path.stem), **table}, path.parent, board)
-            except InputError as error:
-                raise InputError(f"radar file '{path}': {error}") from None
         if path.suffix == ".cfg":
             return cls.from_ti_cfg(path, board)
         if board is not None:

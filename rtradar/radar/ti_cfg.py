@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, NamedTuple, NoReturn, TypeVar
 
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar.powers import Powers
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import read_bytes
@@ -53,12 +53,11 @@ _SWITCHES = ("clutterRemoval", "extendedMaxVelocity", "nearFieldCfg")
 class _Line(NamedTuple):
     """A command, where it is and what it says."""
 
-    path: Path
     number: int
     values: tuple[float, ...]
 
     def refuse(self, why: str) -> NoReturn:
-        raise InputError(f"profile '{self.path}', line {self.number}: {why}") from None
+        raise InputError(f"line {self.number}: {why}") from None
 
     def whole(self, index: int, least: int, most: int, what: str) -> int:
         value = self.values[index]
@@ -85,18 +84,18 @@ def read_ti_cfg(
 ) -> TiProfile[_Radar]:
     """Read a configuration file; see `Radar.from_ti_cfg`. A board is made by ``preset``."""
     path = Path(path)
-    commands, platform = _commands(path)
-    low_power = "chirpComnCfg" in commands
-    for command in _NEEDED_LOW_POWER if low_power else _NEEDED:
-        if command not in commands:
-            raise InputError(f"profile '{path}' has no {command}; it must say it")
-    try:
-        if low_power:
-            return _read_low_power(path, commands, platform, board, preset)
-        return _read(path, commands, platform, board, preset)
-    except InputError as error:
-        text = str(error)
-        raise InputError(text if str(path) in text else f"profile '{path}': {text}") from None
+    with prefixed(f"profile '{path}': "):
+        commands, platform = _commands(path)
+        low_power = "chirpComnCfg" in commands
+        for command in _NEEDED_LOW_POWER if low_power else _NEEDED:
+            if command not in commands:
+                raise InputError(f"it has no {command}; it must say it")
+        read = _read_low_power if low_power else _read
+        return read(path, commands, platform, board, preset)
+
+
+def _warn(path: Path, text: str) -> None:
+    warnings.warn(f"profile '{path}': {text}", ValidityWarning, stacklevel=6)
 
 
 def _read(
@@ -111,7 +110,7 @@ def _read(
     if mode and mode[-1].values[0] != 1:
         mode[-1].refuse("dfeDataOutputMode must be 1, frames of one kind; others are not simulated")
     frame, channels, adc = (commands[one][-1] for one in ("frameCfg", "channelCfg", "adcCfg"))
-    sequence = _sequence(commands, frame, channels)
+    sequence = _sequence(path, commands, frame, channels)
     order, profile = sequence.order, sequence.profile
     base = preset(board or _board(path, commands, platform, profile.values[1]))
     most_tx, most_rx = base.n_tx, base.n_rx
@@ -169,7 +168,7 @@ def _read_low_power(
         counts = (4, 4) if large else (base.n_tx, base.n_rx)
         tx_places, rx_places = _virtual_places(commands["antGeometryCfg"][-1], *counts)
     elif large:
-        raise InputError(f"profile '{path}' has no antGeometryCfg, which says where antennas are")
+        raise InputError("it has no antGeometryCfg, which says where antennas are")
     assert tx_places is not None  # every board lists its antennas
     assert rx_places is not None
     rx_mask = channels.whole(0, 1, 2 ** len(rx_places) - 1, "the mask of Rx")
@@ -195,11 +194,10 @@ def _read_low_power(
             f"slope of {slope:g} MHz/us; the sweep must rise and the chirps fit"
         )
     if bursts > 1 and chirps * (ramp_us + idle_us) < burst_us * (1 - 1e-9):
-        warnings.warn(
-            f"profile '{path}': the {chirps} chirps of a burst are taken evenly over its "
+        _warn(
+            path,
+            f"the {chirps} chirps of a burst are taken evenly over its "
             f"{burst_us:g} us; the chip transmits one every {ramp_us + idle_us:g} us, and pauses",
-            ValidityWarning,
-            stacklevel=5,
         )
     radar = dataclasses.replace(
         base,
@@ -265,9 +263,9 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
     try:
         text = read_bytes(path, _MOST_BYTES).decode("utf-8-sig", errors="replace")
     except OSError as error:
-        raise InputError(f"profile '{path}': {error.strerror}; give a .cfg file") from None
+        raise InputError(f"{error.strerror}; give a .cfg file") from None
     except ValueError:
-        raise InputError(f"profile '{path}' is larger than 1 MB: it is no .cfg file") from None
+        raise InputError("it is larger than 1 MB, and no .cfg file") from None
     found: dict[str, list[_Line]] = {}
     unknown: dict[str, int] = {}
     processing: dict[str, int] = {}
@@ -279,9 +277,9 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
         if command == "flushCfg":
             found.clear()
         if command in _REFUSED:
-            _Line(path, number, ()).refuse(_REFUSED[command])
+            _Line(number, ()).refuse(_REFUSED[command])
         if command in _COUNTS:
-            found.setdefault(command, []).append(_line(path, number, command, words))
+            found.setdefault(command, []).append(_line(number, command, words))
         elif command in _PROCESSING:
             if command not in _SWITCHES or not words or words[-1] not in ("0", "0.0"):
                 processing.setdefault(command, number)
@@ -292,21 +290,19 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
         listed.append(f"{name} (line {n}; {_PROCESSING[name]})")
     if listed:
         text = ", ".join(listed)
-        warnings.warn(
-            f"profile '{path}': what these lines say is not read: "
-            f"{text if len(text) <= 700 else text[:697] + '...'}",
-            ValidityWarning,
-            stacklevel=4,
+        _warn(
+            path,
+            f"what these lines say is not read: {text if len(text) <= 700 else text[:697] + '...'}",
         )
     return found, platform
 
 
-def _line(path: Path, number: int, command: str, words: Sequence[str]) -> _Line:
+def _line(number: int, command: str, words: Sequence[str]) -> _Line:
     """Read the values of a command."""
     counts = _COUNTS[command]
     if len(words) not in counts:
         allowed = " or ".join(map(str, counts))
-        _Line(path, number, ()).refuse(f"{command} has {len(words)} values, not {allowed}")
+        _Line(number, ()).refuse(f"{command} has {len(words)} values, not {allowed}")
     values = []
     for word in words:
         try:
@@ -314,9 +310,9 @@ def _line(path: Path, number: int, command: str, words: Sequence[str]) -> _Line:
         except (ValueError, OverflowError):
             value = math.nan
         if not abs(value) < 1e15:
-            _Line(path, number, ()).refuse(f"{command} has {brief(word)}, which is no number")
+            _Line(number, ()).refuse(f"{command} has {brief(word)}, which is no number")
         values.append(value)
-    return _Line(path, number, tuple(values))
+    return _Line(number, tuple(values))
 
 
 class _Sequence(NamedTuple):
@@ -328,7 +324,9 @@ class _Sequence(NamedTuple):
     multiplexing: Literal["tdm", "ddm", "bpm"]
 
 
-def _sequence(commands: dict[str, list[_Line]], frame: _Line, channels: _Line) -> _Sequence:
+def _sequence(
+    path: Path, commands: dict[str, list[_Line]], frame: _Line, channels: _Line
+) -> _Sequence:
     chirps: dict[int, _Line] = {}
     for line in commands["chirpCfg"]:
         first = line.whole(0, 0, _MOST_CHIRPS - 1, "the first chirp")
@@ -356,7 +354,7 @@ def _sequence(commands: dict[str, list[_Line]], frame: _Line, channels: _Line) -
     profile = matching[-1]
     signs = commands.get("bpmCfg", [])
     if signs and signs[-1].values[0 if len(signs[-1].values) == 3 else 1]:
-        order, multiplexing = _with_signs(masks, first, signs[-1])
+        order, multiplexing = _with_signs(path, masks, first, signs[-1])
     elif all(mask.bit_count() == 1 for mask in masks):
         order, multiplexing = [mask.bit_length() - 1 for mask in masks], "tdm"
     elif "ddmPhaseShiftAntOrder" in commands and len(set(masks)) == 1:
@@ -378,7 +376,7 @@ def _sequence(commands: dict[str, list[_Line]], frame: _Line, channels: _Line) -
 
 
 def _with_signs(
-    masks: Sequence[int], first: int, line: _Line
+    path: Path, masks: Sequence[int], first: int, line: _Line
 ) -> tuple[list[int], Literal["tdm", "bpm"]]:
     """Tx of each chirp where two of the chirps are sent by two Tx, with signs + + and + -."""
     chirps = [int(value) - first for value in line.values[-2:]]
@@ -398,12 +396,11 @@ def _with_signs(
         line.refuse("several Tx transmit in a chirp that bpmCfg does not name")
     if not others and chirps == [0, 1]:
         return order, "bpm"
-    warnings.warn(
-        f"profile '{line.path}', line {line.number}: Tx {members[0] + 1} and {members[1] + 1} "
+    _warn(
+        path,
+        f"line {line.number}: Tx {members[0] + 1} and {members[1] + 1} "
         "transmit together with signs of their own (BPM); here each has a chirp of its own, and 3 "
         "dB less signal over noise",
-        ValidityWarning,
-        stacklevel=6,
     )
     return order, "tdm"
 
@@ -420,22 +417,21 @@ def _board(
         board = _BOARDS.get(platform.lower())
         if board is None:
             raise InputError(
-                f"profile '{path}' is for platform {brief(platform)[1:-1]}, whose antennas are not "
+                f"it is for platform {brief(platform)[1:-1]}, whose antennas are not "
                 f"known; name a board (board, --board), or one of: % Platform:{', '.join(_BOARDS)}"
             )
         low, high = (57, 64) if "6843" in board or "6432" in board else (76, 81)
         if not low <= start_ghz <= high:
             raise InputError(
-                f"profile '{path}' is for platform {brief(platform)[1:-1]} of {low} to {high} GHz, "
+                f"it is for platform {brief(platform)[1:-1]} of {low} to {high} GHz, "
                 f"and starts at {start_ghz:g} GHz; mend one of both, or name a board (--board)"
             )
         return board
     board = "iwr6843" if start_ghz < 70 else "iwr1843"
-    warnings.warn(
-        f"profile '{path}' names no board: the antennas are those of {board}; another is named by "
+    _warn(
+        path,
+        f"it names no board: the antennas are those of {board}; another is named by "
         "--board, or in the file by a line such as % Platform:xWR14xx",
-        ValidityWarning,
-        stacklevel=5,
     )
     return board
 

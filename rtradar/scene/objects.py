@@ -28,7 +28,7 @@ ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
 """Limits of the size of furniture along its longest axis [m]."""
 
-_BOX = Annotated[
+BOX = Annotated[
     Vector,
     Limits(
         SMALLEST_M, LARGEST_M, f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
@@ -328,7 +328,7 @@ class Furniture:
         where = self._where
         check_fields(self, f"{where}: ")
         if isinstance(self.mesh, list | tuple):
-            lengths = read_value(_BOX, f"{where}: ", "box", self.mesh)
+            lengths = read_value(BOX, f"{where}: ", "box", self.mesh)
             object.__setattr__(self, "mesh", lengths)
         if not self._settled and not isinstance(self.mesh, str | Path):
             raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be a name or a file")
@@ -336,6 +336,11 @@ class Furniture:
             raise InputError(
                 f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
                 f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
+            )
+        if not self._settled and self.path.suffix.lower() not in MESH_ENDINGS:
+            raise InputError(
+                f"{where}: mesh = {brief(self.path.name)}; allowed endings: "
+                f"{', '.join(MESH_ENDINGS)}"
             )
         if self._settled:
             if self.metres_per_unit is not None or self.sheet:

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.recordings import SAID, SYNTHETIC, said_of
-from rtradar.settings import Breathing
 from rtradar.system.checks import (
     Table,
     brief,
     check_keys,
     check_number,
-    check_text,
     table_at,
     tables_at,
 )
-from rtradar.system.fields import read_table
+from rtradar.system.fields import read_value
 
 if TYPE_CHECKING:
     from rtradar.body import Person
@@ -31,18 +28,6 @@ KEYS += " seed duration_s traits"
 _OF_ACTORS = ("seed", "duration_s", "traits")
 _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 """How long a synthetic actor moves by default, and at most [s]."""
-
-
-def checked(where: str, people: Iterable[Person]) -> tuple[Person, ...]:
-    """Return the people of a scene as a tuple; InputError if one is none."""
-    given: object = people
-    found: tuple[Any, ...] = tuple(people) if isinstance(given, Iterable) else (None,)
-    if found:
-        from rtradar.body import Person  # which takes long to import
-
-        if not all(isinstance(one, Person) for one in found):
-            raise InputError(f"{where}: people must be a tuple of Person")
-    return found
 
 
 def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
@@ -75,15 +60,10 @@ def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
         own = {
             key: value
             for key, value in entry.items()
-            if key not in ("motion", "skeleton", "breathing", *SAID, *_OF_ACTORS)
+            if key not in ("motion", "skeleton", *SAID, *_OF_ACTORS)
         }
-        try:
-            if "breathing" in entry:
-                breath = table_at("breathing", entry)
-                own["breathing"] = read_table(Breathing, "breathing: ", breath)
+        with prefixed(where):
             found.append(Person(_motion(entry, folder), **own))
-        except InputError as error:
-            raise InputError(f"{where}{error}") from None
     return tuple(found)
 
 
@@ -92,7 +72,7 @@ def _motion(entry: Table, folder: Path) -> Motion:
 
     if isinstance(entry["motion"], Motion):
         return entry["motion"]
-    name = check_text("person", "motion", entry["motion"])
+    name = read_value(str, "person: ", "motion", entry["motion"])
     if name.startswith(SYNTHETIC):
         for key in ("skeleton", *SAID):
             if key in entry:
@@ -109,7 +89,7 @@ def _motion(entry: Table, folder: Path) -> Motion:
         if key in entry:
             raise InputError(f"{key} = {brief(entry[key])}: only a synthetic actor has it")
     paths = {
-        key: folder / check_text("people", key, entry[key])
+        key: folder / read_value(str, "people: ", key, entry[key])
         for key in ("motion", "skeleton")
         if key in entry
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -14,15 +14,14 @@ import numpy as np
 
 from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar import Radar
 from rtradar.radar.array import UsualPlace
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene import display, people
 from rtradar.scene.materials import MATERIALS, Material, own_material
-from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.moving import Object, motion_of
-from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
+from rtradar.scene.objects import BOX, ROOM_SIDES, Furniture, Surface, Wall, room_walls
 from rtradar.scene.random_rooms import (
     FURNITURE,
     HEIGHT_M,
@@ -36,13 +35,20 @@ from rtradar.system.checks import (
     Vector,
     brief,
     check_keys,
-    check_text,
     inside,
     printable,
     table_at,
     tables_at,
 )
-from rtradar.system.fields import Angle, Limits, MaybeEmpty, Point, check_fields
+from rtradar.system.fields import (
+    Angle,
+    Limits,
+    MaybeEmpty,
+    Point,
+    check_fields,
+    keys_of,
+    read_value,
+)
 from rtradar.system.registries import RANDOM_SCENE, scene_table
 
 if TYPE_CHECKING:
@@ -52,33 +58,26 @@ if TYPE_CHECKING:
 
 Piece = TypeVar("Piece", Wall, Furniture, Object)
 
+_ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
+
+
+def _of_mesh(kind: type, *needed: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    own, others = keys_of(kind, without=("mesh", *needed))
+    return (*own, *needed), ("mesh", "box", *others)
+
+
 KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    table: (tuple(needed.split()), tuple(others.split()))
-    for table, needed, others in (
-        ("top", "", "name description"),
-        ("[random]", "seed", " ".join(RANDOM)),
-        ("[radar]", "", "position_m yaw_deg pitch_deg roll_deg"),
-        ("[person]", "", "position_m heading_deg"),
-        ("[room]", "size_m corner_m", ""),
-        ("a side of a room", "material thickness_m", "roughness_m openings"),
-        (
-            "[[walls]]",
-            "name corner_m edge_u_m edge_v_m material thickness_m",
-            "roughness_m openings",
-        ),
-        (
-            "[[furniture]]",
-            "name material position_m",
-            "mesh box yaw_deg scale metres_per_unit sheet",
-        ),
-        (
-            "[[objects]]",
-            "name material motion",
-            "mesh box position_m pivot_m yaw_deg scale metres_per_unit sheet",
-        ),
-        ("[[people]]", "motion", people.KEYS),
-        ("[materials.NAME]", "source low_hz high_hz a", "b c d"),
-    )
+    "top": ((), ("name", "description")),
+    "[random]": (("seed",), tuple(RANDOM)),
+    "[radar]": ((), ("position_m", *_ANGLES)),
+    "[person]": ((), ("position_m", "heading_deg")),
+    "[room]": (("size_m", "corner_m"), ()),
+    "a side of a room": keys_of(Surface),
+    "[[walls]]": keys_of(Wall),
+    "[[furniture]]": _of_mesh(Furniture),
+    "[[objects]]": _of_mesh(Object, "motion"),
+    "[[people]]": (("motion",), tuple(people.KEYS.split())),
+    "[materials.NAME]": (("source", "low_hz", "high_hz", "a"), ("b", "c", "d")),
 }
 """Keys of each table of a scene file: those that must be given, and the others."""
 
@@ -162,7 +161,11 @@ class Scene:
                 raise InputError(
                     f"{where}{key} has two of the name '{twice[0]}'; give each its own"
                 )
-        object.__setattr__(self, "people", people.checked(where.rstrip(": "), self.people))
+        if self.people:
+            from rtradar.body import Person  # which takes long to import
+
+            if not all(isinstance(one, Person) for one in self.people):
+                raise InputError(f"{where}people must be a tuple of Person")
 
     def __repr__(self) -> str:
         return text_card("Scene", self.name, display.brief_rows(self))
@@ -210,10 +213,8 @@ class Scene:
           materials    plasterboard, wood, chipboard, metal
         """
         path, table = scene_table(source)
-        try:
+        with prefixed(f"scene file '{path}': "):
             return cls.of_table({"name": printable(path.stem), **rooted(table, path.parent)})
-        except InputError as error:
-            raise InputError(f"scene file '{path}': {error}") from None
 
     @classmethod
     def of_table(cls, table: Table) -> Scene:
@@ -358,10 +359,8 @@ class Scene:
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
         for part in self._parts:
-            try:
+            with prefixed(f"scene '{self.name}', {part.name}: "):
                 part.material.eta(sweep)
-            except InputError as error:
-                raise InputError(f"scene '{self.name}', {part.name}: {error}") from None
         for wall in self.walls:
             if wall.holds(antennas).any():
                 raise InputError(
@@ -439,9 +438,6 @@ class Scene:
         return bool((np.asarray(place) < low).any() or (np.asarray(place) > high).any())
 
 
-_ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
-
-
 def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield where a table of a scene names files, under which key, and the table of that key."""
     for list_, keys in (("furniture", ("mesh",)), ("objects", ("mesh",)), ("people", _FILES)):
@@ -511,7 +507,7 @@ def _fields(table: Table) -> dict[str, Any]:
 def _own_materials(table: Table) -> dict[str, Material]:
     found = {}
     for name in table:
-        check_text("[materials]", "a name", name)
+        read_value(str, "[materials] ", "a name", name)
         constants = table_at(name, table, "materials.")
         check_keys(f"[materials.{name}] ", constants, *KEYS["[materials.NAME]"])
         found[name] = own_material(name, **constants)
@@ -548,7 +544,7 @@ def _pieces(
             own["mesh"] = _shape(where, entry)
             entry = {name: value for name, value in entry.items() if name != "box"}
         chosen = _material(where, entry["material"], materials)
-        with _prefixed(where):
+        with prefixed(where):
             if "motion" in entry:
                 own["motion"] = motion_of(entry["motion"])
             found.append(kind(**{**entry, **own, "material": chosen}))
@@ -557,26 +553,11 @@ def _pieces(
 
 def _shape(where: str, entry: Table) -> Any:
     """Return the mesh of an entry, or the lengths of its box."""
-    if "box" not in entry:
-        if "mesh" not in entry:
-            raise InputError(f"{where}mesh is missing; give a mesh, or box = [x, y, z] in metres")
-        return _mesh(where, entry["mesh"])
+    if ("mesh" in entry) == ("box" in entry):
+        raise InputError(f"{where}give a mesh, or box = [x, y, z] in metres, one of them")
     if "mesh" in entry:
-        raise InputError(f"{where}mesh and box are given; leave one out")
-    if not isinstance(entry["box"], list):
-        raise InputError(f"{where}box = {brief(entry['box'])}; it must be [x, y, z] in metres")
-    return entry["box"]
-
-
-def _mesh(where: str, value: object) -> str | Path:
-    """Check a mesh: a name, or the path of a file."""
-    text = check_text(where.strip(), "mesh", value)
-    if not Path(text).suffix:
-        return text
-    if Path(text).suffix.lower() not in MESH_ENDINGS:
-        name = brief(Path(text).name)
-        raise InputError(f"{where}mesh = {name}; allowed endings: {', '.join(MESH_ENDINGS)}")
-    return Path(text)
+        return read_value(str, where, "mesh", entry["mesh"])
+    return read_value(BOX, where, "box", entry["box"])
 
 
 def _material(where: str, value: object, materials: Mapping[str, Material]) -> Material:
@@ -587,11 +568,3 @@ def _material(where: str, value: object, materials: Mapping[str, Material]) -> M
             "[materials.NAME] of your own"
         )
     return materials[value]
-
-
-@contextmanager
-def _prefixed(where: str) -> Iterator[None]:
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{where}{error}") from None

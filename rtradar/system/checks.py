@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
@@ -78,34 +78,6 @@ def check_number(where: str, key: str, value: object, least: float, most: float)
             f"{where}: {key} = {brief(value)}; it must be a number from {least:g} to {most:g}"
         )
     return number
-
-
-def check_vector(
-    where: str, key: str, value: object, size: int, most: float = 1000.0
-) -> tuple[float, ...]:
-    """Return ``size`` finite numbers of magnitude up to ``most`` as a tuple of floats."""
-    import numpy as np  # a refusal on the command line does not need it
-
-    if (
-        isinstance(value, Sequence | np.ndarray)
-        and not isinstance(value, str | bytes)
-        and len(value) == size
-    ):
-        numbers = [
-            number for number in map(_number, value) if number is not None and abs(number) <= most
-        ]
-        if len(numbers) == size:
-            return tuple(numbers)
-    raise InputError(
-        f"{where}: {key} = {brief(value)}; it must be {size} numbers from {-most:g} to {most:g}"
-    )
-
-
-def check_text(where: str, key: str, value: object) -> str:
-    """Return a text of one line, not empty."""
-    if isinstance(value, str) and value.strip() and value.isprintable():
-        return value
-    raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
 
 
 def check_path(what: str, value: object, *, or_name: bool = False) -> Path:

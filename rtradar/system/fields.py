@@ -10,6 +10,7 @@ other class, and unions of these. What fields must be to each other is left to t
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -168,91 +169,71 @@ def _rule(hint: Any, limits: Limits | None = None) -> Rule:
         given = [one for one in args[1:] if isinstance(one, Limits)]
         return _rule(args[0], given[0] if given else limits)
     bounds = limits or Limits()
+    allowed = args if own is Literal else bounds.allowed
     if own in (Union, UnionType):
         found = _any_of(
             [_rule(one, limits) for one in args if one is not NoneType], NoneType in args
         )
     elif own is tuple:
         found = _list_of(args, limits)
-    elif own is float:
-        found = Rule(_numbers(is_real, bounds, float), _range("a number", bounds))
-    elif own is int:
-        found = Rule(_numbers(is_whole, bounds, int), _range("a whole number", bounds))
-    elif own in _READERS:
-        found = Rule(*_READERS[own](bounds, args))
-    elif dataclasses.is_dataclass(own) and isinstance(own, type):
+    elif own in (float, int):
+        found = _number(own, bounds)
+    elif own is bool:
+        found = _where(
+            lambda value: type(value).__name__ in ("bool", "bool_"),
+            "it must be true or false",
+            bool,
+        )
+    elif allowed:
+        found = _where(
+            lambda value: isinstance(value, str) and value in allowed,
+            f"allowed: {', '.join(allowed)}",
+        )
+    elif own is str:
+        found = _where(
+            lambda value: (
+                isinstance(value, str)
+                and value.isprintable()
+                and (bounds.may_be_empty or bool(value.strip()))
+            ),
+            "it must be a string of one line, not empty",
+        )
+    elif dataclasses.is_dataclass(own):
         found = _table_of(own)
     else:
-        found = Rule(
-            lambda value: value if own is Any else _tested(isinstance(value, own), value),
+        found = _where(
+            lambda value: own is Any or isinstance(value, own),
             f"it must be a {getattr(own, '__name__', own)}",
         )
     return found._replace(wanted=bounds.wanted or found.wanted)
 
 
-def _tested(right: bool, value: Any) -> Any:
-    if not right:
-        raise ValueError
-    return value
-
-
-def _range(noun: str, limits: Limits) -> str:
-    if -limits.least == limits.most == _FINITE:
-        return f"it must be {noun}"
-    return f"it must be {noun} from {_shown(limits.least)} to {_shown(limits.most)}"
-
-
-def _shown(limit: float) -> str:
-    return f"{limit}" if isinstance(limit, int) else f"{limit:g}"
-
-
-def _numbers(
-    right: Callable[[object], bool], limits: Limits, convert: type
-) -> Callable[[Any], Any]:
-    least, most = limits.least, limits.most
+def _where(
+    allows: Callable[[Any], bool], wanted: str, convert: Callable[[Any], Any] | None = None
+) -> Rule:
+    """Make the rule that a value passes a test."""
 
     def read(value: Any) -> Any:
-        if not right(value) or not least <= value <= most:
+        if not allows(value):
             raise ValueError
+        return value if convert is None else convert(value)
+
+    return Rule(read, wanted)
+
+
+def _number(kind: type, limits: Limits) -> Rule:
+    least, most, whole = limits.least, limits.most, kind is int
+    right = is_whole if whole else is_real
+    wanted = f"it must be a {'whole ' * whole}number"
+    if (least, most) != (-_FINITE, _FINITE):
+        low, high = (f"{one}" if isinstance(one, int) else f"{one:g}" for one in (least, most))
+        wanted += f" from {low} to {high}"
+    return _where(
+        lambda value: right(value) and least <= value <= most,
+        wanted,
         # A kind of int stays what it is.
-        return value if isinstance(value, convert) else convert(value)
-
-    return read
-
-
-def _truth(_: Limits, __: Any) -> tuple[Callable[[Any], Any], str]:
-    return (
-        lambda value: bool(_tested(type(value).__name__ in ("bool", "bool_"), value)),
-        "it must be true or false",
+        lambda value: value if whole and isinstance(value, int) else kind(value),
     )
-
-
-def _line(limits: Limits, _: Any) -> tuple[Callable[[Any], Any], str]:
-    if limits.allowed:
-        return _choice(limits, limits.allowed)
-    return (
-        lambda value: _tested(
-            isinstance(value, str)
-            and value.isprintable()
-            and (limits.may_be_empty or bool(value.strip())),
-            value,
-        ),
-        "it must be a string of one line, not empty",
-    )
-
-
-def _choice(_: Limits, allowed: Any) -> tuple[Callable[[Any], Any], str]:
-    return (
-        lambda value: _tested(isinstance(value, str) and value in allowed, value),
-        f"allowed: {', '.join(allowed)}",
-    )
-
-
-_READERS: Mapping[Any, Callable[[Limits, Any], tuple[Callable[[Any], Any], str]]] = {
-    bool: _truth,
-    str: _line,
-    Literal: _choice,
-}
 
 
 def _any_of(rules: Sequence[Rule], or_none: bool) -> Rule:
@@ -279,13 +260,14 @@ def _list_of(args: tuple[Any, ...], limits: Limits | None) -> Rule:
     least, most = (limits or Limits()).counts if even else (len(args), len(args))
 
     def read(value: Any) -> Any:
-        listed = isinstance(value, Sequence | Iterator) and not isinstance(value, str | bytes)
-        if not listed and not hasattr(value, "tolist"):  # which an array of NumPy has
+        own = value.tolist() if hasattr(value, "tolist") else value  # an array of NumPy
+        if not isinstance(own, Sequence | Iterator) or isinstance(own, str | bytes):
             raise ValueError
-        own = tuple(value if listed else _tested(value.ndim > 0, value))
+        own = tuple(own)
         if not least <= len(own) <= most:
             raise ValueError
-        found = tuple(map(rules[0].read, own) if even else map(_read_by, rules, own))
+        each = itertools.repeat(rules[0]) if even else rules
+        found = tuple(rule.read(one) for rule, one in zip(each, own, strict=False))
         if limits and limits.rising and sorted(found) != list(found):
             raise ValueError
         # A kind of tuple stays what it is.
@@ -296,14 +278,9 @@ def _list_of(args: tuple[Any, ...], limits: Limits | None) -> Rule:
     return Rule(read, f"it must be {several} {each.replace('number', 'numbers')}")
 
 
-def _read_by(rule: Rule, value: Any) -> Any:
-    return rule.read(value)
-
-
 def _table_of(kind: type) -> Rule:
-    def read(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return read_table(kind, "", value)
-        return _tested(isinstance(value, kind), value)
-
-    return Rule(read, f"it must be a table of the fields of {kind.__name__}")
+    return _where(
+        lambda value: isinstance(value, Mapping | kind),
+        f"it must be a table of the fields of {kind.__name__}",
+        lambda value: read_table(kind, "", value) if isinstance(value, Mapping) else value,
+    )

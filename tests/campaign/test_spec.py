@@ -168,18 +168,11 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         ("", "neither [[synthetic]] nor [[recordings]]"),
         ("colour = 1" + SMALL, "unknown key 'colour' (did you mean clouds?); allowed: seed, pfa"),
         ("seed = 1.5" + SMALL, "seed = 1.5; it must be a whole number"),
-        ("seed = true" + SMALL, "seed = True; it must be a whole number"),
         ("pfa = 2" + SMALL, "pfa = 2; it must be a number"),
         ('clutter_removal = "magic"' + SMALL, "clutter_removal = 'magic'; allowed: none, mean"),
         ("detector = 'eye'" + SMALL, "detector 'eye' is unknown; allowed: os-cfar"),
-        ("body_material = 'wood'" + SMALL, "body_material = 'wood'; allowed: perfect-conductor"),
         ("range_window = 'square'" + SMALL, "range window 'square' is unknown; allowed: "),
         ("doppler_window = [1, 2]" + SMALL, "doppler_window = [1, 2]; it must be a name"),
-        (
-            "order = 4" + SMALL,
-            "order = 4; it must be a whole number from 0 to 3",
-        ),
-        ("keep_all = 1" + SMALL, "keep_all = 1; it must be true or false"),
         ("windows = 3", "windows = 3; it must be a table"),
         (SMALL + "colour = 1", "[[synthetic]] number 1 unknown key 'colour'"),
         (SMALL + "seeds = [1]", "give count or seeds, one of them"),
@@ -189,7 +182,6 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             SMALL.replace("count = 3", "seeds = [1, 1]"),
             "seeds = [1, 1]; it must be a list of different whole numbers",
         ),
-        (SMALL.replace("count = 3", 'seeds = ["a"]'), "seeds = 'a'; it must be a whole number"),
         (
             SMALL.replace("walk", "dance"),
             f"label = 'dance' is unknown; allowed: {', '.join(ACTIVITIES)}",
@@ -227,25 +219,12 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             "[each] fidelity 'perfect' is unknown; allowed: analytic-paper",
         ),
         (SMALL + "[each]\nsnr_db = [1, 1]", "a value is given twice"),
-        (SMALL + "[each]\nsnr_db = ['loud']", "snr_db = 'loud'; it must be a number"),
-        (
-            SMALL + "[each]\nperson_position_m = [[0]]",
-            "person_position_m = [0]; it must be 2 numbers",
-        ),
         (
             SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]",
             "snr_db is under [each] and under [drawn]",
         ),
         (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
         (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range [least, most]"),
-        (
-            SMALL + "[drawn]\ntempo = [1.2, 0.8]",
-            "[drawn] tempo = [1.2, 0.8]; it must be a range [least, most]",
-        ),
-        (
-            SMALL + "[drawn]\ntempo = [1.2, 9]",
-            "[drawn] tempo = [1.2, 9]; it must be a range [least, most] of numbers from 0.4 to 2",
-        ),
         (RECORDING, "[[recordings]] number 1 file = 'walk.bvh': there is no such file"),
         (
             RECORDING.replace("licence", "license"),
@@ -256,10 +235,6 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (RECORDING.replace("walk.bvh", "*.bvh"), "file = '*.bvh' matches no file in"),
         (RECORDING.replace("walk.bvh", "../*.bvh"), "file = '../*.bvh' leaves the folder"),
         (RECORDING.replace("walk.bvh", "*" * 11), "10 wildcards are allowed"),
-        (
-            RECORDING.replace('"her"', "7"),
-            "[[recordings]] number 1 subject = 7; it must be a string",
-        ),
         ('folder = "none"' + SMALL, "folder = 'none': there is no such folder"),
         ('folder = "${RTRADAR_NOWHERE}"' + SMALL, "the environment has no such variable"),
         ("[", "is not TOML"),
