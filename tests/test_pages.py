@@ -109,12 +109,11 @@ def limit_names() -> set[str]:
 
 def flags() -> dict[str, str]:
     """Option of each setting of a run."""
-    settings = RunSettings.__dataclass_fields__
     actions = options_of_run()._option_string_actions.items()
     return {
-        action.dest: flag
+        action.dest.removeprefix("settings."): flag
         for flag, action in actions
-        if action.dest in settings and not flag.startswith("--no-")
+        if re.fullmatch(r"settings\.\w+", action.dest) and not flag.startswith("--no-")
     }
 
 

@@ -11,7 +11,7 @@ from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import say, show_page
+from rtradar.cli.values import say, settings_in, show_page
 from rtradar.errors import InputError
 from rtradar.recordings import SYNTHETIC
 
@@ -42,12 +42,13 @@ def _choose_as_paper(options: argparse.Namespace) -> None:
 
     defaults = RunSettings()
     for name, value in AS_PAPER.items():
-        given, default = getattr(options, name, None), getattr(defaults, name)
+        key, default = f"settings.{name}", getattr(defaults, name)
+        given = vars(options).get(key)
         if given and given not in (default, value):
             raise InputError(
                 f"--as-paper sets {name} = {value!r}, and {given!r} is given; leave one of both out"
             )
-        setattr(options, name, value)
+        setattr(options, key, value)
     if not options.quiet:
         for text in paper_warnings():
             print(f"rtradar: warning: {text}", file=sys.stderr)
@@ -151,9 +152,7 @@ def _tables(options: argparse.Namespace, alone: bool = False) -> tuple[Mapping[s
     from rtradar.settings import RunSettings
     from rtradar.system.registries import radar_table, scene_table
 
-    given = vars(options)
-    names = [field.name for field in dataclasses.fields(RunSettings) if field.name in given]
-    settings = {name: given[name] for name in names}
+    settings = settings_in(options)
     # What is wrong is refused before anything slow is imported.
     RunSettings(**settings)
     for source, look_up in ((options.radar, radar_table), (options.scene, scene_table)):
@@ -164,7 +163,7 @@ def _tables(options: argparse.Namespace, alone: bool = False) -> tuple[Mapping[s
     from rtradar.description import read_run_file, settings_of_table, with_value
 
     table = read_run_file(run_file, changed=options.changed) if run_file else {}
-    for key, value in _described(options, settings):
+    for key, value in _described(options):
         table = with_value(table, key, value)
     several = _several(options)
     once = [own for own in options.set if own[0] not in several]
@@ -208,34 +207,18 @@ def _run_file(options: argparse.Namespace) -> Path | None:
     return files[0] if files else None
 
 
-def _described(
-    options: argparse.Namespace, settings: Mapping[str, Any]
-) -> Iterator[tuple[str, Any]]:
+def _described(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
     """Yield keys of a run file and the values that options give them."""
-    for name, value in settings.items():
-        if dataclasses.is_dataclass(value) and not isinstance(value, type):
-            value = dataclasses.asdict(value)
-        if name != "model_options":
-            yield f"settings.{name}", value
-    tolerances = {
-        name: getattr(options, name, None) for name in ("tolerance_db", "tolerance_complex")
-    }
-    for name, value in (*settings.get("model_options", ()), *tolerances.items()):
-        if value is not None:
-            yield f"settings.model_options.{name}", value
     for table in ("radar", "scene"):
         if (source := getattr(options, table)) is not None:
             # From here, not from the folder of a run file.
             own = str(Path(source).absolute()) if Path(source).suffix else source
             yield table, {"base": own}
-    pose = {f"{name}_deg": getattr(options, name) for name in ("yaw", "pitch", "roll")}
-    for key, value in {
-        "board": options.board,
-        "position_m": options.radar_position,
-        **pose,
-    }.items():
-        if value is not None:
-            yield f"radar.{key}", value
+    for key, value in vars(options).items():
+        if key == "settings.model_options":
+            yield from ((f"{key}.{name}", own) for name, own in value)
+        elif "." in key:
+            yield key, vars(value) if dataclasses.is_dataclass(value) else value
 
 
 def _checked_people(options: argparse.Namespace, alone: bool) -> dict[str, Path]:

@@ -129,7 +129,7 @@ class OneLineParser(argparse.ArgumentParser):
                 noun, registry = _NAMED[name]
                 text = f"{noun}: {', '.join(registry)}"
             # What is not given is left to the run file.
-            how: dict[str, Any] = {"default": argparse.SUPPRESS, "dest": name}
+            how: dict[str, Any] = {"default": argparse.SUPPRESS, "dest": f"settings.{name}"}
             if default is False:
                 how["action"] = "store_true"
             else:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rtradar.cli.captures import tell
+from rtradar.cli.values import settings_in
 from rtradar.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,10 +61,9 @@ def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca100
 
 def process(options: argparse.Namespace) -> Mapping[str, Any]:
     """Do ``rtradar process``."""
-    from rtradar.settings import ProcessingOptions, RunSettings
+    from rtradar.settings import RunSettings
 
-    given = vars(options)
-    settings = {name: given[name] for name in ProcessingOptions.__annotations__ if name in given}
+    settings = settings_in(options)
     RunSettings(**settings)  # refuses what is wrong before anything slow is imported
     from rtradar.exchange import open_samples
 

@@ -24,6 +24,12 @@ def say(options: argparse.Namespace, text: str) -> None:
         print(text)
 
 
+def settings_in(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of a run that are given."""
+    keys = {key: key.removeprefix("settings.") for key in vars(options) if key.count(".") == 1}
+    return {name: vars(options)[key] for key, name in keys.items() if name != key}
+
+
 def show_page(page: Path) -> None:
     """Open a page in the browser, or say that there is none."""
     import webbrowser
