@@ -18,8 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import at_nodes
 from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
 from rtradar.scatter.common.poses import EchoModel
-from rtradar.scatter.inside_people import InsidePeople
-from rtradar.scatter.inside_solids import Inside
+from rtradar.scatter.inside import Inside
 from rtradar.scatter.validity import (
     Limit,
     folded_angle_deg,
@@ -78,7 +77,7 @@ def link_budget(
     """
     chirps = chirps_by_steps(radar, n_chirps, keyframe_step(radar))
     powers, fields = FileBackedRows(), FileBackedRows()
-    solid, others = Inside(scene or Scene(), body.part_names, body.owner), InsidePeople(body)
+    others = Inside(scene or Scene(), body)
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts = np.zeros(len(body.part_names), dtype=bool)
     ever_sampled = np.zeros(len(body.names), dtype=bool)
@@ -92,8 +91,7 @@ def link_budget(
         by_part = _by_part(echoes, len(body.part_names))
         powers.append(by_part)
         fields.append(_field(echoes, radar.centre_frequency_hz).view(np.float64))
-        for look in (solid.look, others.look):
-            look(times, body.at(times), by_part)
+        others.look(times, body.at(times), by_part)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
         concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
         small = by_part * small_curvature(radar, body, times)
@@ -111,7 +109,7 @@ def link_budget(
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
     power = float(power_at.sum())
     person_power = np.bincount(body.owner, weights=power_at.mean(axis=0)).tolist()
-    in_solids = [*solid.found(power_at.sum(axis=0)), *others.found()]
+    in_others = others.found(power_at.sum(axis=0))
     release_pages(power_at)
     field_at = fields.rows().view(np.complex128)
     kept = part_power, tuple(person_power), radar.centres_of(chirps), power_at, field_at
@@ -120,7 +118,7 @@ def link_budget(
     names = [name for name, small in zip(body.part_names, small_parts, strict=True) if small]
     messages = _messages(radar, names)
     found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
-    limits = tuple(Limit(name, own / power, text) for name, own, text in [*found, *in_solids])
+    limits = tuple(Limit(name, own / power, text) for name, own, text in [*found, *in_others])
     for limit in limits:
         warn_of(limit)
     return LinkBudget(power / len(chirps), True, *kept, limits)

@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scatter.echo_models import build_model, takes_backend
-from rtradar.scatter.inside_solids import objects_inside
+from rtradar.scatter.inside import objects_inside
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel

@@ -1,10 +1,11 @@
-"""What is inside of what is solid: body parts in walls, furniture and objects, and objects."""
+"""What is inside of what: body parts in walls, furniture, objects and other people, and objects."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.scatter.validity import Limit
@@ -15,6 +16,10 @@ REFUSED_FRACTION = 0.05
 """A part that sends more than this of the person's echo power must not be inside a wall."""
 
 _PELVIS = ("left hip", "right hip", "lower torso")
+"""Parts that must not be inside a wall."""
+
+_TRUNK = (*_PELVIS, "middle torso", "upper torso", "neck", "head")
+"""Parts that must not be inside another person; hands and feet may touch."""
 
 _CONTACT_M = 0.02
 """Depth up to which the centre of a part touches a wall [m]: hands and feet in recordings do."""
@@ -32,45 +37,73 @@ _SHRUNK = 0.99
 """Size of an object whose places are looked for: what touches is not inside."""
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 class Inside:
-    """Record of which parts were inside walls, furniture and objects over a capture."""
+    """Record of which parts were inside what else over a capture.
 
-    def __init__(self, scene: Scene, part_names: tuple[str, ...], owner: Indices) -> None:
-        self._scene, self._names, self._owner = scene, part_names, owner
+    Things are the walls of the scene, closed furniture, closed objects, and people, in this order.
+    """
+
+    def __init__(self, scene: Scene, body: Body) -> None:
+        self._scene, self._names, self._owner = scene, body.part_names, body.owner
+        self._trunk, self._pelvis = (
+            np.array([name.endswith(ends) for name in body.part_names])
+            for ends in (_TRUNK, _PELVIS)
+        )
         pieces = (*scene.furniture, *scene.objects)
         self._solids = [one for piece in pieces if (one := _Solid(piece)).mesh.closed]
-        self._still = sum(one.moving is None for one in self._solids)
-        things = len(scene.walls) + len(self._solids)
-        self._first_s = np.full((things, len(part_names)), np.inf)
-        self._power = np.zeros((things, len(part_names)))
+        # Who is alone is inside nobody else.
+        people = body.names if len(body.names) > 1 else ()
+        every = [wall.name for wall in scene.walls], [one.name for one in self._solids], people
+        self._things = [name for names in every for name in names]
+        self._people = range(len(self._things) - len(people), len(self._things))
+        self._first_s = np.full((len(self._things), len(self._names)), np.inf)
+        self._power = np.zeros(self._first_s.shape)
         self._instant = 0
 
     def look(self, times: Array, poses: Poses, power: Array) -> None:
         """Test the next instants.
 
         Given are the times (time,) [s], the body's poses, and its echo power (time, part) [m^2]. An
-        `InputError` is raised if the pelvis is inside a wall.
+        `InputError` is raised if the pelvis is inside a wall, or someone's trunk in another's.
         """
-        pelvis = [part for part, name in enumerate(self._names) if name.endswith(_PELVIS)]
+        walls = len(self._scene.walls)
         for number, wall in enumerate(self._scene.walls):
             self._keep(number, times, _inside_wall(wall, poses), power)
-            found = [part for part in pelvis if np.isfinite(self._first_s[number, part])]
-            if found:
-                self._refuse(number, found)
+            self._refuse(number, self._pelvis)
         at = np.arange(-self._instant % _MESH_STEP, len(times), _MESH_STEP)
         self._instant += len(times)
-        for number, solid in enumerate(self._solids, start=len(self._scene.walls)):
+        for number, solid in enumerate(self._solids, start=walls):
             held = np.zeros(power.shape, dtype=bool)
             held[at] = solid.holds(times[at], poses.centres[at])
             self._keep(number, times, held, power * _MESH_STEP)
+        for person, number in enumerate(self._people):
+            self._keep(number, times, self._inside_person(person, times, poses), power)
 
-    def _keep(self, number: int, times: Array, held: NDArray[np.bool_], power: Array) -> None:
+    def _keep(self, number: int, times: Array, held: Bools, power: Array) -> None:
         first = np.where(held, times[:, None], np.inf).min(axis=0, initial=np.inf)
         self._first_s[number] = np.minimum(self._first_s[number], first)
         self._power[number] += (power * held).sum(axis=0)
+
+    def _inside_person(self, person: int, times: Array, poses: Poses) -> Bools:
+        """Which parts (time, part) of others have their centres inside a person."""
+        own, other = self._owner == person, np.flatnonzero(self._owner != person)
+        away = poses.centres[:, other, None] - poses.centres[:, None, own]
+        local = np.einsum("tqji,tpqj->tpqi", poses.frames[:, own], away)
+        within = ((local / poses.semi_axes[own]) ** 2).sum(axis=-1) < 1
+        bad = (within & self._trunk[own]).any(axis=-1) & self._trunk[other]
+        if bad.any():
+            time, part = np.argwhere(bad)[0]
+            raise InputError(
+                f"at {times[time]:.2f} s the {self._names[other[part]]} is inside "
+                f"'{self._things[self._people[person]]}'; move one of them (position_m, --at), or "
+                "choose another interval (--start, --duration)"
+            )
+        held = np.zeros(poses.centres.shape[:2], dtype=bool)
+        held[:, other] = within.any(axis=-1)
+        return held
 
     def found(self, part_power: Array) -> list[tuple[str, float, str]]:
         """Return the name, power while inside [m^2] and message of each limit.
@@ -78,42 +111,41 @@ class Inside:
         ``part_power (part,)`` is the echo power of each part, over all instants [m^2]. An
         `InputError` is raised if a part with more than 5 % of that of its owner was inside a wall.
         """
-        walls, inside = len(self._scene.walls), np.isfinite(self._first_s)
-        still = walls + self._still
         of_owner = np.bincount(self._owner, weights=part_power)[self._owner]
-        large = part_power > REFUSED_FRACTION * of_owner
+        walls = len(self._scene.walls)
         for number in range(walls):
-            if (parts := np.flatnonzero(large & inside[number])).size:
-                self._refuse(number, parts.tolist())
+            self._refuse(number, part_power > REFUSED_FRACTION * of_owner)
+        objects = walls + sum(one.moving is None for one in self._solids)
+        people = len(self._things) - len(self._people)
+        untouched = "taken as if it were not there"
         limits = []
-        for name, what, chosen in (
-            ("inside_wall", "parts inside a wall", slice(walls)),
-            ("inside_furniture", "parts inside furniture", slice(walls, still)),
-            ("inside_object", "parts inside objects that move", slice(still, None)),
+        for name, what, first, last in (
+            ("inside_wall", f"a wall, {untouched}", 0, walls),
+            ("inside_furniture", f"furniture, {untouched}", walls, objects),
+            ("inside_object", f"objects that move, {untouched}", objects, people),
+            ("inside_person", "another person, in whom they are hidden", people, None),
         ):
-            names = self._thing_names()[chosen]
+            first_s, names = self._first_s[first:last], self._things[first:last]
             said = [
-                f"the {self._names[part]} in '{names[number]}' from "
-                f"{self._first_s[chosen][number, part]:.2f} s"
-                for number, part in np.argwhere(inside[chosen])
+                f"the {self._names[part]} in '{names[number]}' from {first_s[number, part]:.2f} s"
+                for number, part in np.argwhere(np.isfinite(first_s))
             ]
             if said:
-                message = f"echo power from {what}, taken as if it were not there: "
-                power = float(self._power[chosen].sum())
-                limits.append((name, power, message + ", ".join(said)))
+                power = float(self._power[first:last].sum())
+                message = f"echo power from parts inside {what}: {', '.join(said)}"
+                limits.append((name, power, message))
         return limits
 
-    def _thing_names(self) -> list[str]:
-        return [wall.name for wall in self._scene.walls] + [one.name for one in self._solids]
-
-    def _refuse(self, number: int, parts: list[int]) -> None:
-        first_s = self._first_s[number]
-        part = min(parts, key=lambda part: float(first_s[part]))
-        raise InputError(
-            f"scene '{self._scene.name}': at {first_s[part]:.2f} s the {self._names[part]} of the "
-            f"person is inside wall '{self._thing_names()[number]}'; move the person (position_m, "
-            "heading_deg) or the wall, or choose another interval (--start, --duration)"
-        )
+    def _refuse(self, number: int, parts: Bools) -> None:
+        """Raise InputError if any of some parts (part,) was inside a wall."""
+        first_s = np.where(parts, self._first_s[number], np.inf)
+        part = int(first_s.argmin())
+        if np.isfinite(first_s[part]):
+            raise InputError(
+                f"scene '{self._scene.name}': at {first_s[part]:.2f} s the {self._names[part]} of "
+                f"the person is inside wall '{self._things[number]}'; move the person (position_m, "
+                "heading_deg) or the wall, or choose another interval (--start, --duration)"
+            )
 
 
 class _Solid:

@@ -1,4 +1,4 @@
-"""Persons who stand in walls or furniture: refused, or told in the limits."""
+"""Persons who stand in walls, furniture or one another: refused, or told in the limits."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import pytest
 
 import rtradar as rt
 from rtradar.body import Body
+from rtradar.body.people import body_of_people
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.inside_solids import Inside, objects_inside
-from rtradar.scatter.link_budget import link_budget
+from rtradar.scatter.inside import Inside, objects_inside
+from rtradar.scatter.link_budget import LinkBudget, link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.settings import RunSettings
 from rtradar.system.registries import scene_files
 
 RADAR = rt.Radar(
@@ -44,9 +46,9 @@ def wall(x: float, thickness: float, name: str = "across") -> Wall:
     return made
 
 
-def inside(*walls: Wall, furniture: tuple[Furniture, ...] = ()) -> list[tuple[str, float, str]]:
+def inside(*walls: Wall) -> list[tuple[str, float, str]]:
     """By even echo powers, in blocks of 7 instants."""
-    solid = Inside(Scene(walls=walls, furniture=furniture), BODY.part_names, BODY.owner)
+    solid = Inside(Scene(walls=walls), BODY)
     power = np.full((len(TIMES), len(BODY.part_names)), 1e-3)
     for first in range(0, len(TIMES), 7):
         some = slice(first, first + 7)
@@ -104,7 +106,7 @@ def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
     assert power == pytest.approx(1e-3 * np.count_nonzero(reach[:, hand] <= back))
     assert f"the {BODY.part_names[hand]} in 'across' from {first:.2f} s" in message
     # The same with all power from that hand.
-    solid = Inside(Scene(walls=(ahead,)), BODY.part_names, BODY.owner)
+    solid = Inside(Scene(walls=(ahead,)), BODY)
     power_of_hand = np.zeros((len(TIMES), len(BODY.part_names)))
     power_of_hand[:, hand] = 1.0
     solid.look(TIMES, BODY.at(TIMES), power_of_hand)
@@ -156,7 +158,7 @@ def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, acti
     )
     body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
     times = np.arange(0, body.duration_s, 0.02)
-    solid = Inside(scene, body.part_names, body.owner)
+    solid = Inside(scene, body)
     solid.look(times, body.at(times), np.ones((len(times), len(body.part_names))))
     assert solid.found(np.ones(len(body.part_names))) == []
 
@@ -170,7 +172,7 @@ def box(name: str, x: float, motion: rt.FollowingPath | None = None) -> rt.Objec
 def test_parts_in_an_object_that_moves_are_told_while_they_are_in_it() -> None:
     # It comes to where the person is half-way, and goes on.
     path = rt.FollowingPath(velocity_mps=(4, 0, 0))
-    solid = Inside(Scene(objects=(box("cart", -2.0, path),)), BODY.part_names, BODY.owner)
+    solid = Inside(Scene(objects=(box("cart", -2.0, path),)), BODY)
     power = np.full((len(TIMES), len(BODY.part_names)), 1e-3)
     solid.look(TIMES, BODY.at(TIMES), power)
     ((name, within, message),) = solid.found(power.sum(axis=0))
@@ -188,3 +190,48 @@ def test_objects_in_one_another_are_told_and_what_touches_is_not() -> None:
     assert limit.share == pytest.approx(0.7)
     assert "'cart' in 'crate' from 0.11 s" in limit.message
     assert objects_inside(Scene(objects=(box("cart", -0.4), box("crate", 0.0))), 1.0) == []
+
+
+STAND = rt.synthetic_motion("punch", duration_s=0.3)
+
+
+def budget(*places: tuple[float, float]) -> LinkBudget:
+    people = [rt.Person(STAND, place, 90.0 * number) for number, place in enumerate(places)]
+    body = body_of_people(people, RunSettings())
+    return link_budget(build_model("analytic", RADAR, body), RADAR, body, 1000)
+
+
+def test_power_is_that_of_each_person() -> None:
+    together, one, other = budget((0, 1), (1, -1)), budget((0, 1)), budget((-1, 2), (1, -1))
+    expected = [one.power, other.person_power[1]]
+    np.testing.assert_allclose(together.person_power, expected, rtol=1e-12)
+    assert together.power == pytest.approx(sum(together.person_power), rel=1e-12)
+    assert one.person_power == (pytest.approx(one.power, rel=1e-12),)
+
+
+def test_people_inside_one_another_are_refused() -> None:
+    with pytest.raises(InputError, match=r"at 0\.\d\d s the synthetic:punch 2: .* is inside"):
+        budget((0, 1), (0.05, 1))
+
+
+def test_a_hand_in_someone_is_a_limit() -> None:
+    """The left hand of the second is put into the middle torso of the first."""
+    people = [rt.Person(STAND), rt.Person(STAND, (1, 0))]
+    body = body_of_people(people, RunSettings())
+    poses, power = body.at([0.1]), np.ones((1, 42))
+    hand, torso = (
+        body.part_names.index(f"synthetic:punch {who}")
+        for who in ("2: left hand", "1: middle torso")
+    )
+    poses.centres[0, hand] = poses.centres[0, torso]
+    others = Inside(Scene(), body)
+    others.look(np.array([0.1]), poses, power)
+    [(name, inside_power, message)] = others.found(power[0])
+    assert name == "inside_person"
+    assert inside_power == 2.0  # of both, for the centre of the torso is in the hand, too
+    assert "the synthetic:punch 2: left hand in 'synthetic:punch 1' from 0.10 s" in message
+
+
+def test_who_is_never_in_range_is_named() -> None:
+    with pytest.raises(InputError, match="person 'synthetic:punch 2' is never within the range"):
+        budget((0, 1), (40, 0))
