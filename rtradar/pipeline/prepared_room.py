@@ -72,7 +72,9 @@ def prepare_room(
         paths = model.prune(n_chirps, noise, _LEFT_OUT * allowed if tones else 0.0)
         error = model.left_out_m2
         if tones:
-            ghosts, said = ghosts_within(model, radar, n_chirps, _OF_GHOSTS * allowed - error)
+            ghosts, said = ghosts_within(
+                model.ghosts, radar, n_chirps, _OF_GHOSTS * allowed - error
+            )
             error += said.pop("error_m2")
         summary["paths"] = [asdict(path) for path in paths]
         summary["faces"] = [face._asdict() for face in model.faces]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from rtradar.scatter.inside import objects_inside
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
+from rtradar.scatter.rigid.bounces import rigid_echoes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
@@ -209,10 +209,10 @@ def build_model_of_all(
     past = None
     if scene.objects and model.variant is not None:
         past = Occluders(use(select(variant)), scene, body)
-    rigid = partial(RigidEchoes, radar, past=past, walls=scene.walls, spreading=spreading)
+    given = {"past": past, "walls": scene.walls, "spreading": spreading}
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     objects = [
-        [rigid(moving=moving, duration_s=body.duration_s, path=path) for path in paths]
+        [rigid_echoes(radar, moving, body.duration_s, path=path, **given) for path in paths]
         for moving in scene.objects
     ]
     return PeopleAndObjects(model, len(body.part_names), objects, overlaps)

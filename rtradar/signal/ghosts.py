@@ -9,7 +9,8 @@ measured against the exact sum, and the anchors lie so close that it stays below
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,15 +55,9 @@ AHEAD = 8
 """Anchors that are computed with those that are needed, because a call has its price."""
 
 
-class GhostEchoes(Protocol):
-    """What is asked of the model of a room: the echoes over its walls.
-
-    Echoes have lengths also where they are not seen, and are the same ones at every chirp.
-    """
-
-    def ghosts(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Compute them at some chirps."""
-        ...
+GhostEchoes = Callable[[NDArray[np.int64]], Echoes]
+"""What gives the echoes over walls at some chirps: they have lengths also where they are not seen,
+and are the same ones at every chirp."""
 
 
 class GhostIf:
@@ -74,14 +69,14 @@ class GhostIf:
 
     def __init__(
         self,
-        model: GhostEchoes,
+        ghosts: GhostEchoes,
         radar: Radar,
         n_cycles: int,
         apart: int,
         order: NDArray[np.int64],
         changing: int,
     ) -> None:
-        self._model, self._radar = model, radar
+        self._ghosts, self._radar = ghosts, radar
         self._order, self._changing = order, changing
         gaps = max(ANCHORS - 1, math.ceil((n_cycles - 1) / apart))
         self.cycles = np.unique(np.rint(np.linspace(0, n_cycles - 1, gaps + 1)).astype(np.int64))
@@ -134,7 +129,7 @@ class GhostIf:
         """Echoes at some cycles."""
         each = np.arange(self._radar.n_tx)
         chirps = (cycles[:, None] * len(each) + each).ravel()
-        echoes = self._model.ghosts(chirps)
+        echoes = self._ghosts(chirps)
         warn_of_motion_in_chirp(echoes, self._radar, self._radar.centres_of(chirps))
         order = len(each) * np.arange(len(cycles))[:, None] + np.argsort(echoes.tx[: len(each)])
         weights = _legendre_weights(echoes, self._radar).astype(np.float32)
@@ -156,14 +151,14 @@ def _empty_anchors(shape: tuple[int, int, int], kept: int, changing: int) -> Anc
 
 
 def ghosts_within(
-    model: GhostEchoes, radar: Radar, n_chirps: int, power_m2: float
+    ghosts: GhostEchoes, radar: Radar, n_chirps: int, power_m2: float
 ) -> tuple[GhostIf | None, dict[str, Any]]:
     """Approximate ghosts so that the mean power of the error of an IF sample stays below a limit.
 
     Parameters
     ----------
-    model : GhostEchoes
-        Model of the room.
+    ghosts : GhostEchoes
+        Echoes over the walls of the room.
     radar : Radar
         Radar in the scene.
     n_chirps : int
@@ -180,7 +175,7 @@ def ghosts_within(
         sweep, the distance between anchors [s], and the error's power [m^2].
     """
     spread = np.unique(np.linspace(0, n_chirps - 1, _POWER_CHIRPS).astype(np.int64))
-    some = model.ghosts(spread)
+    some = ghosts(spread)
     said = {"ghosts": len(some.part), "changing": 0}
     exact = said | {"anchors_apart_s": None, "error_m2": 0.0}
     # A cubic over a gap between frames would be far off.
@@ -201,15 +196,15 @@ def ghosts_within(
         apart = min(round(apart_s / radar.cycle_duration_s), (n_cycles - 1) // (ANCHORS - 1))
         if apart < 2:
             break
-        found = GhostIf(model, radar, n_cycles, apart, order, len(groups[1]))
-        error = _error(found, model, radar)
+        found = GhostIf(ghosts, radar, n_cycles, apart, order, len(groups[1]))
+        error = _error(found, ghosts, radar)
         if error * 10 ** (_MARGIN_DB / 10) <= power_m2:
             apart_s = apart * radar.cycle_duration_s
             return found, said | {"anchors_apart_s": apart_s, "error_m2": error}
     return None, exact
 
 
-def _error(found: GhostIf, model: GhostEchoes, radar: Radar) -> float:
+def _error(found: GhostIf, ghosts: GhostEchoes, radar: Radar) -> float:
     """Mean power of the error [m^2] in some cycles beside the sum of all ghosts, chirp by chirp."""
     # In the middle between anchors, where a cubic is off by most.
     middles = (found.cycles[:-1] + found.cycles[1:]) // 2
@@ -217,7 +212,7 @@ def _error(found: GhostIf, model: GhostEchoes, radar: Radar) -> float:
     each = np.arange(radar.n_tx)
     chirps = (cycles[:, None] * radar.n_tx + each).ravel()
     times = radar.centres_of(chirps)
-    error = -synthesize(model.ghosts(chirps), radar, times, dtype=np.complex64)
+    error = -synthesize(ghosts(chirps), radar, times, dtype=np.complex64)
     for first in range(0, len(chirps), radar.n_tx):
         own = slice(first, first + radar.n_tx)
         found.add(error[own], chirps[own])

@@ -13,8 +13,8 @@ What a person takes from the clutter by their shadow is left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,19 +37,6 @@ _MOST_TERMS = 4_000_000
 """Echoes of channels that are in memory at once."""
 
 
-class Traced(Protocol):
-    """The clutter of a room from one pose, as `rtradar.scatter.clutter.static_clutter.Clutter`."""
-
-    @property
-    def objects(self) -> Sequence[Any]:
-        """Echoes of each object, `rtradar.scatter.clutter.returns.RoomEchoes`."""
-        ...
-
-    def cycle(self) -> Iterator[Echoes]:
-        """Yield the echoes of one cycle, object by object."""
-        ...
-
-
 class _Keyframe(NamedTuple):
     """What the room returns at a keyframe.
 
@@ -63,10 +50,11 @@ class _Keyframe(NamedTuple):
 class MovingRoomIf(RoomIf):
     """IF samples of a room, for a capture of ``duration_s`` by a radar that moves.
 
-    ``trace`` gives the clutter before a radar at rest, once for each keyframe.
+    ``trace`` gives the clutter before a radar at rest,
+    `rtradar.scatter.clutter.static_clutter.Clutter`, once for each keyframe.
     """
 
-    def __init__(self, radar: Radar, duration_s: float, trace: Callable[[Radar], Traced]) -> None:
+    def __init__(self, radar: Radar, duration_s: float, trace: Callable[[Radar], Any]) -> None:
         self._trace, self.times = trace, keyframe_times(radar, duration_s)
         self._kept: KeyframeCache[int, _Keyframe] = KeyframeCache(0, 3)
         super().__init__(radar, trace(radar.at(0.0)).cycle())

@@ -47,9 +47,9 @@ from rtradar.scatter.clutter.returns import (
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain, images
-from rtradar.scatter.multipath.slab_series import DENSE_NODES, whole_walls
+from rtradar.scatter.multipath.slab_series import DENSE_NODES, WHOLE, whole_walls
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scatter.multipath.wall_interaction import WallResponse, reflect
+from rtradar.scatter.multipath.wall_interaction import WallResponse, after_slab
 from rtradar.scene import Scene
 from rtradar.system.seeds import stream
 from rtradar.trace.occluders import Occluders
@@ -204,7 +204,7 @@ def _rough_face(
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
         sent = sent_field(element, ways, polarization, x_for_steep=True)
-        field = reflect(smooth, sent.astype(np.complex128), ways, frequency)[0]
+        field = after_slab(smooth, sent.astype(np.complex128), ways, frequency, WHOLE[0])[0]
         clear = occluders.clear(antennas[:, None], points)
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear
         return distance, np.maximum(-(ways @ normal), 0.0), strength

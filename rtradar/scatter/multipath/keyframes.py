@@ -27,8 +27,6 @@ from rtradar.scatter.common.polarization import (
     Surfaces,
     bisector,
     over_copolar,
-    sent_field,
-    unit,
 )
 from rtradar.scatter.multipath.furniture_faces import SolidFace
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
@@ -244,18 +242,15 @@ def _carry(
         chosen = np.flatnonzero(np.isin(path, numbers))
         of_leg[chosen] = np.arange(len(chosen))
         ends = antennas[:, :, None], points[:, :, None, chosen]
-        along, extent = around.walls.edges.leg(leg, *ends)
-        valid[..., chosen] = extent != 0
-        ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        sent = sent_field(antenna, ways[0], around.polarization)
-        waves = around.walls.along(leg, along, ways, sent * extent[..., None])
-        for step, (origins, targets) in enumerate(pairwise(along)):
+        own = around.walls.carried(leg, *ends, antenna, around.polarization)
+        valid[..., chosen] = own.extent != 0
+        for step, (origins, targets) in enumerate(pairwise(own.corners)):
             start, end = np.broadcast_arrays(origins, targets)
             at_solid = any(isinstance(face.wall, SolidFace) for face in leg)
             sections.append(_Section(chosen, start, end, step == len(leg), at_solid))
-        all_waves[leg] = {wave.passages: wave.field for wave in waves}
+        all_waves[leg] = {wave.passages: wave.field for wave in own.waves}
         field[..., chosen, :] = all_waves[leg].setdefault((), field[..., chosen, :])
-        arriving[..., chosen, :] = ways[-1]
+        arriving[..., chosen, :] = own.ways[-1]
     return _Carried(field, all_waves, of_leg, arriving, valid, sections)
 
 

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.rooms import PathFactors, path_amplitudes
+from rtradar.kernels.scatter.nearby_points import Nearby
+from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.echo_sets import take, times_factor, together, weakest
@@ -209,9 +210,7 @@ class RoomModel:
         specular points also where they are not seen.
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
-        at = chirp_poses(self._radar, self._body, chirps)
-        blend, before, after = self._keyframes.around(chirps, at.tx_index)
-        near = nearby_points(blend, before, after)
+        at, blend, near, factors = self._between_keyframes(chirps)
         if ghosts:
             near = near._replace(wanted=np.ones_like(near.wanted))
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
@@ -237,15 +236,11 @@ class RoomModel:
             own = columns.path[others], columns.part[others]
             found.append(legs.echoes(*own, there, near.take(others), formula))
         length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
-        factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
+        echo = np.array(columns.echo, dtype=np.int64)
         if columns.delayed:
-            echo = np.array(columns.echo)
             length = columns.lengths(legs, there, near.places(), length)
             # Contiguous, or Numba would compile the same for another layout.
             bare = np.ascontiguousarray(bare[..., echo])
-            factors = [
-                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
-            ]
         # Times what walls, the body's surface and occluders leave.
         frequency = self._around.walls.frequency
         if all(bool((own.factor == own.factor[:, :1]).all()) for own in factors):
@@ -256,7 +251,6 @@ class RoomModel:
             frequency = frequency[[len(frequency) // 2]]
         amplitude = np.empty((len(frequency), *bare.shape), dtype=np.complex64)
         in_threads(path_amplitudes, len(bare), bare, *factors, blend, amplitude)
-        echo = np.array(columns.echo, dtype=np.int64)
         bounces = 1 + np.array([self.paths[path].order for path in columns.path], dtype=np.int64)
         return Echoes(
             length=length,
@@ -267,6 +261,21 @@ class RoomModel:
             bounces=bounces[echo],
             path=columns.path[echo],
         )
+
+    def _between_keyframes(
+        self, chirps: NDArray[np.int64]
+    ) -> tuple[ChirpPoses, Blend, Nearby, list[PathFactors]]:
+        """Poses of chirps, where they are between keyframes, specular points, and both factors."""
+        columns, at = self._columns, chirp_poses(self._radar, self._body, chirps)
+        blend, *ends = self._keyframes.around(chirps, at.tx_index)
+        factors = [PathFactors(end.factor, end.seen) for end in ends]
+        if columns.delayed:
+            echo = np.array(columns.echo)
+            # Contiguous, or Numba would compile the same for another layout.
+            factors = [
+                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
+            ]
+        return at, blend, nearby_points(blend, *ends), factors
 
     @property
     def has_ghost_tones(self) -> bool:
@@ -289,19 +298,12 @@ class RoomModel:
 
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
-        columns = self._columns
-        at = chirp_poses(self._radar, self._body, chirps)
-        blend, before, after = self._keyframes.around(chirps, at.tx_index)
-        factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
-        echo = np.array(columns.echo)
+        columns, echo = self._columns, np.array(self._columns.echo)
+        at, blend, near, factors = self._between_keyframes(chirps)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
-            factors = [
-                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
-            ]
             there, legs = self._images(at)
-            points = nearby_points(blend, before, after).places()
-            extra = columns.lengths(legs, there, points, extra)
+            extra = columns.lengths(legs, there, near.places(), extra)
         nodes = self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         in_threads(path_amplitudes, len(extra), np.ones(extra.shape), *factors, blend, left)

@@ -14,10 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.mirrors import SlabPass, slab_fields
+from rtradar.scatter.common.polarization import Polarization, sent_field, unit
 from rtradar.scatter.multipath.image_paths import Leg
-from rtradar.scatter.multipath.slab_series import WHOLE, Term, WallSeries
+from rtradar.scatter.multipath.slab_series import Term, WallSeries
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Wall
 
@@ -26,33 +28,18 @@ Field = NDArray[np.complex128]
 Waves = list["Wave"]
 
 
-def reflect(
-    wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[0]
-) -> Field:
-    """Compute the field after reflection, at the face that reflects.
-
-    The incident field (node, ..., 3), or (..., 3) for all nodes, travels along the unit vectors
-    ``directions (..., 3)``. The roughness s of the wall takes exp(-2 (k s cos)^2) off it (Ament,
-    Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3) of one term of the slab, without
-    the phase of its path and of the term's extra length.
-    """
-    return _after(wall, field, directions, frequency_hz, term)
-
-
-def transmit(
-    wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[1]
-) -> Field:
-    """Compute the field behind the wall over that of the same way through air; see `reflect`.
-
-    The ray goes straight on: the small shift to the side is left out, its phase is not.
-    """
-    return _after(wall, field, directions, frequency_hz, term)
-
-
-def _after(
+def after_slab(
     wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term
 ) -> Field:
-    """Field (node, ..., 3) after the passes of a term through a wall."""
+    """Compute the field after reflection, or behind the wall, by one term of its slab.
+
+    The incident field (node, ..., 3), or (..., 3) for all nodes, travels along the unit vectors
+    ``directions (..., 3)``. The roughness s of the wall takes exp(-2 (k s cos)^2) off what is
+    reflected (Ament, Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3), without the
+    phase of its path and of the term's extra length: at the face that reflects, or behind the wall
+    over that of the same way through air. A transmitted ray goes straight on: its small shift to
+    the side is left out, its phase is not.
+    """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     slab = SlabPass(
         wall.normal,
@@ -95,6 +82,15 @@ class Wave(NamedTuple):
     field: Field
 
 
+class Carried(NamedTuple):
+    """A leg by its corners [m], what the extents of its faces leave, directions, and the waves."""
+
+    corners: list[Array]
+    extent: Field
+    ways: list[Array]
+    waves: Waves
+
+
 class WallResponse(NamedTuple):
     """The edges of all surfaces, the series of each, and the frequencies of the nodes [Hz]."""
 
@@ -111,6 +107,22 @@ class WallResponse(NamedTuple):
         """Return a wave at its antenna, of a field (..., 3) that is the same at all nodes."""
         nodes = np.broadcast_to(field, (len(self.frequency), *np.shape(field)))
         return [Wave((), np.zeros(np.shape(field)[:-1]), np.array(nodes, dtype=np.complex128))]
+
+    def carried(
+        self,
+        leg: Leg,
+        places: Array,
+        points: Array,
+        antenna: Antenna | None,
+        polarization: Polarization,
+    ) -> Carried:
+        """Carry the field of an antenna at places (..., 3) over a leg to points (..., 3) [m]."""
+        corners, extent = self.edges.leg(leg, places, points)
+        ways = [unit(targets - origins) for origins, targets in pairwise(corners)]
+        sent = sent_field(antenna, ways[0], polarization)
+        return Carried(
+            corners, extent, ways, self.along(leg, corners, ways, sent * extent[..., None])
+        )
 
     def along(
         self, leg: Leg, corners: Sequence[Array], directions: Sequence[Array], field: Field
@@ -138,7 +150,7 @@ class WallResponse(NamedTuple):
         out = []
         for passages, extra, field in waves:
             for term in self.series[number].terms[0]:
-                sent = reflect(wall, field, directions, self.frequency, term)
+                sent = after_slab(wall, field, directions, self.frequency, term)
                 # What the face itself reflects comes without a delay.
                 passage = (Passage(number, section, term.passes),) if term.passes else ()
                 longer = extra + term.extra_m(wall.thickness_m, cosine)
@@ -172,7 +184,7 @@ class WallResponse(NamedTuple):
                 past[:, across] -= comes
                 for term in self.series[number].terms[1]:
                     passed = past if term.whole else np.zeros_like(field)
-                    passed[:, across] += transmit(wall, comes, ways, self.frequency, term)
+                    passed[:, across] += after_slab(wall, comes, ways, self.frequency, term)
                     if not term.whole:
                         longer = extra.copy()
                         longer[across] += term.extra_m(wall.thickness_m, cosine)

@@ -9,7 +9,6 @@ of the sheet that both antennas see.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -17,16 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import SHEET_BOUNCES
+from rtradar.scatter.common.echo_sets import together
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import Polarization
+from rtradar.scatter.multipath.image_paths import WallPath
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
-from rtradar.scatter.rigid.polynomials import PolynomialsInTime
+from rtradar.scatter.rigid.echoes import PolynomialsInTime, RigidEchoes, far_apart
+from rtradar.scene import Object
 from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -34,75 +37,78 @@ Indices = NDArray[np.int64]
 _KEPT_KNOTS, _PASSING = 128, 32
 
 
-class SheetBounces:
-    """Echoes of two bounces and more on a sheet, for any chirps.
+def rigid_echoes(
+    radar: Radar,
+    moving: Object,
+    duration_s: float,
+    past: Occluders | None,
+    *,
+    path: WallPath,
+    **options: Any,
+) -> RigidEchoes:
+    """Return the echoes of a moving object over a path; rays follow several bounces on a sheet."""
+    given = radar, moving, duration_s
+    if past is None or moving.shape.closed or path.order:
+        return RigidEchoes(*given, past, path=path, **options)
+    return RigidSheet(*given, past, path=path, **options)
 
-    Mitsuba, ``mi``, has its variant set. ``pose(times)`` gives rotations (time, 3, 3) and the point
-    of reference (time, 3), world [m], of ``triangles`` and their facets ``grid``, both about that
-    point; ``open_at(time)`` the fractions (tx,) and (rx,) of the sheet that antennas see past
-    others, times the gain of the antennas. Echoes are ``step`` [m] apart in length.
+
+class RigidSheet(RigidEchoes):
+    """Echoes of a sheet that moves: those of one bounce, then those of two bounces and more.
+
+    Parameters and errors are those of `RigidEchoes`, the path is direct. Echoes of several bounces
+    are as far apart in length as those of one.
     """
 
     def __init__(
-        self,
-        mi: Any,
-        radar: Radar,
-        triangles: Array,
-        grid: MeshGrid,
-        *,
-        pose: Callable[[Array], tuple[Array, Array]],
-        open_at: Callable[[float], tuple[Array, Array]],
-        frequency: Array,
-        step: float,
-        knot_s: float,
-        spreading: bool,
+        self, radar: Radar, moving: Object, duration_s: float, past: Occluders, **options: Any
     ) -> None:
-        self._mi, self._radar, self._triangles, self._grid = mi, radar, triangles, grid
-        self._pose, self._open_at, self._spreading = pose, open_at, spreading
-        self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
-        self._step, self._knot_s = step, knot_s
-        radius = float(np.linalg.norm(triangles, axis=-1).max())
-        self._half = int(np.ceil((SHEET_BOUNCES + 1) * radius / step)) + 1
-        self._count = 2 * self._half + 2
+        super().__init__(radar, moving, duration_s, past, **options)
+        self._mi = past.mi
+        radius = float(np.linalg.norm(self._corners, axis=-1).max())
+        self._half = int(np.ceil((SHEET_BOUNCES + 1) * radius / self._grid.step)) + 1
         self._orders = np.arange(2, SHEET_BOUNCES + 1)
-        self._knots: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(
+        self._shots: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(
             _KEPT_KNOTS, _PASSING
         )
 
-    def echoes(
-        self, times: Array, tx: Indices, *, whole: bool
-    ) -> tuple[Array, NDArray[np.complex64], Indices]:
-        """Lengths (echo,) [m] beyond the path over the point of reference, amplitudes, bounces.
-
-        Amplitudes (node, chirp, rx, echo) are as of `Echoes` [m], for the Tx ``tx (chirp,)``. All
-        echoes are there if ``whole``, else those that are not 0.
-        """
-        knots = PolynomialsInTime(times, self._knot_s)
+    def echoes(self, chirps: Indices) -> Echoes:
+        """Echoes of the sheet at these chirps; see `RigidEchoes.echoes`."""
+        times, tx = self._radar.centres_of(chirps), self._radar.tx_of_chirp(chirps)
+        knots = PolynomialsInTime(times, self._knot_s / 2)
         field = np.stack(
-            [self._knots.get(own, partial(self._knot, own)) for own in knots.numbers.tolist()]
+            [self._shots.get(own, partial(self._shot, own)) for own in knots.numbers.tolist()]
         )
-        used = field.any(axis=(0, 1, 2, 3)) | whole
-        out = knots.between(field[..., used], tx)
-        beyond = np.arange(-self._half, self._half + 2) * self._step
-        bounces = np.repeat(self._orders, self._count).astype(np.int64)
-        return np.tile(beyond, len(self._orders))[used], out, bounces[used]
+        used = field.any(axis=(0, 1, 2, 3)) | far_apart(chirps)
+        beyond = np.arange(-self._half, self._half + 2) * self._grid.step
+        steps = np.tile(beyond, len(self._orders))[used]
+        several = Echoes(
+            length=self._over_reference(times, tx)[..., None] + self._longer_m + steps,
+            amplitude=knots.between(field[..., used], tx),
+            frequency=self.frequency,
+            tx=tx,
+            part=np.zeros(len(steps), dtype=np.int64),
+            bounces=np.repeat(self._orders, len(beyond))[used].astype(np.int64),
+        )
+        return together([super().echoes(chirps), several])
 
-    def _knot(self, number: int) -> NDArray[np.complex128]:
+    def _shot(self, number: int) -> NDArray[np.complex128]:
         """Amplitudes (tx, rx, node, echo) at one knot, the echoes of each number of bounces."""
-        time_s = number * self._knot_s
+        time_s = number * self._knot_s / 2
         radar, ((rotation,), (at,)) = self._radar.at(time_s), self._pose(np.array([time_s]))
         polarization = Polarization(radar.polarization, radar.axes)
-        surfaces = MeshTracer(self._mi, self._triangles @ rotation.T + at)
+        surfaces = MeshTracer(self._mi, self._corners @ rotation.T + at)
         shooter = Shooter(
             surfaces=surfaces,
-            grid=MeshGrid(self._grid.corners @ rotation.T + at, self._grid.face),
+            grid=MeshGrid(self._small.corners @ rotation.T + at, self._small.face),
             bounces=SHEET_BOUNCES,
-            wavenumber=float(self._wavenumber.max()),
+            wavenumber=float(self._grid.wavenumber.max()),
             polarization=polarization,
             spreading=self._spreading,
             two_sided=True,
         )
-        shape = radar.n_tx, len(self._orders), len(self._wavenumber), radar.n_rx, self._count
+        nodes, count = len(self.frequency), 2 * self._half + 2
+        shape = radar.n_tx, len(self._orders), nodes, radar.n_rx, count
         out = np.zeros(shape, dtype=np.complex128)
         open_tx, open_rx = self._open_at(time_s)
         for index, tx in enumerate(radar.tx):
@@ -115,7 +121,20 @@ class SheetBounces:
                     out[index, order] = self._shared(*given)
             out[index] *= open_tx[index] * open_rx[radar.rx_of_tx[index]][:, None]
         out = np.moveaxis(out.conj(), 1, 3)
-        return out.reshape(*out.shape[:1], len(self._wavenumber), radar.n_rx, -1).swapaxes(1, 2)
+        return out.reshape(*out.shape[:1], nodes, radar.n_rx, -1).swapaxes(1, 2)
+
+    def _open_at(self, time_s: float) -> tuple[Array, Array]:
+        """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times what is left.
+
+        That is the root of what walls and patterns of antennas leave of both legs.
+        """
+        legs, middles, _ = self._facets_at(time_s)
+        asked = np.ones((len(legs.places), len(middles)), dtype=bool)
+        clear = legs.seen(time_s, middles, asked, but=self.moving).mean(axis=1)
+        at = self._pose(np.array([time_s]))[1]
+        left = legs.factor(at, np.eye(3)[:1], self.moving.material, self._longer_m)
+        root = np.sqrt(np.abs(left[len(left) // 2, 0]))
+        return legs.tx_weight @ clear * root, legs.rx_weight @ clear * root
 
     def _shared(
         self,
@@ -128,19 +147,20 @@ class SheetBounces:
         """Field (node, rx, echo) of footprints, shared between the two echoes next to each."""
         middle = rx.mean(axis=0)
         path = footprints.path[:, 3] + np.linalg.norm(footprints.places[:, 3] - middle, axis=1)
-        place = (path - over.mean()) / self._step + self._half
-        cell = np.clip(np.floor(place), 0, self._count - 2).astype(np.int64)
+        place = (path - over.mean()) / self._grid.step + self._half
+        count = 2 * self._half + 2
+        cell = np.clip(np.floor(place), 0, count - 2).astype(np.int64)
         fraction = np.clip(place - cell, 0.0, 1.0)
         after = fraction**2 * (3 - 2 * fraction)
-        lengths = over[:, None] + (np.arange(self._count) - self._half) * self._step
-        total = np.zeros((len(self._wavenumber), *lengths.shape), complex)
+        lengths = over[:, None] + (np.arange(count) - self._half) * self._grid.step
+        total = np.zeros((len(self._grid.wavenumber), *lengths.shape), complex)
         for own, share in ((cell, 1 - after), (cell + 1, after)):
             lit = replace(footprints, field=footprints.field * share[:, None], surface=own)
             total += radiate(
                 lit,
                 visible,
                 rx,
-                self._wavenumber,
+                self._grid.wavenumber,
                 lengths,
                 polarization=polarization,
                 spreading=self._spreading,

@@ -10,7 +10,7 @@ An object is seen over some lengths, one echo each, about that over its point of
 facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
 phases change slowly against those at the point of reference, the field is computed at knots in
 time for all pairs of antennas, with polynomials in between; else at every chirp. A sheet reflects
-several times, too (`rtradar.scatter.rigid.bounces`).
+several times, too (`RigidSheet`, in `rtradar.scatter.rigid.bounces`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
@@ -34,16 +35,14 @@ from rtradar.kernels.scatter.facets_by_length import (
 )
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import flat_edge, small_facets
-from rtradar.scatter.common.interpolation import sweep_nodes
+from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import antennas_in_use
 from rtradar.scatter.multipath.image_paths import WallPath, images
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.rigid.bounces import SheetBounces
 from rtradar.scatter.rigid.legs import RigidLegs
-from rtradar.scatter.rigid.polynomials import PolynomialsInTime
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map
@@ -77,6 +76,10 @@ _SAMPLES, _STEP_S = 200, 1e-5
 """Instants of a capture at which velocities and distances are looked at, and the time for both."""
 
 _TASKS_AT_ONCE = 16
+
+_COUNT = 8
+_OFFSETS = np.arange(_COUNT) - _COUNT // 2 + 1
+"""Knots of a polynomial in time, from the one before."""
 
 
 class _Keyframe(NamedTuple):
@@ -118,13 +121,14 @@ class RigidEchoes:
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
-        own = shape.corners - self._reference
-        radius = float(np.linalg.norm(own, axis=-1).max())
+        self._corners = shape.corners - self._reference
+        radius = float(np.linalg.norm(self._corners, axis=-1).max())
         nearest, rates, speeds, turning = self._kinematics(duration_s)
         wavenumber = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
         k = wavenumber[-1]
-        small = small_facets(own, 0, flat_edge(float((high - low).max()), nearest, k))
-        self._facets = _rigid_facets(small.corners, not shape.closed)
+        edge = flat_edge(float((high - low).max()), nearest, k)
+        self._small = small_facets(self._corners, 0, edge)
+        self._facets = _rigid_facets(self._small.corners, not shape.closed)
         step = SPEED_OF_LIGHT_MPS / (_LENGTHS_A_CELL * radar.bandwidth_hz)
         half = math.ceil(2 * radius / step) + 1
         sweep = radar.bandwidth_hz / (2 * radar.centre_frequency_hz)
@@ -139,20 +143,6 @@ class RigidEchoes:
         self.limits = tuple(self._limits(speeds)) if path.order == 0 else ()
         # What slabs add is the same all the time: what is left is in the factors.
         self._longer_m = self._legs.longer_m(self._pose(np.zeros(1))[1][0])
-        self._bounces = None
-        if past is not None and not shape.closed and path.order == 0:
-            self._bounces = SheetBounces(
-                past.mi,
-                radar,
-                own,
-                small,
-                pose=self._pose,
-                open_at=self._open_at,
-                frequency=self.frequency,
-                step=step,
-                knot_s=self._knot_s / 2,
-                spreading=spreading,
-            )
 
     def _kinematics(self, duration_s: float) -> tuple[float, float, Array, float]:
         """Least distance [m], largest rates, and range rates of the mesh over the capture.
@@ -224,7 +214,6 @@ class RigidEchoes:
         """
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
-        apart = len(chirps) and chirps[-1] - chirps[0] >= 2 * len(chirps)
         knots = PolynomialsInTime(times, self._knot_s)
         count = len(knots.numbers)
         if count * radar.n_tx < len(chirps):
@@ -234,21 +223,16 @@ class RigidEchoes:
             amplitude = knots.between(field, tx)
         else:
             field = self._field(times, tx)
-            used = field.any(axis=(0, 1, 2)) | bool(apart)
+            used = field.any(axis=(0, 1, 2)) | far_apart(chirps)
             amplitude = np.moveaxis(field[..., used], 2, 0).astype(np.complex64)
         steps = (self._grid.first + np.flatnonzero(used)) * self._grid.step
-        bounces = np.ones(len(steps), dtype=np.int64)
-        if self._bounces is not None:
-            more, field_of, order = self._bounces.echoes(times, tx, whole=bool(apart))
-            steps, bounces = np.append(steps, more), np.append(bounces, order)
-            amplitude = np.concatenate([amplitude, field_of], axis=3)
         return Echoes(
             length=self._over_reference(times, tx)[..., None] + self._longer_m + steps,
             amplitude=np.ascontiguousarray(amplitude),
             frequency=self.frequency,
             tx=tx,
             part=np.zeros(len(steps), dtype=np.int64),
-            bounces=bounces + self.path.order,
+            bounces=np.full(len(steps), 1 + self.path.order),
         )
 
     def _at_knots(self, numbers: list[int]) -> NDArray[np.complex128]:
@@ -315,29 +299,23 @@ class RigidEchoes:
 
     def _keyframe(self, number: int) -> _Keyframe:
         time_s, facets = number * self._keyframe_s, self._facets
-        legs = self._legs.before(self._radar.at(time_s))
-        (rotation,), (at,) = self._pose(np.array([time_s]))
-        middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
-        normals = facets.normals @ rotation.T
+        legs, middles, normals = self._facets_at(time_s)
         facing = np.einsum("fi,pfi->pf", normals, legs.places[:, None] - middles)
         asked = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
         seen = legs.seen(time_s, middles, asked)
         given = middles, normals, self.moving.material, self._longer_m
         return _Keyframe(seen.astype(np.float32), legs.factor(*given))
 
-    def _open_at(self, time_s: float) -> tuple[Array, Array]:
-        """Fractions of the facets that Tx (tx,) and Rx (rx,) see past others, times what is left.
-
-        That is the root of what walls and patterns of antennas leave of both legs.
-        """
-        legs, facets = self._legs.before(self._radar.at(time_s)), self._facets
-        (rotation,), (at,) = self._pose(np.array([time_s]))
+    def _facets_at(self, time_s: float) -> tuple[RigidLegs, Array, Array]:
+        """Legs at a time, with the middles [m] and the normals (facet, 3) of facets, world."""
+        facets, ((rotation,), (at,)) = self._facets, self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
-        asked = np.ones((len(legs.places), len(middles)), dtype=bool)
-        clear = legs.seen(time_s, middles, asked, but=self.moving).mean(axis=1)
-        left = legs.factor(at[None], np.eye(3)[:1], self.moving.material, self._longer_m)
-        root = np.sqrt(np.abs(left[_NODES // 2, 0]))
-        return legs.tx_weight @ clear * root, legs.rx_weight @ clear * root
+        return self._legs.before(self._radar.at(time_s)), middles, facets.normals @ rotation.T
+
+
+def far_apart(chirps: Indices) -> bool:
+    """Whether chirps are so far apart that all echoes are asked for, also those that are 0."""
+    return len(chirps) > 0 and bool(chirps[-1] - chirps[0] >= 2 * len(chirps))
 
 
 def _rigid_facets(corners: Array, both_sides: bool) -> RigidFacets:
@@ -354,3 +332,37 @@ def _rigid_facets(corners: Array, both_sides: bool) -> RigidFacets:
         areas=twice / 2,
         both_sides=both_sides,
     )
+
+
+class PolynomialsInTime:
+    """Polynomials through the fields at the eight knots about each time.
+
+    Knots are at multiples of ``apart`` seconds, ``numbers (knot,)`` those about the times [s].
+    """
+
+    def __init__(self, times: NDArray[np.float64], apart: float) -> None:
+        before = np.floor(times / apart).astype(np.int64)
+        around = before[:, None] + _OFFSETS
+        self.numbers = np.unique(around)
+        weights = interpolation_weights(_OFFSETS.astype(np.float64), times / apart - before)
+        ends = np.arange(len(times) + 1) * _COUNT
+        given = weights.ravel(), np.searchsorted(self.numbers, around).ravel(), ends
+        self._weights = csr_array(given, shape=(len(times), len(self.numbers)))
+
+    def between(
+        self, field: NDArray[np.complex128], tx: NDArray[np.int64]
+    ) -> NDArray[np.complex64]:
+        """Compute amplitudes (node, chirp, rx, echo) of chirps, each of its Tx ``tx (chirp,)``.
+
+        They are those of the polynomials through ``field (knot, tx, rx, node, echo)``.
+        """
+        _, _, receivers, nodes, echoes = field.shape
+        out = np.empty((nodes, len(tx), receivers, echoes), dtype=np.complex64)
+        for number in np.unique(tx):
+            own = np.flatnonzero(tx == number)
+            # Weights are real: real and imaginary parts are columns of their own.
+            columns = np.ascontiguousarray(field[:, number]).reshape(len(field), -1)
+            found = np.ascontiguousarray(self._weights[own] @ columns.view(np.float64))
+            shaped = found.view(np.complex128).reshape(len(own), receivers, nodes, echoes)
+            out[:, own] = np.moveaxis(shaped, 2, 0)
+        return out

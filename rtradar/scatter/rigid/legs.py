@@ -21,7 +21,6 @@ from rtradar.scatter.common.polarization import (
     Polarization,
     antenna_field,
     bisector,
-    sent_field,
     unit,
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
@@ -140,8 +139,5 @@ class RigidLegs:
         Lengths (point,) [m], fields (node, point, 3), and the direction of arrival (point, 3).
         """
         middle = np.array(self._radar.position_m)
-        along, extent = self._walls.edges.leg(leg, middle, points)
-        ways = [unit(targets - origins) for origins, targets in pairwise(along)]
-        sent = sent_field(antenna, ways[0], self._polarization)
-        waves = self._walls.along(leg, along, ways, sent * extent[..., None])
-        return [(wave.extra_m, wave.field) for wave in waves], ways[-1]
+        found = self._walls.carried(leg, middle, points, antenna, self._polarization)
+        return [(wave.extra_m, wave.field) for wave in found.waves], found.ways[-1]

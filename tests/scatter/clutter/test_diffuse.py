@@ -9,7 +9,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.wall_returns import rough_returns
-from rtradar.scatter.multipath.wall_interaction import reflect
+from rtradar.scatter.multipath.slab_series import WHOLE
+from rtradar.scatter.multipath.wall_interaction import after_slab
 from rtradar.scene import Scene, Wall, material, slab
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.occluders import Occluders
@@ -62,7 +63,7 @@ def test_mirrored_and_diffuse_power_are_what_a_smooth_wall_mirrors() -> None:
         diffuse = echoes.power_m2() * 8**4 / 4
         field, ahead = np.array([0, 0, 1.0 + 0j]), np.array([1.0, 0, 0])
         smooth, mirrored = (
-            np.abs(reflect(wall(0.0, height), field, ahead, [14e9])[0, 2]) ** 2
+            np.abs(after_slab(wall(0.0, height), field, ahead, [14e9], WHOLE[0])[0, 2]) ** 2
             for height in (0.0, roughness)
         )
         assert diffuse + mirrored == pytest.approx(smooth, rel=0.03)

@@ -17,7 +17,7 @@ from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scatter.rigid import bounces
-from rtradar.scatter.rigid.echoes import RigidEchoes
+from rtradar.scatter.rigid.echoes import PolynomialsInTime, RigidEchoes
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -208,3 +208,18 @@ def test_over_a_conducting_wall_it_is_its_mirror_image() -> None:
     found = field(RigidEchoes(RADAR, own, 0.1, None, walls=(behind,), path=path).echoes(chirp))
     expected = field(RigidEchoes(RADAR, mirrored, 0.1, None).echoes(chirp))
     np.testing.assert_allclose(found, expected, atol=0.01 * np.abs(expected).max())
+
+
+def test_polynomials_of_degree_seven_are_met() -> None:
+    rng = np.random.default_rng(0)
+    times, tx = rng.uniform(0.1, 0.2, 40), rng.integers(0, 3, 40)
+    knots = PolynomialsInTime(times, 0.01)
+    powers = np.arange(8)[:, None, None, None, None]
+    terms = rng.normal(size=(8, 3, 2, 4, 5, 2)).view(np.complex128)[..., 0]
+
+    def field(at: np.ndarray) -> np.ndarray:
+        return (terms * (at / 0.2)[:, None, None, None, None, None] ** powers).sum(axis=1)
+
+    found = knots.between(field(knots.numbers * 0.01), tx)
+    expected = np.moveaxis(field(times)[np.arange(40), tx], 2, 0)
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
