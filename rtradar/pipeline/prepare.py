@@ -23,10 +23,13 @@ from rtradar.process import clutter_removal, range_spectrum
 from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
-from rtradar.scatter.binary_phase import BinaryPhaseModel
 from rtradar.scatter.common.poses import has_mesh
 from rtradar.scatter.link_budget import LinkBudget, link_budget, power_of_parts_alone
-from rtradar.scatter.people_and_objects import PeopleAndObjects, build_model_of_all
+from rtradar.scatter.people_and_objects import (
+    BinaryPhaseModel,
+    PeopleAndObjects,
+    build_model_of_all,
+)
 from rtradar.scatter.validity import warn_of
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings

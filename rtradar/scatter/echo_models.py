@@ -111,14 +111,20 @@ def _kind_for(fidelity: str, body: Body, model_options: Iterable[str]) -> Callab
             f"{', '.join(models_that('accepts_meshes'))}"
         )
     with MODELS.guarded(fidelity):
-        known = [name for name in inspect.signature(kind).parameters if name not in _COMMON]
-        for option in model_options:
-            if option not in known:
-                raise InputError(
-                    f"fidelity '{fidelity}' has no option '{option}'; it has: "
-                    f"{', '.join(known) or 'none'}"
-                )
+        refuse_options(f"fidelity '{fidelity}'", kind, model_options, _COMMON)
     return kind
+
+
+def refuse_options(
+    what: str, called: Callable[..., Any], options: Iterable[str], common: Iterable[str]
+) -> None:
+    """Raise InputError where what is called has no such option besides its common parameters."""
+    known = [name for name in inspect.signature(called).parameters if name not in common]
+    for option in options:
+        if option not in known:
+            raise InputError(
+                f"{what} has no option '{option}'; it has: {', '.join(known) or 'none'}"
+            )
 
 
 def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:

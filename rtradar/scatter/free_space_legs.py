@@ -77,11 +77,6 @@ class _OverLegs:
         """Backend of the model."""
         return self._model.variant
 
-    @property
-    def traces(self) -> bool:
-        """Whether the model traces."""
-        return bool(getattr(self._model, "traces", False))
-
     def account(self) -> dict[str, Any] | None:
         """Report what the model did."""
         return account_of(self._model)

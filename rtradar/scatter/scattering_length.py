@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter.echo_models import models_that
+from rtradar.scatter.echo_models import models_that, refuse_options
 from rtradar.scatter.full_wave import FULL_WAVE, full_wave_scattering
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.target import target_geometry
@@ -118,8 +117,9 @@ def _method_for(
     target: object, fidelity: str, options: Iterable[str]
 ) -> tuple[Callable[..., NDArray[np.complex128]], bool]:
     """Function of a model that knows such targets and options, and whether it traces."""
+    what = f"scattering_length: '{fidelity}'"
     if fidelity == FULL_WAVE:
-        _refuse_unknown(fidelity, full_wave_scattering, options)
+        refuse_options(what, full_wave_scattering, options, _COMMON)
         return full_wave_scattering, True
     MODELS.refuse_gone(fidelity)
     if fidelity not in (allowed := [*models_that("scattering"), FULL_WAVE]):
@@ -129,23 +129,11 @@ def _method_for(
     model: Any = MODELS[fidelity]
     if not isinstance(target, Ellipsoids) and not model.accepts_meshes:
         raise InputError(
-            f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it "
+            f"{what} takes rt.Ellipsoids, not {type(target).__name__}: it "
             "needs curvature in closed form"
         )
-    _refuse_unknown(fidelity, model.scattering, options)
+    refuse_options(what, model.scattering, options, _COMMON)
     return model.scattering, model.traces
-
-
-def _refuse_unknown(
-    fidelity: str, scattering: Callable[..., object], options: Iterable[str]
-) -> None:
-    known = [name for name in inspect.signature(scattering).parameters if name not in _COMMON]
-    for option in options:
-        if option not in known:
-            raise InputError(
-                f"scattering_length: '{fidelity}' has no option '{option}'; it has: "
-                f"{', '.join(known) or 'none'}"
-            )
 
 
 def _pairs(

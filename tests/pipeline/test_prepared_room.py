@@ -13,7 +13,7 @@ from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.pipeline.output.writer import ReceivedFrame
 from rtradar.scatter import build_model
-from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.scatter.multipath.path_summary import ghosts
 
 pytestmark = pytest.mark.drawn
 

@@ -17,7 +17,7 @@ from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms
 from rtradar.report.figures.plots import Plots
-from rtradar.scatter.multipath.ghosts import Ghost, ghosts
+from rtradar.scatter.multipath.path_summary import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure
 

@@ -18,7 +18,7 @@ from rtradar.pipeline.processing import Clouds, Processing
 from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.radar import Radar
 from rtradar.scatter import account_of
-from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions, RunSettings
 from rtradar.system.clock import Moment

@@ -122,7 +122,10 @@ class ClutterShadow:
         allowed_m2: float = 0.0,
     ) -> None:
         self._radar, self._body = clutter.radar, body
-        self._faces = [_Faces.of(moving) for moving in objects]
+        # Triangles of objects about their pivots, in their own axes.
+        self._faces = [
+            (moving, small_facets(moving.shape.corners, 0, _EDGE_M).corners) for moving in objects
+        ]
         self.starts = np.cumsum([0, *(own.n_echoes for own in clutter.objects)])
         self.frequency = sweep_nodes(self._radar, SWEEP_NODES)
         numbered = enumerate(clutter.objects)
@@ -161,10 +164,10 @@ class ClutterShadow:
         at = chirp_poses(radar, self._body, chirps)
         maps = np.swapaxes(at.frames[0], 1, 2) / at.semi_axes[:, :, None]
         corners, closed = [np.empty((0, 3, 3))], [np.empty(0, dtype=bool)]
-        for own in self._faces:
-            (rotation,), (place,) = own.moving.pose(radar.centres_of(chirps))
-            corners.append(own.corners @ rotation.T + place)
-            closed.append(np.full(len(own.corners), own.moving.shape.closed))
+        for moving, own in self._faces:
+            (rotation,), (place,) = moving.pose(radar.centres_of(chirps))
+            corners.append(own @ rotation.T + place)
+            closed.append(np.full(len(own), moving.shape.closed))
         return Posed(
             at.centres[0],
             np.ascontiguousarray(maps),
@@ -299,17 +302,6 @@ def _apart_s(
     apart_s = tried_s * (goal / error) ** (1 / _ERROR_POWER)
     apart_s = float(min(limits_s[1], max(limits_s[0], apart_s)))
     return apart_s, error * (apart_s / tried_s) ** _ERROR_POWER
-
-
-class _Faces(NamedTuple):
-    """An object that moves, and its triangles (face, 3, 3) about its pivot, in its own axes [m]."""
-
-    moving: Object
-    corners: Array
-
-    @classmethod
-    def of(cls, moving: Object) -> _Faces:
-        return cls(moving, small_facets(moving.shape.corners, 0, _EDGE_M).corners)
 
 
 def _shared_points(clutter: Clutter, starts: Indices) -> SharedPoints:

@@ -17,5 +17,5 @@ The physics is in seven files, in the order in which a wave meets it:
 `keyframes` (polarisation, slabs, body material), times the fraction that is not occluded. The
 product is made in `rtradar.kernels.scatter.rooms.path_amplitudes`. `room_keyframes` keeps keyframes
 and finds those around a chirp. Where a level does not compute all paths itself, each path has a
-model of it before an `image_radar`, in place of `path_echoes`.
+model of it before an `ImageRadar`, in place of `path_echoes`.
 """

@@ -331,37 +331,27 @@ def _not_occluded(
     part: NDArray[np.int64],
     known: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Whether the body leaves both legs free, (keyframe, line, 2, rx_end, echo)."""
-    clear = [np.logical_or.reduce(seen, axis=axis) for axis in (3, 2)]
-    for leg, free in zip(legs, clear, strict=True):
-        _clear_of_body(body, leg, free, poses, part, known)
-    return np.asarray(clear[0][:, :, :, None] & clear[1][:, :, None])
-
-
-def _clear_of_body(
-    body: BodyTracer,
-    leg: _Carried,
-    clear: NDArray[np.bool_],
-    poses: Poses,
-    part: NDArray[np.int64],
-    known: NDArray[np.int64],
-) -> None:
-    """Take out of ``clear (keyframe, line, end, echo)`` what the body occludes.
+    """Whether the body leaves both legs free, (keyframe, line, 2, rx_end, echo).
 
     Of the last sections of the ``known`` echoes the model knows that itself.
     """
-    keyframes, kinds = len(clear), len(poses.semi_axes) + 1
-    rays = []
-    for chosen, origins, targets, last, _ in leg.sections:
-        asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
-        where = np.nonzero(clear[..., chosen] & asked)
-        echo = chosen[where[-1]]
-        # At the specular point the part itself cannot be in the way, before a wall it can.
-        own = part[echo] if last else np.full(len(echo), kinds - 1)
-        rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
-    starts, stops, group, *which = (np.concatenate(column) for column in zip(*rays, strict=True))
+    keyframes, kinds = len(seen), len(poses.semi_axes) + 1
     # A group for each part at each keyframe, and one for targets on no part.
     parts = np.tile(np.append(np.arange(kinds - 1), -1), keyframes)
     pose = np.repeat(np.arange(keyframes), kinds)
-    occluded = ~body.clear(starts, stops, group, parts, pose, poses)
-    clear[tuple(index[occluded] for index in which)] = False
+    both = [np.logical_or.reduce(seen, axis=axis) for axis in (3, 2)]
+    for leg, clear in zip(legs, both, strict=True):
+        rays = []
+        for chosen, origins, targets, last, _ in leg.sections:
+            asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
+            where = np.nonzero(clear[..., chosen] & asked)
+            echo = chosen[where[-1]]
+            # At the specular point the part itself cannot be in the way, before a wall it can.
+            own = part[echo] if last else np.full(len(echo), kinds - 1)
+            rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
+        *lines, group, keyframe, line, end, echo = (
+            np.concatenate(column) for column in zip(*rays, strict=True)
+        )
+        occluded = ~body.clear(*lines, group, parts, pose, poses)
+        clear[keyframe[occluded], line[occluded], end[occluded], echo[occluded]] = False
+    return np.asarray(both[0][:, :, :, None] & both[1][:, :, None])

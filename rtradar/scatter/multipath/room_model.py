@@ -32,8 +32,7 @@ from rtradar.scatter.common.polarization import CONDUCTOR, Polarization, Surface
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
-from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
-from rtradar.scatter.multipath.image_radar import ImageRadar
+from rtradar.scatter.multipath.image_paths import Face, ImageRadar, corners, wall_paths
 from rtradar.scatter.multipath.keyframes import Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize

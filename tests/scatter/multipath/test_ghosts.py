@@ -9,7 +9,7 @@ import pytest
 
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
-from rtradar.scatter.multipath.ghosts import ghosts
+from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scene import Scene, Wall, material
 
