@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scene import Wall, material
+from rtradar.scatter import build_model
+from rtradar.scene import Furniture, Scene, Wall, material
 
 Array = NDArray[np.float64]
 Make = Callable[..., Any]
@@ -95,5 +96,23 @@ def single() -> Make:
         return Radar(
             **({"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "chirp_duration_s": 1e-3} | fields)
         )  # type: ignore[arg-type]
+
+    return make
+
+
+@pytest.fixture
+def room() -> Make:
+    """Build `specular`, or another level, between walls and furniture."""
+
+    def make(
+        radar: Radar,
+        body: Any,
+        *walls: Wall,
+        fidelity: str = "specular",
+        furniture: tuple[Furniture, ...] = (),
+        **options: Any,
+    ) -> Any:
+        scene = Scene(walls=walls, furniture=furniture)
+        return build_model(fidelity, radar, body, scene=scene, **options)
 
     return make

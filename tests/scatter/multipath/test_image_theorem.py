@@ -13,14 +13,12 @@ from rtradar.body.body import Poses
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
-from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.multipath.image_paths import images, wall_paths
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scene import Scene, Surface, Wall, material, room_walls
-from rtradar.trace.backends.backend import Backend
+from rtradar.scene import Surface, Wall, material, room_walls
 
 Array = NDArray[np.float64]
 Make = Callable[..., Any]
@@ -70,13 +68,11 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("side", ["floor", "left"])
 def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
-    side: str, polarization: str, backend: Backend, one: Make, wall: Make
+    side: str, polarization: str, one: Make, wall: Make, room: Any
 ) -> None:
     body = one()
     radar = replace(Radar.preset("paper-12ghz"), polarization=polarization)
-    model = build_model(
-        "specular", radar, body, scene=Scene(walls=(wall(side),)), variant=backend.kind, order=2
-    )  # type: ignore[arg-type]
+    model = room(radar, body, wall(side), order=2)
     chirps = np.arange(24)
     echoes = model.echoes(chirps)
     number = by_name(model, f"{side} > body > {side}")
@@ -99,12 +95,10 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("side", ["floor", "left"])
 def test_one_way_over_a_conducting_plane_by_hand(
-    side: str, polarization: str, backend: Backend, one: Make, wall: Make, single: Make
+    side: str, polarization: str, one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     body, radar = one(), single(polarization=polarization)
-    model = build_model(
-        "specular", radar, body, scene=Scene(walls=(wall(side),)), variant=backend.kind
-    )  # type: ignore[arg-type]
+    model = room(radar, body, wall(side))
     echoes = model.echoes(np.arange(1))
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
@@ -136,15 +130,13 @@ def test_one_way_over_a_conducting_plane_by_hand(
 
 
 def test_floor_out_and_a_side_wall_back_by_hand(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     # Concrete a metre thick is a half-space: 0.36 S/m leave exp(-30) of what goes through.
     radius, centre = 0.2, np.array([0.5, 0.2, 1.1])
     body, radar = one((radius,) * 3, tuple(centre)), single()
     walls = (wall("floor", "concrete", 1.0), wall("left", "concrete", 1.0))
-    model = build_model(
-        "specular", radar, body, scene=Scene(walls=walls), variant=backend.kind, order=2
-    )  # type: ignore[arg-type]
+    model = room(radar, body, *walls, order=2)
     echoes = model.echoes(np.arange(1))
     antenna = np.array(radar.position_m)
     tx, rx = antenna * [1, 1, -1], antenna * [1, -1, 1] + [0, 5, 0]
@@ -184,13 +176,12 @@ def test_floor_out_and_a_side_wall_back_by_hand(
 # -- against mirror, chirp by chirp ----------------------------------------------------------------
 
 
-def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend) -> None:
+def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(room: Any) -> None:
     body = rt.Body.from_motion(
         place(rt.synthetic_motion("kick", seed=1), start_s=0.9, duration_s=0.2)
     )
     radar = Radar.preset("paper-12ghz")
-    scene = Scene(walls=box())
-    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)
+    model = room(radar, body, *box())
     chirps = np.arange(0, 2000, 41)
     echoes, at = model.echoes(chirps), chirp_poses(radar, body, chirps)
     off, strength = [], []
@@ -208,15 +199,12 @@ def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend)
     assert np.concatenate(off).max() < 1e-6
 
 
-def test_any_block_of_chirps_gets_the_same_echoes(
-    backend: Backend, one: Make, single: Make
-) -> None:
+def test_any_block_of_chirps_gets_the_same_echoes(one: Make, single: Make, room: Any) -> None:
     body = one(velocity=(-1.0, 0.5, 0.0))
     radar = single(tx_y=2, rx_y=2)
-    scene = Scene(walls=box())
     chirps = np.arange(13, 60)
-    whole = build_model("specular", radar, body, scene=scene, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
-    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    whole = room(radar, body, *box()).echoes(chirps)
+    model = room(radar, body, *box())
     pieces = [model.echoes(block) for block in np.split(chirps, [7, 8, 30])]
     np.testing.assert_array_equal(np.concatenate([piece.length for piece in pieces]), whole.length)
     np.testing.assert_array_equal(

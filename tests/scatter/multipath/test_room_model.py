@@ -42,7 +42,7 @@ def by_name(model: RoomModel, name: str) -> int:
 
 
 def test_a_slab_before_the_radar_lets_its_square_through(
-    backend: Backend, one: Make, single: Make
+    one: Make, single: Make, room: Any
 ) -> None:
     body = one((0.2, 0.2, 0.2), (0.0, 1.0, 1.0))
     radar = single()
@@ -54,13 +54,11 @@ def test_a_slab_before_the_radar_lets_its_square_through(
         material=material("plasterboard"),
         thickness_m=0.003,
     )
-    model = build_model(
-        "specular", radar, body, scene=Scene(walls=(plasterboard,)), variant=backend.kind
-    )  # type: ignore[arg-type]
+    model = room(radar, body, plasterboard)
     echoes, free = (
         model.echoes(np.arange(2)),
-        Specular(radar, body, variant=backend.kind).echoes(np.arange(2)),
-    )  # type: ignore[arg-type]
+        Specular(radar, body).echoes(np.arange(2)),
+    )
     # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
     root = np.sqrt(material("plasterboard").eta(echoes.frequency))
     wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
@@ -74,24 +72,18 @@ def test_a_slab_before_the_radar_lets_its_square_through(
     np.testing.assert_array_equal(echoes.amplitude[..., 1:], 0)
 
 
-def test_behind_metal_there_is_nothing(
-    backend: Backend, one: Make, wall: Make, single: Make
-) -> None:
+def test_behind_metal_there_is_nothing(one: Make, wall: Make, single: Make, room: Any) -> None:
     sheet = replace(
         wall("left", "metal"),
         corner_m=(-2.0, -2.0, 0.0),
         edge_u_m=(0.0, 6.0, 0.0),
         edge_v_m=(0.0, 0.0, 3.0),
     )
-    model = build_model(
-        "specular", single(), one(), scene=Scene(walls=(sheet,)), variant=backend.kind
-    )  # type: ignore[arg-type]
+    model = room(single(), one(), sheet)
     np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
 
 
-def test_a_wall_reflects_only_where_it_is(
-    backend: Backend, one: Make, wall: Make, single: Make
-) -> None:
+def test_a_wall_reflects_only_where_it_is(one: Make, wall: Make, single: Make, room: Any) -> None:
     # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the
     # body passes x = 0.2.
     body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
@@ -102,9 +94,7 @@ def test_a_wall_reflects_only_where_it_is(
     chirps = np.arange(0, 1000, keyframe_step(radar, KEYFRAMES_S))
     found = []
     for mirror in (sheet, wall("left")):
-        model = build_model(
-            "specular", radar, body, scene=Scene(walls=(mirror,)), variant=backend.kind
-        )  # type: ignore[arg-type]
+        model = room(radar, body, mirror)
         found.append(np.abs(model.echoes(chirps).amplitude[0, :, 0, 1]))
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     _, _, point = solve_specular_points(
@@ -124,17 +114,13 @@ def test_a_wall_reflects_only_where_it_is(
     # On its way in it grows smoothly, chirp by chirp.
     first = int(chirps[np.flatnonzero(deep > 0)[0]])
     moments = np.arange(first - keyframe_step(radar, KEYFRAMES_S), first + 1)
-    onset = np.abs(
-        build_model("specular", radar, body, scene=Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
-        .echoes(moments)
-        .amplitude[0, :, 0, 1]
-    )
+    onset = np.abs(room(radar, body, sheet).echoes(moments).amplitude[0, :, 0, 1])
     assert (np.diff(onset) > 0).all()
 
 
 @pytest.mark.parametrize("hides", [True, False])
 def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
-    hides: bool, backend: Backend, one: Make, wall: Make, single: Make
+    hides: bool, backend: Backend, one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     # A wardrobe between radar and body; the floor before it is free, but what goes over it meets
     # its side.
@@ -142,14 +128,15 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
     wardrobe = Furniture(
         name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place
     )
-    scene = Scene(walls=(wall("floor"), wall("left")), furniture=(wardrobe,))
     body = one(centre=(1.0, 1.0, 1.0))
-    model = build_model("specular", single(), body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    given = single(), body, wall("floor"), wall("left")
+    options = {"furniture": (wardrobe,), "variant": backend.kind}
+    model = room(*given, **options)
     seen = np.abs(model.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as
     # well.
     np.testing.assert_array_equal(seen, not hides)
-    second = build_model("specular", single(), body, scene=scene, variant=backend.kind, order=2)  # type: ignore[arg-type]
+    second = room(*given, **options, order=2)
     seen = np.abs(second.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     number = by_name(second, "left > body > left")
     assert seen[number]
@@ -157,16 +144,15 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
 
 
 def test_furniture_occludes_by_the_backend_that_was_asked_for_also_where_no_part_does(
-    one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     # `auto` traces nothing by itself where nothing comes near a line of sight.
-    scene = Scene(walls=(wall("left"),))
-    model = build_model("auto", single(), one(), scene=scene, variant="scalar")
+    model = room(single(), one(), wall("left"), fidelity="auto", variant="scalar")
     assert model.variant == "scalar"
 
 
 def test_another_part_hides_a_leg_over_a_wall(
-    backend: Backend, wall: Make, single: Make, still: Make
+    backend: Backend, wall: Make, single: Make, still: Make, room: Any
 ) -> None:
     # A large sphere on the way from the left wall to the small one; both are free before the radar.
     small, radar = np.array([0.0, 1.0, 1.0]), single()
@@ -175,9 +161,7 @@ def test_another_part_hides_a_leg_over_a_wall(
     body = still(
         np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2)
     )
-    model = build_model(
-        "specular", radar, body, scene=Scene(walls=(wall("left"),)), variant=backend.kind
-    )  # type: ignore[arg-type]
+    model = room(radar, body, wall("left"), variant=backend.kind)
     echoes = model.echoes(np.arange(1))
     seen = {
         (name, part): bool(abs(echoes.amplitude[0, 0, 0, 2 * i + part]) > 0)
@@ -198,11 +182,10 @@ def test_another_part_hides_a_leg_over_a_wall(
 
 
 def test_what_stays_below_the_noise_is_left_out_and_told(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
-    body, radar = one(), single(frame_duration_s=0.1)
-    scene = Scene(walls=(wall("floor", "wood", 0.02), wall("left")))
-    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    given = single(frame_duration_s=0.1), one(), wall("floor", "wood", 0.02), wall("left")
+    model = room(*given)
     whole = model.echoes(np.arange(0, 100, 10))
     power = (np.abs(whole.amplitude) ** 2).mean(axis=(0, 1, 2))
     gain = 256 * 100
@@ -220,9 +203,7 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
     assert names["left > body"].why == ""
     assert names["body"].kept == ["part 0"]
     assert kept.length.shape[2] == 3
-    again = build_model("specular", radar, body, scene=scene, variant=backend.kind).echoes(
-        np.arange(20)
-    )  # type: ignore[arg-type]
+    again = room(*given).echoes(np.arange(20))
     stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
     # What is left is of conductors, and the same at all frequencies.
     assert len(kept.frequency) == 1
@@ -232,17 +213,16 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
 
 
 def test_the_weakest_are_left_out_as_far_as_is_tolerated(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
-    scene = Scene(walls=(wall("floor"), wall("left")))
-    room = single(frame_duration_s=0.1), one()
-    whole = build_model("specular", *room, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    given = single(frame_duration_s=0.1), one(), wall("floor"), wall("left")
+    whole = room(*given)
     whole.prune(100, 0.0)
     echoes = whole.echoes(np.arange(0, 100, 4))
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
     weakest = int(np.argmin(np.where(echoes.bounces > 1, power, np.inf)))
     for share, count in ((0.5, 0), (1.5, 1)):
-        model = build_model("specular", *room, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+        model = room(*given)
         summaries = model.prune(100, 0.0, share * power[weakest])
         assert model.left_out == count
         assert model.left_out_m2 == pytest.approx(count * power[weakest], rel=0.05)
@@ -257,7 +237,7 @@ def test_the_weakest_are_left_out_as_far_as_is_tolerated(
 
 
 def test_without_noise_only_what_is_never_seen_is_left_out(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     aside = replace(
         wall("floor"),
@@ -265,9 +245,7 @@ def test_without_noise_only_what_is_never_seen_is_left_out(
         edge_u_m=(1.0, 0.0, 0.0),
         edge_v_m=(0.0, 1.0, 0.0),
     )
-    model = build_model(
-        "specular", single(), one(), scene=Scene(walls=(aside, wall("left"))), variant=backend.kind
-    )  # type: ignore[arg-type]
+    model = room(single(), one(), aside, wall("left"))
     summaries = {summary.path: summary for summary in model.prune(50, 0.0)}
     assert summaries["floor > body"].dropped == ["part 0"]
     assert summaries["floor > body"].power_m2 == 0
@@ -289,12 +267,10 @@ def test_without_noise_only_what_is_never_seen_is_left_out(
     ],
 )
 def test_what_has_no_meaning_is_refused(
-    given: dict[str, object], message: str, one: Make, wall: Make, single: Make
+    given: dict[str, object], message: str, one: Make, wall: Make, single: Make, room: Any
 ) -> None:
-    scene = Scene(walls=(wall("floor"),))
-    options = {"fidelity": "specular"} | given
     with pytest.raises(InputError, match=message) as error:
-        build_model(radar=single(), body=one(), scene=scene, variant="scalar", **options)  # type: ignore[arg-type]
+        room(single(), one(), wall("floor"), **given)
     assert "\n" not in str(error.value)
 
 
@@ -323,11 +299,10 @@ def test_direct_echoes_and_ghosts_follow_from_one_formula(
 
 
 def test_analytic_has_the_same_paths_with_its_own_returns(
-    one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     body, radar = one((0.1, 0.1, 0.1)), single()
-    scene = Scene(walls=(wall("left"),))
-    model = build_model("analytic", radar, body, scene=scene)  # type: ignore[arg-type]
+    model = room(radar, body, wall("left"), fidelity="analytic")
     echoes = model.echoes(np.arange(5))
     assert model.variant is None
     # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall
@@ -344,12 +319,12 @@ def test_analytic_has_the_same_paths_with_its_own_returns(
 
 
 def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
     # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is
     # not seen.
     walls = (wall("floor", "concrete", 0.2), wall("left", "plasterboard", 0.005))
-    model = build_model("specular", single(), one(), scene=Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
+    model = room(single(), one(), *walls)
     amplitude = model.echoes(np.arange(3)).amplitude
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
@@ -363,36 +338,31 @@ def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
 
 @pytest.mark.parametrize("name", ["perfect-conductor", "skin"])
 def test_the_person_alone_is_specular_in_free_space(
-    name: str, backend: Backend, one: Make, wall: Make
+    name: str, one: Make, wall: Make, room: Any
 ) -> None:
     body, radar, chirps = (
         one(velocity=(-1.0, 0.0, 0.0)),
         Radar.preset("paper-12ghz"),
         np.arange(100),
     )
-    scene = Scene(walls=(wall("floor", "concrete"),))
-    room = build_model("specular", radar, body, scene=scene, variant=backend.kind, materials=[name])  # type: ignore[arg-type]
-    free = build_model("specular", radar, body, variant=backend.kind, materials=[name])  # type: ignore[arg-type]
-    free = free.echoes(chirps)
-    alone = room.person.echoes(chirps)
+    model = room(radar, body, wall("floor", "concrete"), materials=[name])
+    free = build_model("specular", radar, body, materials=[name]).echoes(chirps)
+    alone = model.person.echoes(chirps)
     np.testing.assert_array_equal(alone.length, free.length)
     np.testing.assert_array_equal(alone.amplitude, free.amplitude)
     # Its direct echo in the room is the same, for the floor is beside it.
-    direct = room.echoes(chirps).amplitude[1, ..., 0]
+    direct = model.echoes(chirps).amplitude[1, ..., 0]
     # In the room the reflection of skin follows the sweep and the ends of the lines, here it is
     # that of the middle.
     np.testing.assert_allclose(direct, free.amplitude[0, ..., 0], rtol=2e-3)
 
 
 def test_skin_over_a_wall_is_weaker_by_its_reflection(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
-    scene, chirps = Scene(walls=(wall("left"),)), np.arange(2)
-    body = one((0.2, 0.2, 0.2))
+    given = single(), one((0.2, 0.2, 0.2)), wall("left")
     metal, skin = (
-        build_model(
-            "specular", single(), body, scene=scene, variant=backend.kind, materials=[name]
-        ).echoes(chirps)  # type: ignore[arg-type]
+        room(*given, materials=[name]).echoes(np.arange(2))
         for name in ("perfect-conductor", "skin")
     )
     # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand,
@@ -410,15 +380,9 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(
 
 
 def test_direct_echoes_of_a_conductor_need_one_frequency(
-    backend: Backend, one: Make, wall: Make, single: Make
+    one: Make, wall: Make, single: Make, room: Any
 ) -> None:
-    model = build_model(
-        "specular",
-        single(),
-        one(),
-        scene=Scene(walls=(wall("left", "brick"),)),
-        variant=backend.kind,
-    )  # type: ignore[arg-type]
+    model = room(single(), one(), wall("left", "brick"))
     chirps = np.arange(40)
     whole, direct = model.echoes(chirps), model.without_ghosts().echoes(chirps)
     assert len(whole.frequency) > 1

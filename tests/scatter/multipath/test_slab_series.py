@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +14,11 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
-from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.slab_series import Term, room_series
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material, slab
 from rtradar.scene.slab import slab_passes
-from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 C = SPEED_OF_LIGHT_MPS
@@ -27,22 +26,18 @@ PRESET = Radar.preset("paper-12ghz")
 FREQUENCY = np.linspace(12e9, 16e9, 401)
 
 
-def pane(made: str | Material, thickness: float, x: float = -2.0) -> Wall:
-    """Across the way from a radar at x = -4 to a body at x = 0."""
-    own = material(made) if isinstance(made, str) else made
-    edges = {"edge_u_m": (0.0, 0.0, 40.0), "edge_v_m": (0.0, 40.0, 0.0)}
+def pane(made: str | Material, thickness: float, x: float = -2.0, *, beside: bool = False) -> Wall:
+    """Across the way from a radar at x = -4 to a body at x = 0; or beside it, at y = 1.6."""
+    along = (40.0, 0.0, 0.0), (0.0, 0.0, 40.0)
+    edges = along if beside else ((0.0, 0.0, 40.0), (0.0, 40.0, 0.0))
     return Wall(
-        name="pane", corner_m=(x, -20.0, -20.0), material=own, thickness_m=thickness, **edges
-    )  # type: ignore[arg-type]
-
-
-def side(made: str | Material, thickness: float) -> Wall:
-    """Beside that way, at y = 1.6."""
-    own = material(made) if isinstance(made, str) else made
-    edges = {"edge_u_m": (40.0, 0.0, 0.0), "edge_v_m": (0.0, 0.0, 40.0)}
-    return Wall(
-        name="side", corner_m=(-20.0, 1.6, -20.0), material=own, thickness_m=thickness, **edges
-    )  # type: ignore[arg-type]
+        name="side" if beside else "pane",
+        corner_m=(-20.0, 1.6, -20.0) if beside else (x, -20.0, -20.0),
+        edge_u_m=edges[0],
+        edge_v_m=edges[1],
+        material=material(made) if isinstance(made, str) else made,
+        thickness_m=thickness,
+    )
 
 
 @dataclass(frozen=True)
@@ -155,14 +150,12 @@ def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
     ("name", "thickness"), [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125)]
 )
 def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
-    name: str, thickness: float, backend: Backend
+    name: str, thickness: float, room: Any
 ) -> None:
     body, radar = Ball((0.0, 0.0, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     wall = pane(name, thickness)
-    behind = build_model(
-        "specular", radar, body, scene=Scene(walls=(wall,)), variant=backend.kind, order=0
-    ).echoes(np.arange(1))  # type: ignore[arg-type]
-    free = Specular(radar, body, variant=backend.kind).echoes(np.arange(1))  # type: ignore[arg-type]
+    behind = room(radar, body, wall, order=0).echoes(np.arange(1))
+    free = Specular(radar, body).echoes(np.arange(1))
     way = np.array([4.0, -1.0, 0.0]) - 0.0
     cosine = abs(way[0]) / np.linalg.norm(way)
     passed = slab(wall.material.eta(FREQUENCY), thickness, FREQUENCY, cosine, "te")[1]
@@ -176,18 +169,9 @@ def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
     assert error < 0.02
 
 
-def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
-    backend: Backend,
-) -> None:
+def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(room: Any) -> None:
     body = Ball((0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
-    model = build_model(
-        "specular",
-        PRESET,
-        body,
-        scene=Scene(walls=(pane("brick", 0.24),)),
-        variant=backend.kind,
-        order=0,
-    )  # type: ignore[arg-type]
+    model = room(PRESET, body, pane("brick", 0.24), order=0)
     # Between two keyframes, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
     echoes, free = model.echoes(chirps), model.person.echoes(chirps)
@@ -205,13 +189,11 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
     assert np.ptp(farther) > 2e-3
 
 
-def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
+def test_one_pruned_echo_list_for_all_of_a_capture(room: Any) -> None:
     # It walks out from behind a partition of brick.
     partition = replace(pane("brick", 0.1), corner_m=(-2.0, -3.0, -20.0), edge_v_m=(0.0, 3.5, 0.0))
     body = Ball((0.0, -1.2, 1.0), velocity=(0.0, 3.0, 0.0))
-    model = build_model(
-        "specular", PRESET, body, scene=Scene(walls=(partition,)), variant=backend.kind, order=1
-    )  # type: ignore[arg-type]
+    model = room(PRESET, body, partition, order=1)
     n_chirps = int(0.9 / PRESET.chirp_duration_s)
     (direct, *_) = model.prune(n_chirps, 0.0)
     assert direct.kept == ["ball"]
@@ -229,20 +211,11 @@ def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
 
 
 @pytest.mark.parametrize(("name", "thickness"), [("brick", 0.11), ("plasterboard", 0.025)])
-def test_ghosts_off_a_wall_whose_back_answers(
-    name: str, thickness: float, backend: Backend
-) -> None:
+def test_ghosts_off_a_wall_whose_back_answers(name: str, thickness: float, room: Any) -> None:
     body, radar = Ball((2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     found = {}
     for made, depth in ((name, thickness), ("perfect-conductor", 0.1)):
-        model = build_model(
-            "specular",
-            radar,
-            body,
-            scene=Scene(walls=(side(made, depth),)),
-            variant=backend.kind,
-            order=2,
-        )  # type: ignore[arg-type]
+        model = room(radar, body, pane(made, depth, beside=True), order=2)
         echoes = model.echoes(np.arange(1))
         for path in ("side > body", "side > body > side"):
             own = np.array(model.path_names)[echoes.path] == path
@@ -297,13 +270,9 @@ def test_a_wall_that_is_not_followed_is_a_limit(tmp_path: Path) -> None:
     ("name", "thickness"),
     [("brick", 0.11), ("brick", 0.24), ("concrete", 0.1), ("plasterboard", 0.0125)],
 )
-def test_a_mirror_of_a_thick_wall_is_held_to_a_thousandth(
-    name: str, thickness: float, backend: Backend
-) -> None:
+def test_a_mirror_of_a_thick_wall_is_held_to_a_thousandth(name: str, thickness: float) -> None:
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512)
-    (own,) = Clutter(
-        radar, Scene(walls=(side(name, thickness),)), order=1, variant=backend.kind
-    ).objects
+    (own,) = Clutter(radar, Scene(walls=(pane(name, thickness, beside=True),)), order=1).objects
     ours = spectrum(own.length, own.amplitude, own.frequency)[:, 0, 0]
     distance = 2 * (1.6 - radar.position_m[1])
     reflected = slab(material(name).eta(FREQUENCY), thickness, FREQUENCY, 1.0, "te")[0]
@@ -315,7 +284,7 @@ def test_a_mirror_of_a_thick_wall_is_held_to_a_thousandth(
     assert (own.n_echoes == 1) == (name == "plasterboard")
 
 
-def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: Backend) -> None:
+def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs() -> None:
     radar = Radar(
         tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512, position_m=(-4.0, 0.0, 1.0)
     )
@@ -345,7 +314,6 @@ def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: 
                 radar,
                 Scene(walls=(*walls, *more), furniture=furniture),
                 order=0,
-                variant=backend.kind,
             ).objects
             (own,) = (one for one in objects if one.kind == kind)
             found.append(spectrum(own.length, own.amplitude, own.frequency)[:, 0, 0])
@@ -354,11 +322,11 @@ def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: 
         assert np.abs(behind - free * passed**2).max() < 0.1 * np.abs(free * passed**2).max(), kind
 
 
-def test_clutter_that_cannot_be_followed_is_refused(backend: Backend) -> None:
+def test_clutter_that_cannot_be_followed_is_refused() -> None:
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512)
     with pytest.raises(
         InputError,
         match=r"^clutter of scene '.*': over the sweep the return 'side' is off by .*allowed is "
         r"0\.001",
     ):
-        Clutter(radar, Scene(walls=(side(dispersive(), 3.0),)), order=1, variant=backend.kind)
+        Clutter(radar, Scene(walls=(pane(dispersive(), 3.0, beside=True),)), order=1)

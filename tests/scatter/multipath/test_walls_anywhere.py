@@ -10,8 +10,7 @@ import pytest
 from rtradar.radar import Radar
 from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.image_paths import Face, corners, wall_paths
-from rtradar.scene import Scene, Surface, Wall, material, room_walls
-from rtradar.trace.backends.backend import Backend
+from rtradar.scene import Surface, Wall, material, room_walls
 
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 ROOM = room_walls(
@@ -50,7 +49,7 @@ def _valid(leg: Any, antenna: np.ndarray, points: np.ndarray) -> bool:
 
 
 def test_over_a_wall_that_is_not_parallel_to_others_an_echo_is_that_of_a_turned_radar(
-    backend: Backend, one: Any
+    one: Any, room: Any
 ) -> None:
     # A mirror turned by 25 degrees about the vertical: v stays v. Its image of the radar by hand.
     turn = np.radians(25)
@@ -68,33 +67,28 @@ def test_over_a_wall_that_is_not_parallel_to_others_an_echo_is_that_of_a_turned_
         thickness_m=0.01,
     )
     np.testing.assert_allclose(mirror.normal, normal, atol=1e-12)
-    body, kind = one((0.1, 0.1, 0.1), (0.0, 0.3, 1.2)), backend.kind
-    model = build_model(
-        "specular", RADAR, body, scene=Scene(walls=(mirror,)), variant=kind, order=2
-    )
+    body = one((0.1, 0.1, 0.1), (0.0, 0.3, 1.2))
+    model = room(RADAR, body, mirror, order=2)
     echoes = model.echoes(np.arange(1))
     index = model.path_names.index("leaning > body > leaning")
     middle = np.array(RADAR.position_m)
     image = middle - 2 * ((middle - corner) @ normal) * normal
     seen = replace(RADAR, position_m=tuple(image))
-    alone = build_model("specular", seen, body, variant=kind).echoes(np.arange(1))
+    alone = build_model("specular", seen, body).echoes(np.arange(1))
     assert echoes.length[0, 0, index] == pytest.approx(alone.length[0, 0, 0], abs=1e-12)
     assert echoes.amplitude[0, 0, 0, index] == pytest.approx(alone.amplitude[0, 0, 0, 0], rel=1e-5)
 
 
 @pytest.mark.parametrize(("aside_m", "through"), [(0.0, True), (2.0, False)])
 def test_a_person_is_seen_through_a_doorway_and_behind_the_wall_beside_it(
-    aside_m: float, through: bool, backend: Backend, one: Any
+    aside_m: float, through: bool, one: Any, room: Any
 ) -> None:
     # The leg from y = 1 to 0.6 meets the wall at 0.8 m, in the middle of a doorway 1.2 m wide.
     doorway = replace(PARTITION, openings=((20.2 - aside_m, 19.0, 1.2, 3.0),))
     body = one((0.1, 0.1, 0.1), (0.0, 0.6, 1.0))
     scenes = (), (PARTITION,), (doorway,)
     free, behind, got = (
-        build_model(
-            "specular", RADAR, body, scene=Scene(walls=walls), variant=backend.kind, order=0
-        ).echoes(np.arange(1))
-        for walls in scenes
+        room(RADAR, body, *walls, order=0).echoes(np.arange(1)) for walls in scenes
     )
     expected = free if through else behind
     own = np.abs(got.amplitude[..., 0, :]).max(axis=0)
