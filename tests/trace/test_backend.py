@@ -50,15 +50,11 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     return set_up
 
 
-def test_auto_passes_over_a_bad_library_to_the_next_good_one(machine: Machine) -> None:
-    machine(BAD, WHEEL, OLD)
-    assert select("auto") == Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4")
-
-
-@pytest.mark.parametrize("bad", [BAD, OLD])
-def test_llvm_by_name_passes_over_bad_ones_too(machine: Machine, bad: Library) -> None:
-    machine(bad, WHEEL)
-    assert select("llvm").llvm_path == WHEEL.path
+@pytest.mark.parametrize("variant", ["auto", "cpu", "llvm"])
+def test_bad_libraries_are_passed_over_to_the_next_good_one(machine: Machine, variant: str) -> None:
+    for gpu in (False, True):  # a GPU is taken only by name
+        machine(BAD, OLD, WHEEL, gpu=gpu)
+        assert select(variant) == Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4")
 
 
 @pytest.mark.parametrize("libraries", [(), (OLD,)])
@@ -93,12 +89,6 @@ def test_cuda_only_where_its_probe_succeeds(machine: Machine) -> None:
         select("cuda")
     machine(WHEEL, gpu=True)
     assert select("cuda") == Backend("cuda", "cuda_ad_rgb", WHEEL.path, "23.1.4")
-
-
-@pytest.mark.parametrize("variant", ["auto", "cpu"])
-def test_a_gpu_is_taken_only_by_name(machine: Machine, variant: str) -> None:
-    machine(WHEEL, gpu=True)
-    assert select(variant).kind == "llvm"
 
 
 def test_available_lists_what_works(machine: Machine) -> None:
@@ -163,19 +153,6 @@ def test_environment_then_wheel_then_system_newest_first(
         ("libLLVM.so.18.1", "system"),
         ("libLLVM-9.so.1", "system"),
     ]
-
-
-@pytest.mark.parametrize(
-    ("name", "version"),
-    [
-        ("libLLVM-15.so.1", "15"),
-        ("libLLVM.so.23.1", "23.1"),
-        ("libLLVM-14.0.6.so.1", "14.0.6"),
-        ("libLLVM.dylib", None),
-    ],
-)
-def test_version_by_name(name: str, version: str | None) -> None:
-    assert Library(f"/lib/{name}", "system").version == version
 
 
 # -- probing ---------------------------------------------------------------------------------------
@@ -250,7 +227,7 @@ def test_results_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.Mon
     assert not empty_cache.exists()
 
 
-@pytest.mark.parametrize("content", ["", "{", "[1]", "\x00"])
+@pytest.mark.parametrize("content", ["{", "[1]"])
 def test_a_spoilt_cache_is_written_anew(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch, content: str
 ) -> None:

@@ -68,15 +68,6 @@ def test_places_on_a_part_are_exact_and_normals_point_outward(backend: Backend) 
     assert np.isnan(surfaces.distance(np.array([0]), rows([1, 0, 0]), rows([0, 1, 0])))
 
 
-def test_only_other_parts_hide_a_point(backend: Backend) -> None:
-    surfaces = body(backend)
-    antennas = rows([0, 4, 0], [4, 0, 0], [0, -4, 0])
-    points = rows([0, 0.1, 0], [0.1, 0, 0], [0, 0.1, 0])
-    np.testing.assert_array_equal(
-        surfaces.sees(antennas, points, np.zeros(3, dtype=np.int64)), [False, True, True]
-    )
-
-
 def test_faces_keep_their_numbers_and_their_planes_have_no_border(backend: Backend) -> None:
     surfaces = mesh(backend)
     points, normals = (
