@@ -149,16 +149,12 @@ def _pairs(
         raise InputError(
             "scattering_length: tx, rx [m] and frequency [Hz] must be numbers"
         ) from None
-    shapes = f"tx {tx_array.shape}, rx {rx_array.shape}, frequency {frequencies.shape}"
     counts = {len(tx_array), len(rx_array), *frequencies.shape} - {1}
-    if (
-        tx_array.shape[1:] != (3,)
-        or rx_array.shape[1:] != (3,)
-        or frequencies.ndim > 1
-        or len(counts) > 1
-    ):
+    triples = tx_array.shape[1:] == rx_array.shape[1:] == (3,)
+    if not triples or frequencies.ndim > 1 or len(counts) > 1:
         raise InputError(
-            f"scattering_length: shapes {shapes}; they must be (n, 3), (n, 3), (n,), or one for all"
+            f"scattering_length: shapes tx {tx_array.shape}, rx {rx_array.shape}, frequency "
+            f"{frequencies.shape}; they must be (n, 3), (n, 3), (n,), or one for all"
         )
     if not (np.isfinite(tx_array).all() and np.isfinite(rx_array).all()):
         raise InputError("scattering_length: tx and rx must be finite [m]")

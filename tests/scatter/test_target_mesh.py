@@ -37,31 +37,19 @@ class NoTrimesh:
 
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "a vertex is NaN": (lambda: mesh(moved(3, np.nan), FACES), "not finite"),
-    "a vertex is infinite": (lambda: mesh(moved(3, np.inf), FACES), "not finite"),
     "a vertex is beyond all bounds": (lambda: mesh(moved(3, 1e200), FACES), "more than 1e"),
-    "a vertex that no face names is NaN": (
-        lambda: mesh(np.vstack([CORNERS, [np.nan] * 3]), FACES),
-        "not finite",
-    ),
     "vertices in a plane of two axes": (
         lambda: mesh(CORNERS[:, :2], FACES),
         r"must be \(vertex, 3\)",
     ),
-    "no vertices": (trimesh.Trimesh, "no triangles"),
     "no faces": (lambda: mesh(CORNERS, np.zeros((0, 3), int)), "no triangles"),
-    "all corners alike": (lambda: mesh(np.zeros((3, 3)), [[0, 1, 2]]), "no triangle with an area"),
     "corners on a line": (
         lambda: mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]),
         "no triangle with an area",
     ),
-    "a corner named twice": (lambda: mesh(CORNERS, [[0, 0, 1]]), "no triangle with an area"),
     "too small for float64": (lambda: mesh(CORNERS * 1e-200, FACES), "no triangle with an area"),
     "an index too high": (
         lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, 99]])),
-        "vertex that is not there",
-    ),
-    "an index below zero": (
-        lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, -1]])),
         "vertex that is not there",
     ),
     "a face wound the other way": (
@@ -70,8 +58,6 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "vertices and faces, but no trimesh": (NoTrimesh, "the target is a NoTrimesh; allowed"),
     "points": (lambda: trimesh.PointCloud(CORNERS), "the target is a PointCloud; allowed"),
-    "a scene": (lambda: trimesh.Scene([BOX]), "the target is a Scene; allowed"),
-    "words": (lambda: "a person", "the target is a str; allowed"),
     "nothing": (lambda: None, "the target is a NoneType; allowed"),
 }
 
@@ -80,25 +66,25 @@ def test_every_model_is_told_of() -> None:
     assert {*WITH_MESHES, *WITHOUT} == set(models_that("scattering"))
 
 
-@pytest.mark.parametrize("pairs", [1, 0])
-@pytest.mark.parametrize("fidelity", WITH_MESHES)
-@pytest.mark.parametrize("case", BAD)
-def test_bad_meshes_are_refused_alike(case: str, fidelity: str, pairs: int) -> None:
+@pytest.mark.parametrize(
+    ("case", "fidelity"),
+    [*((case, "physical-optics") for case in BAD), ("points", "reference"), ("points", "rays")],
+)
+def test_bad_meshes_are_refused_alike(case: str, fidelity: str) -> None:
     make, said = BAD[case]
-    tx = np.tile(AWAY, (pairs, 1))
-    with pytest.raises(InputError, match=said) as caught:
-        rt.scattering_length(make(), tx, tx, 3e9, fidelity=fidelity)
-    assert "\n" not in str(caught.value)
+    for pairs in (1, 0):
+        tx = np.tile(AWAY, (pairs, 1))
+        with pytest.raises(InputError, match=said) as caught:
+            rt.scattering_length(make(), tx, tx, 3e9, fidelity=fidelity)
+        assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("fidelity", WITHOUT)
-@pytest.mark.parametrize(
-    "make", [lambda: BOX, *(make for make, _ in BAD.values())], ids=["a good mesh", *BAD]
-)
-def test_models_that_take_no_meshes_say_so(make: Callable[[], Any], fidelity: str) -> None:
-    with pytest.raises(InputError, match=f"'{fidelity}' takes rt.Ellipsoids, not") as caught:
-        rt.scattering_length(make(), AWAY, AWAY, 3e9, fidelity=fidelity)
-    assert "\n" not in str(caught.value)
+def test_models_that_take_no_meshes_say_so(fidelity: str) -> None:
+    for target in (BOX, trimesh.PointCloud(CORNERS), "a person"):
+        with pytest.raises(InputError, match=f"'{fidelity}' takes rt.Ellipsoids, not") as caught:
+            rt.scattering_length(target, AWAY, AWAY, 3e9, fidelity=fidelity)  # type: ignore[arg-type]
+        assert "\n" not in str(caught.value)
 
 
 SHEET = mesh(
@@ -106,29 +92,25 @@ SHEET = mesh(
 )
 
 
-@pytest.mark.parametrize("fidelity", WITH_MESHES)
-@pytest.mark.parametrize("name", ["tx", "rx"])
 @pytest.mark.parametrize(
-    ("target", "place"),
+    ("target", "place", "fidelity"),
     [
-        (BOX, (0, 0, 0)),
-        (BOX, (0.1, 0.01, 0.02)),
-        (BOX, tuple(CORNERS[0])),
-        (SHEET, (0, 0.01, 0.05)),
-        (SHEET, (0, 0.2, 0.2)),
+        (BOX, (0, 0, 0), "physical-optics"),
+        (BOX, (0.1, 0.01, 0.02), "reference"),
+        (BOX, tuple(CORNERS[0]), "rays"),
+        (SHEET, (0, 0.01, 0.05), "physical-optics"),
+        (SHEET, (0, 0.2, 0.2), "rays"),
     ],
     ids=["inside", "on a face", "on a corner", "on a sheet", "on a sheet's corner"],
 )
 def test_antennas_stand_outside(
-    target: Any, place: tuple[float, float, float], name: str, fidelity: str
+    target: Any, place: tuple[float, float, float], fidelity: str
 ) -> None:
-    antennas = {"tx": [AWAY, AWAY], "rx": [AWAY, AWAY]} | {
-        name: [AWAY, np.array(place, dtype=np.float64)]
-    }
-    with pytest.raises(
-        InputError, match=rf"{name}\[1\] is .*on.*; antennas must stand outside the target"
-    ):
-        rt.scattering_length(target, antennas["tx"], antennas["rx"], 3e9, fidelity=fidelity)
+    there, away = [AWAY, np.array(place, dtype=np.float64)], [AWAY, AWAY]
+    for name, antennas in (("tx", (there, away)), ("rx", (away, there))):
+        said = rf"{name}\[1\] is .*on.*; antennas must stand outside the target"
+        with pytest.raises(InputError, match=said):
+            rt.scattering_length(target, *antennas, 3e9, fidelity=fidelity)
 
 
 def sphere(radius: float, y: float = 0.0) -> trimesh.Trimesh:

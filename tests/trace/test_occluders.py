@@ -73,13 +73,6 @@ def test_a_surface_does_not_hide_its_own_points(backend: Backend, box: Scene) ->
     assert not tracer.clear(antenna, far).any()
 
 
-def test_what_stands_behind_the_target_does_not_block(backend: Backend, box: Scene) -> None:
-    before = CORNER + SIZE / 2 - [SIZE[0] / 2 + 0.01, 0, 0]
-    tracer = Occluders(use(backend), box)
-    assert tracer.clear(np.array([-4.0, 1.0, 1.0]), before)
-    assert not tracer.clear(np.array([-4.0, 1.0, 1.0]), before + np.array([0.1, 0, 0]))
-
-
 def test_people_are_in_the_way_where_they_are_at_each_time(backend: Backend) -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=2.0))
     occluders, times = Occluders(use(backend), Scene(), body), np.array([0.0, 2.0, 9.0])

@@ -25,7 +25,15 @@ from scipy.special import fresnel
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.multipath.furniture_faces import SolidFace
-from rtradar.scatter.multipath.image_paths import Face, Leg, corners, height, image, image_chain
+from rtradar.scatter.multipath.image_paths import (
+    Face,
+    Leg,
+    corners,
+    height,
+    image,
+    image_chain,
+    inside,
+)
 from rtradar.scene import Wall
 
 Array = NDArray[np.float64]
@@ -245,8 +253,6 @@ def _free(wall: Wall, ends: Array, walls: Sequence[Wall]) -> Bools:
 
 def touches(wall: Wall, points: Array) -> Bools:
     """Tell whether points (point, 3) [m] lie on a wall or inside it."""
-    u, v, above = _on_face(wall, points, back=False)
+    above = height(wall, points)
     near = (above <= _TOUCHES_M) & (above >= -wall.thickness_m - _TOUCHES_M)
-    for place, edge in ((u, wall.edge_u_m), (v, wall.edge_v_m)):
-        near &= (place >= -_TOUCHES_M) & (place <= np.linalg.norm(edge) + _TOUCHES_M)
-    return np.asarray(near)
+    return near & inside(wall, points, _TOUCHES_M)

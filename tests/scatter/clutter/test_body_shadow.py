@@ -166,8 +166,3 @@ def _dense(shadow: ClutterShadow, keyframe: int, clutter: Clutter) -> Array:
     lost = shadow.at(keyframe)
     fraction[..., lost.echo] = lost.fraction[0]
     return fraction
-
-
-def test_a_body_outside_hides_nothing(clutter: Clutter) -> None:
-    shadow = ClutterShadow(clutter, Ball(place=(30.0, 0.0, 1.0)))
-    assert len(shadow.at(3).echo) == len(shadow.at(3).mirror) == 0

@@ -12,7 +12,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter import furniture as clutter_furniture
 from rtradar.scatter.clutter.furniture import furniture_returns
 from rtradar.scatter.clutter.returns import RoomEchoes
-from rtradar.scene import Furniture, Scene, Wall, material, reflection, slab
+from rtradar.scene import Furniture, Scene, material, reflection
 from rtradar.trace.backends.backend import select, use
 
 AWAY = 60.0
@@ -106,26 +106,6 @@ def test_what_stands_before_hides_what_stands_behind(tmp_path: Path) -> None:
     behind = block(tmp_path, "behind", (0.1, 0.5, 0.5), (1.0, 0, 1), "metal")
     beside = block(tmp_path, "beside", (0.1, 0.5, 0.5), (1.0, 1.5, 1), "metal")
     assert set(returns(WIDE, Scene(furniture=(front, behind, beside)))) == {"front", "beside"}
-
-
-def test_a_wall_on_the_way_is_passed_twice(tmp_path: Path) -> None:
-    scene = Scene(furniture=(block(tmp_path, "block", (0.1, 0.4, 0.3), (0.05, 0, 1), "metal"),))
-    pane = Wall(
-        name="pane",
-        corner_m=(-30, -20, -20),
-        edge_u_m=(0, 40, 0),
-        edge_v_m=(0, 0, 40),
-        material=material("plasterboard"),
-        thickness_m=0.0125,
-    )
-    frequency = np.linspace(12.2e9, 15.8e9, 7)
-    free = field(returns(ONE, scene)["block"], ONE, frequency)
-    walled = Scene(furniture=scene.furniture, walls=(pane,))
-    behind = field(returns(ONE, walled)["block"], ONE, frequency)
-    _, through = slab(pane.material.eta(frequency), 0.0125, frequency, 1.0, "te")
-    air = np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * 0.0125)
-    # Five frequency nodes for the block and the pane together.
-    np.testing.assert_allclose((behind / free).ravel(), np.conj((through * air) ** 2), rtol=0.02)
 
 
 def test_groups_and_their_frequency_nodes_add_up_to_all_facets(

@@ -92,43 +92,6 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
     assert echoes.part[number] == 0
 
 
-@pytest.mark.parametrize("polarization", ["v", "h"])
-@pytest.mark.parametrize("side", ["floor", "left"])
-def test_one_way_over_a_conducting_plane_by_hand(
-    side: str, polarization: str, one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    body, radar = one(), single(polarization=polarization)
-    model = room(radar, body, wall(side))
-    echoes = model.echoes(np.arange(1))
-    turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
-    shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
-    antenna = np.array(radar.position_m)
-    image = turn @ antenna + shift
-    poses = chirp_poses(radar, body, np.arange(1))  # type: ignore[arg-type]
-    length, bare, point = (
-        value[0, 0, 0]
-        for value in solve_specular_points(
-            Geometry(image[None], antenna[None, None], *poses[3:6]), points=True
-        )
-    )
-    # The antenna's field along the way it really goes; a conductor turns the part along itself
-    # round.
-    up = np.array([0.0, 0.0, 1.0])
-
-    def sent(way: Array) -> Array:
-        return unit(up - (up @ way) * way) if polarization == "v" else unit(np.cross(way, up))
-
-    over_wall = -turn @ sent(turn @ unit(point - image))
-    straight = sent(unit(point - antenna))
-    normal = unit(unit(image - point) + unit(antenna - point))
-    expected = -bare * straight @ (2 * (normal @ over_wall) * normal - over_wall)
-    for name in (f"{side} > body", f"body > {side}"):
-        number = by_name(model, name)
-        assert echoes.length[0, 0, number] == pytest.approx(length, abs=1e-9)
-        # `mirror` settles its point to 1e-7 of a semi-axis, factors are complex64.
-        assert echoes.amplitude[0, 0, 0, number] == pytest.approx(expected, rel=1e-5)
-
-
 def test_floor_out_and_a_side_wall_back_by_hand(
     one: Make, wall: Make, single: Make, room: Any
 ) -> None:

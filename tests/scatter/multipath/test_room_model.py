@@ -72,17 +72,6 @@ def test_a_slab_before_the_radar_lets_its_square_through(
     np.testing.assert_array_equal(echoes.amplitude[..., 1:], 0)
 
 
-def test_behind_metal_there_is_nothing(one: Make, wall: Make, single: Make, room: Any) -> None:
-    sheet = replace(
-        wall("left", "metal"),
-        corner_m=(-2.0, -2.0, 0.0),
-        edge_u_m=(0.0, 6.0, 0.0),
-        edge_v_m=(0.0, 0.0, 3.0),
-    )
-    model = room(single(), one(), sheet)
-    np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
-
-
 def test_a_wall_reflects_only_where_it_is(one: Make, wall: Make, single: Make, room: Any) -> None:
     # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the
     # body passes x = 0.2.
@@ -296,26 +285,6 @@ def test_direct_echoes_and_ghosts_follow_from_one_formula(
         assert double.length.shape[2] == 1 + 2 * len(walls)
         np.testing.assert_allclose(double.length, usual.length + 1, rtol=1e-12)
         np.testing.assert_allclose(double.amplitude, 2 * usual.amplitude, rtol=1e-6)
-
-
-def test_analytic_has_the_same_paths_with_its_own_returns(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    body, radar = one((0.1, 0.1, 0.1)), single()
-    model = room(radar, body, wall("left"), fidelity="analytic")
-    echoes = model.echoes(np.arange(5))
-    assert model.variant is None
-    # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall
-    # the field stays vertical.
-    point = np.linalg.norm(np.array(radar.position_m) - np.array([0.0, 0.3, 1.2]))
-    assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(
-        np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6
-    )
-    image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
-    assert echoes.length[0, 0, 1] == pytest.approx(
-        point + np.linalg.norm(image - [0.0, 0.3, 1.2]) - 0.2, abs=0.05
-    )
-    assert (np.abs(echoes.amplitude[0, 0, 0, 1:]) > 0).all()
 
 
 def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(

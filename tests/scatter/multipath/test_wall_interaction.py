@@ -184,17 +184,6 @@ def test_te_and_tm_take_their_own_coefficients() -> None:
     )
 
 
-def test_roughness_takes_its_share_off_the_mirrored_field() -> None:
-    rough = Wall(
-        **{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "roughness_m": 0.001}
-    )
-    direction, field = wave(3)
-    cosine = abs(direction @ WALL.normal)
-    k = 2 * np.pi * 14e9 / SPEED_OF_LIGHT_MPS
-    ratio = reflect(rough, field, direction, [14e9]) / reflect(WALL, field, direction, [14e9])
-    np.testing.assert_allclose(ratio, np.exp(-2 * (k * 0.001 * cosine) ** 2), rtol=1e-12)
-
-
 def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
     second = Wall(
         **{
@@ -223,10 +212,3 @@ def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
             for wall in walls:
                 expected = transmit(wall, expected, way, frequency)
             np.testing.assert_allclose(got[:, index, place], expected, rtol=1e-12)
-
-
-def test_straight_on_both_polarisations_are_alike() -> None:
-    field = np.cross(WALL.normal, [0.3, 0.2, 0.9])
-    got = reflect(WALL, field, -WALL.normal, [14e9])[0]
-    te, _ = slab(WALL.material.eta(14e9), WALL.thickness_m, 14e9, 1.0, "te")
-    np.testing.assert_allclose(got, te * field, atol=1e-12)
