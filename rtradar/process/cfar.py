@@ -23,10 +23,6 @@ from scipy.optimize import brentq
 from scipy.special import betainccinv, betaincinv, gammainc, gammaincc, gammaln
 
 from rtradar.errors import InputError
-from rtradar.kernels.cfar import os_cfar_rows
-from rtradar.system.threads import thread_map
-
-_ROWS_A_THREAD = 64
 
 
 def os_cfar(
@@ -78,11 +74,11 @@ def os_cfar(
     >>> [tuple(map(int, cell)) for cell in np.argwhere(rt.process.os_cfar(power))]
     [(20, 30)]
     """
-    cells, counts = _checked(power, guard, train, pfa, looks, scale)
+    cells, _ = _checked(power, guard, train, pfa, looks, scale)
     check_quantile(quantile)
     scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
     thresholds = cells / scales.astype(cells.dtype)
-    return _by_rows(os_cfar_rows, cells, thresholds, ranks, counts, guard, guard + train)
+    return np.asarray(_count_below(cells, thresholds, guard, guard + train) >= ranks)
 
 
 def ca_cfar(
@@ -199,16 +195,17 @@ def _by_count(counts: NDArray[np.int32], of_count: Callable[[int], float]) -> ND
     return table[counts]
 
 
-def _by_rows(
-    kernel: Callable[..., None], cells: NDArray[np.floating], *given: object
-) -> NDArray[np.bool_]:
-    """Mask of a map, some rows to a thread."""
-    mask = np.empty(cells.shape, dtype=np.bool_)
-    thread_map(
-        lambda first: kernel(first, min(first + _ROWS_A_THREAD, len(cells)), cells, *given, mask),
-        range(0, len(cells), _ROWS_A_THREAD),
-    )
-    return mask
+def _count_below(
+    cells: NDArray[np.floating], thresholds: NDArray[np.floating], guard: int, outer: int
+) -> NDArray[np.int32]:
+    """Number of training cells that lie below the threshold of each cell (range, velocity)."""
+    rows, columns = cells.shape
+    count = np.zeros(cells.shape, dtype=np.int32)
+    padded = np.pad(cells, outer, constant_values=np.inf)
+    for down, right in np.ndindex(2 * outer + 1, 2 * outer + 1):
+        if max(abs(down - outer), abs(right - outer)) > guard:
+            count += padded[down : down + rows, right : right + columns] < thresholds
+    return count
 
 
 # -- multipliers -----------------------------------------------------------------------------------

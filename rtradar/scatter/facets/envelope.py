@@ -10,14 +10,26 @@ side of each.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.scatter.envelope import find_slopes
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.body import Body
+from rtradar.body.body import Poses
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.envelope import fill_envelope, find_slopes
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
+from rtradar.scatter.common.poses import owners_of
+from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.skin import SkinFacets
+from rtradar.scatter.facets.surfaces import edge_facets
 from rtradar.system.threads import thread_map
 
 _KEPT_KEYFRAMES = 2048
@@ -32,7 +44,21 @@ TOGETHER = 16
 _KEPT_INTERVALS = TOGETHER + 8
 """More than these and one on either side."""
 
+_COARSE, _FINE = (2, 1), (6, 2)
+"""Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
+
+_GRADUAL_S, _GRADUAL_PLACES, _GRADUAL_BEND, _GRADUAL_UNEVENNESS = 10e-3, 16, 0.05, 0.02
+"""Of visible fractions the time between keyframes [s], its parts where it is divided the most, and
+the changes in time and over the array that ask for more, as `ArrayEnvelope` has them. In 20 ms a
+limb at 4 m/s may pass unseen (``validation/other_methods/visible_fractions.py``)."""
+
+_WIDE = 0.1
+"""Bandwidth over centre frequency above which visible fractions differ over the sweep: what an edge
+diffracts takes another path than the return of the specular point."""
+
+Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
+Indices = NDArray[np.int64]
 Scale = NDArray[np.float64]
 
 
@@ -71,8 +97,8 @@ class Envelope:
 
     def __init__(
         self,
-        sample: Callable[[float, NDArray[np.int64], Scale | None], Sample],
-        owner: NDArray[np.int64],
+        sample: Callable[[float, Indices, Scale | None], Sample],
+        owner: Indices,
         tolerance: float,
         end: int,
         places: int,
@@ -160,7 +186,7 @@ class Envelope:
         interval: _Interval,
         left: int,
         right: int,
-        parts: NDArray[np.int64],
+        parts: Indices,
         whole: Scale,
     ) -> None:
         """Sample these parts half-way, and go on where they bend there."""
@@ -183,10 +209,136 @@ def _bend(
     return np.asarray((np.abs(before - 2 * here + after) * strength).max(axis=(0, 1)))
 
 
-def whole_echo(sample: Sample, owner: NDArray[np.int64]) -> Scale:
+def whole_echo(sample: Sample, owner: Indices) -> Scale:
     """Root of the power of all of a part's owner (part,), mean over frequencies and pairs [m].
 
     Scales of one person are so the same whoever else is there.
     """
     power = (np.abs(sample.ratio * sample.strength) ** 2).mean(axis=(0, 1))
     return np.asarray(np.sqrt(np.bincount(owner, power)[owner]))
+
+
+# -- before a whole array --------------------------------------------------------------------------
+
+
+class ArrayEnvelope:
+    """The envelope of each part of a moving body over a capture, for every Tx and Rx.
+
+    It is the sum over the facets of a ``surface`` over the carriers, the echoes of the specular
+    points; or with ``gradual`` the visible fraction of these facets. Keyframes are ``anchor_s``
+    apart [s]. They come closer, down to that over ``places``, where a part bends by more than
+    ``tolerance`` of the whole person, and there are more places of the array where it differs over
+    that by more than ``unevenness`` of it.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        surface: FacetBody | SkinFacets,
+        *,
+        anchor_s: float,
+        tolerance: float,
+        unevenness: float,
+        places: int = 8,
+        gradual: bool = False,
+    ) -> None:
+        self._radar, self._body, self._surface, self._gradual = radar, body, surface, gradual
+        self.frequency = surface.frequency
+        self._weights = array_nodes(radar, *_FINE).weights
+        # From coarse nodes to fine ones, which stand at antennas or between them.
+        self._spread = spread_nodes(radar, _COARSE, _FINE)
+        self._unevenness = unevenness
+        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
+        end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
+        self._envelope = Envelope(self._sample, owners_of(body), tolerance, end, places)
+
+    def _sample(self, place: float, parts: Indices, whole: Scale | None) -> Sample:
+        """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
+        time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
+        pose, radar = self._body.at([time]), self._radar.at(time)
+        coarse = self._at_nodes(time, pose, array_nodes(radar, *_COARSE), parts)
+        ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
+        echo = coarse.ratio * coarse.strength
+        scale = whole_echo(coarse, owners_of(self._body)) if whole is None else whole[parts]
+        uneven = (
+            np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1))
+            > self._unevenness * scale
+        )
+        if uneven.any():
+            fine = self._at_nodes(time, pose, array_nodes(radar, *_FINE), parts[uneven])
+            ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
+        return Sample(ratio, strength)
+
+    def _at_nodes(self, time: float, pose: Poses, nodes: ArrayNodes, parts: Indices) -> Sample:
+        antennas, pairs = nodes.antennas, nodes.pairs
+        centres, frames = (
+            np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
+        )
+        ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
+        carriers = self._surface.carriers(Geometry(*ends, centres, frames, pose.semi_axes[parts]))
+        length, strength = (values[:, 0] for values in carriers)
+        given = time, pose, nodes, length, parts
+        if self._gradual and isinstance(self._surface, FacetBody):
+            return Sample(self._surface.visible(*given), np.abs(strength))
+        amplitude = self._surface.field(*given)
+        # Without a specular point there is next to nothing to see either: antennas on opposite
+        # sides.
+        ratio = np.where(strength != 0, amplitude / np.where(strength != 0, strength, 1.0), 0.0)
+        return Sample(ratio, np.abs(strength))
+
+    def times(self, chirps: Indices, tx: Indices, strength: Array) -> Field:
+        """Multiply ``strength (chirp, rx, part)`` at chirps, which ``tx (chirp,)`` send.
+
+        Returned is (node, chirp, rx, part) in the phase convention of `Echoes`.
+        """
+        amplitude = np.empty((len(self.frequency), *strength.shape), dtype=np.complex128)
+        intervals, rest = keyframe_before(self._radar, chirps, self._step)
+        envelope, weights = self._envelope, self._weights
+        # Power is measured at keyframes, where nothing is asked of what comes after.
+        between = set(intervals[rest != 0].tolist())
+        in_order = sorted(set(intervals.tolist()))
+        for _, group in groupby(in_order, key=lambda interval: interval // TOGETHER):
+            together = list(group)
+            envelope.prepare_keyframes(k for k in together if k not in between)
+            envelope.prepare_courses(between.intersection(together))
+            for interval in together:
+                inside = np.flatnonzero(intervals == interval)
+                if interval in between:
+                    fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
+                    course = tuple(envelope.course(interval))
+                    fill_envelope(inside, fraction, tx, weights, course, strength, amplitude)
+                else:
+                    ratio = envelope.keyframe(interval).ratio[:, None]
+                    amplitude[:, inside] = (weights[tx[inside]] @ ratio) * strength[inside]
+        return amplitude
+
+
+def visible_fractions_of(
+    radar: Radar, body: Body, *, variant: str, spreading: bool
+) -> ArrayEnvelope:
+    """Return what occluders leave of the returns of a moving body's parts.
+
+    The visible fraction of a part is the sum over its facets with traced shadows over the same sum
+    without them, at three frequencies where the sweep is wide, else at one. ``variant`` and
+    ``spreading`` are those of a model.
+    """
+    wavenumber = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
+    surface = FacetBody(
+        radar,
+        body,
+        variant=variant,
+        spreading=spreading,
+        facets=edge_facets(body.semi_axes, wavenumber),
+        nodes=3 if radar.bandwidth_hz > _WIDE * radar.centre_frequency_hz else 1,
+    )
+    return ArrayEnvelope(
+        radar,
+        body,
+        surface,
+        anchor_s=_GRADUAL_S,
+        tolerance=_GRADUAL_BEND,
+        unevenness=_GRADUAL_UNEVENNESS,
+        places=_GRADUAL_PLACES,
+        gradual=True,
+    )

@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
+from rtradar.scatter.facets.radiation import NEAR, Links, Seen, directions_apart, radiated
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
-    facet_integral,
     facet_normals,
     mesh_facets,
     smooth_bend,
@@ -71,18 +69,17 @@ def mesh_scattering(
     for pair, k in enumerate(wavenumber):
         antennas = np.stack([tx[pair], rx[pair]])
         divided, face = _divide_bent(corners, antennas, k)
-        ways = antennas - middle
-        wide = bool(directions_apart(*ways) > NEAR)
+        wide = bool(directions_apart(*(antennas - middle)) > NEAR)
         divided, face, seen = _divide_edges(solid, divided, face, antennas, k, wide)
-        own = divided.reshape(-1, 3), _own_faces(len(divided))
+        own = (divided - middle).reshape(-1, 3), _own_faces(len(divided))
         facets = mesh_facets(*own, both_sides=not mesh.closed, bend=solid.bend[face])
         ranges = np.linalg.norm(antennas, axis=1)
-        views = Views(np.zeros(1, dtype=np.int64), antennas[None], one_pair, seen)
-        waves = Waves(one_pair, np.array([[ranges.sum()]]), np.array([[k]]), spreading=True)
-        to_tx, to_rx = ways[:, None, None, None]
-        axes = np.eye(3)[None, None]
-        waves, factor = with_obliquity(waves, to_tx, to_rx, axes, polarization, shadow=True)
-        field[pair] = (facet_integral(facets, views, waves) * factor).item() * ranges.prod()
+        path, k_there = np.full((1, 1, 1), ranges.sum()), np.full((1, 1), k)
+        links = Links(antennas[None], one_pair, path, k_there, polarization, True, shadow=True)
+        row = np.arange(2)[:, None]
+        given = np.array([0]), (middle[None, None], np.eye(3)[None, None]), links
+        value = radiated(facets, *given, Seen(seen, row), row.T)
+        field[pair] = value.item() * ranges.prod()
     return field
 
 

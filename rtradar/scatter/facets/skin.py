@@ -21,7 +21,7 @@ from rtradar.body.body import Poses
 from rtradar.body.human.mesh import MOST_DIVISIONS, loop_subdivision
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.kernels.scatter.facets import Facets
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
@@ -29,10 +29,16 @@ from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses, has_mesh
 from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
+from rtradar.scatter.facets.radiation import (
+    NEAR,
+    Links,
+    Seen,
+    as_amplitude,
+    directions_apart,
+    radiated,
+)
 from rtradar.scatter.facets.surfaces import (
     body_facets,
-    facet_integral,
     facet_normals,
     smooth_bend,
 )
@@ -205,12 +211,12 @@ class SkinFacets:
         seen, radar = self._seen(time), self._radar.at(time)
         polarization = Polarization(radar.polarization, radar.axes)
         apart = np.linalg.norm(antennas[:, None] - shadow_nodes(radar)[0], axis=2)
-        row = np.argmin(apart, axis=1)[None]
+        eyes, index = np.arange(len(seen))[:, None], np.argmin(apart, axis=1)[None]
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
-        field = np.empty((len(parts), len(pairs), len(self.frequency)), dtype=np.complex128)
         to_tx, to_rx = (antennas[pairs[:, side]] - centres[parts, None] for side in (0, 1))
         wide = bool((directions_apart(to_tx, to_rx) > NEAR).any())
-        frame = np.eye(3)[None, None]
+        given = k, polarization, self._spreading
+        fields = []
         for place, part in enumerate(parts):
             piece = self._pieces[part]
             own = (vertices[piece.vertices] - centres[part])[None]
@@ -220,13 +226,11 @@ class SkinFacets:
                 # The current does not fall to nothing at the edge of the lit side.
                 bend[0] = smooth_bend(own[0], piece.faces)
             facets = Facets(own, piece.faces, normals, areas, bend)
-            local, lit = (antennas - centres[part])[None], seen[:, piece.facets]
-            views = Views(np.zeros(1, dtype=np.int64), local, row, np.ascontiguousarray(lit))
-            waves = Waves(pairs, length[None, :, place], k, self._spreading)
-            ways = to_tx[None, place, None], to_rx[None, place, None], frame
-            waves, factor = with_obliquity(waves, *ways, polarization, shadow=False)
-            field[place] = facet_integral(facets, views, waves)[0] * factor[0, 0, :, None]
-        return np.asarray(np.conj(np.moveaxis(field, (0, 1, 2), (2, 1, 0))))
+            pose = centres[part][None, None], np.eye(3)[None, None]
+            links = Links(antennas[None], pairs, length[None, :, [place]], *given, shadow=False)
+            lit = Seen(seen[:, piece.facets], eyes)
+            fields.append(radiated(facets, np.array([0]), pose, links, lit, index))
+        return as_amplitude(np.concatenate(fields, axis=1))[:, 0]
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""

@@ -1,4 +1,4 @@
-"""Surfaces as flat triangles fixed in the material, and what they scatter.
+"""Surfaces as flat triangles fixed in the material.
 
 Triangles move and turn with the part they belong to, so that what they add stays coherent from
 chirp to chirp. Their vertices are kept in the axes of the part; antennas are brought there, not
@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from rtradar.body.body import MAXIMUM_SUBDIVISIONS, unit_sphere
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.facets import Facets, Views, Waves, integrate
+from rtradar.kernels.scatter.facets import Facets
 from rtradar.system.checks import is_whole
-from rtradar.system.threads import thread_map
 
 MAXIMUM_FACETS = 20 * 4**MAXIMUM_SUBDIVISIONS
 """Facets of one ellipsoid beyond which no icosphere is built."""
@@ -31,9 +30,6 @@ FACETS_PER_SQUARE_KA = 6.0
 
 _EDGE = 0.5
 """Angle between the normals of a triangle and a vertex [rad] above which a mesh has an edge."""
-
-_PARALLEL_TERMS = 4_000_000
-"""Facets times pairs times frequencies, 12 ms, below which waking threads costs as much as work."""
 
 
 def subdivisions_for(facets: int) -> int:
@@ -140,33 +136,3 @@ def facet_normals(
     twice = np.linalg.norm(normals, axis=2)
     normals /= np.where(twice > 0, twice, 1.0)[..., None]
     return np.ascontiguousarray(normals), np.ascontiguousarray(twice / 2)
-
-
-def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.complex128]:
-    """Scattering length F of posed parts, the phase of a carrier taken out, (task, pair, node) [m].
-
-    It is for exp(+j omega t), and 0 where nothing is lit. `Views` need not mark what faces away.
-    """
-    # What may not be written to is another type to Numba, for which it would compile all again.
-    views = Views(
-        np.ascontiguousarray(views.part, dtype=np.int64),
-        np.ascontiguousarray(views.antennas, dtype=np.float64),
-        np.ascontiguousarray(views.row, dtype=np.int64),
-        views.seen,
-    )
-    waves = Waves(
-        np.ascontiguousarray(waves.pairs, dtype=np.int64),
-        np.ascontiguousarray(waves.carrier, dtype=np.float64),
-        np.require(waves.wavenumber, np.float64, ["C", "W"]),
-        waves.spreading,
-        np.require(waves.currents, np.float64, ["C", "W"]),
-    )
-    tasks = len(views.part)
-    shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
-    out = np.empty(shape, dtype=np.complex128)
-    at_once = 1 if out.size * len(facets.faces) >= _PARALLEL_TERMS else max(1, tasks)
-    thread_map(
-        lambda first: integrate(first, min(first + at_once, tasks), facets, views, waves, out),
-        range(0, tasks, at_once),
-    )
-    return out

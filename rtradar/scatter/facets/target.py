@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,23 +13,19 @@ from numpy.typing import NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.facets import Facets, Views, Waves
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.facets.body import FacetShadows, Seen, visible_fraction
+from rtradar.scatter.facets.body import FacetShadows
 from rtradar.scatter.facets.mesh_target import mesh_scattering
-from rtradar.scatter.facets.obliquity import NEAR, directions_apart, with_obliquity
+from rtradar.scatter.facets.radiation import NEAR, Links, directions_apart, radiated, visible
 from rtradar.scatter.facets.surfaces import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
     MAXIMUM_FACETS,
     edge_facets,
-    ellipsoid_facets,
-    facet_integral,
     subdivisions_for,
 )
 from rtradar.scatter.target import target_mesh
-from rtradar.trace.backends.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.backends.backend import select
 
 if TYPE_CHECKING:
     import trimesh
@@ -73,9 +69,8 @@ def facet_scattering(
     sent = Polarization(polarization)
     if not isinstance(solid, Ellipsoids):
         return mesh_scattering(solid, tx, rx, wavenumber, sent, variant)
-    pairs = _Pairs(tx, rx, wavenumber, sent, wide=False)
     count = partial(_enough_facets, solid, facets)
-    field = _block_by_block(solid, pairs, variant, count, _fields).sum(axis=1)
+    field = _block_by_block(solid, (tx, rx, wavenumber), sent, variant, count, radiated).sum(axis=1)
     return np.asarray(field * np.linalg.norm(tx, axis=1) * np.linalg.norm(rx, axis=1))
 
 
@@ -95,8 +90,8 @@ def visible_fractions(
     look at few facets tells.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    pairs = _Pairs(tx, rx, wavenumber, Polarization(polarization), wide=False)
-    few = _block_by_block(target, pairs, variant, lambda *_: _FEW_FACETS, _rows)
+    given = target, (tx, rx, wavenumber), Polarization(polarization), variant
+    few = _block_by_block(*given, lambda *_: _FEW_FACETS, _hidden)
     cut = few.any(axis=0)
     if not cut.any():
         return np.ones_like(few)
@@ -104,53 +99,57 @@ def visible_fractions(
     def count(largest: float, wide: bool) -> int:
         return _for_directions(4 * edge_facets(target.semi_axes[cut], largest), wide)
 
-    return _block_by_block(target, pairs, variant, count, _fractions)
+    return _block_by_block(*given, count, visible)
 
 
-class _Pairs(NamedTuple):
-    """Antennas (n, 3) pair by pair [m], wavenumbers (n,) [rad/m], and whether all are far apart."""
-
-    tx: Array
-    rx: Array
-    wavenumber: Array
-    polarization: Polarization
-    wide: bool
-
-    def some(self, chosen: slice | NDArray[np.int64]) -> _Pairs:
-        return self._replace(
-            tx=self.tx[chosen], rx=self.rx[chosen], wavenumber=self.wavenumber[chosen]
-        )
-
-
-_OfBlock = Callable[[Ellipsoids, Facets, FacetShadows, _Pairs], NDArray[np.complex128]]
+def _hidden(*given: Any) -> NDArray[np.bool_]:
+    """Whether parts are cut or hidden (pose, part, 1, 1), for what `visible` takes."""
+    seen, index = given[-2:]
+    return np.asarray(seen.row[index].any(axis=1)[..., None, None])
 
 
 def _block_by_block(
     target: Ellipsoids,
-    pairs: _Pairs,
+    pairs: tuple[Array, Array, Array],
+    polarization: Polarization,
     variant: str,
     count: Callable[[float, bool], int],
-    of_block: _OfBlock,
+    find: Callable[..., NDArray[Any]],
 ) -> NDArray[np.complex128]:
-    """What a function finds of each part (n, part), for pairs near each other and far apart.
+    """What `radiated` or `visible` finds of each part (n, part), for pairs near and far apart.
 
-    ``count(wavenumber, wide)`` is the number of facets per part that either need.
+    ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber, wide)`` is
+    the number of facets per part that either need.
     """
-    found = np.empty((len(pairs.tx), len(target.centres)), dtype=np.complex128)
-    apart = _directions_apart(target, pairs.tx, pairs.rx)
+    tx, rx, wavenumber = pairs
+    parts = np.arange(len(target.centres))
+    found = np.empty((len(tx), len(parts)), dtype=np.complex128)
+    to_tx, to_rx = (antennas[:, None] - target.centres for antennas in (tx, rx))
+    apart = directions_apart(to_tx, to_rx).max(axis=1)
     for wide in (False, True):
         some = np.flatnonzero((apart > NEAR) == wide)
         if not len(some):
             continue
-        enough = count(float(pairs.wavenumber[some].max()), wide)
-        surface = ellipsoid_facets(target.semi_axes, subdivisions_for(enough))
-        tracer = BodyTracer(use(select(variant)), target.semi_axes)
-        shadows = FacetShadows(tracer, surface, target.semi_axes)
-        block = max(1, _VIEWS_AT_ONCE // (8 * len(target.centres) * len(surface.faces)))
+        enough = count(float(wavenumber[some].max()), wide)
+        shadows = FacetShadows(select(variant), target.semi_axes, enough)
+        facets = shadows.facets
+        block = max(1, _VIEWS_AT_ONCE // (8 * len(parts) * len(facets.faces)))
         for first in range(0, len(some), block):
             own = some[first : first + block]
-            given = pairs.some(own)._replace(wide=wide)
-            found[own] = of_block(target, surface, shadows, given)
+            ends = np.stack([tx[own], rx[own]], axis=1)
+            antennas, index = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
+            beyond = float(apart[own].max()) if wide else 0.0
+            seen = shadows.seen(target.centres, target.frames, antennas, parts, apart=beyond)
+            pose = tuple(
+                np.repeat(array[None], len(own), axis=0)
+                for array in (target.centres, target.frames)
+            )
+            path = np.linalg.norm(ends, axis=2).sum(axis=1)[:, None, None]
+            path = np.broadcast_to(path, (len(own), 1, len(parts)))
+            k = wavenumber[own, None]
+            links = Links(ends, np.array([[0, 1]]), path, k, polarization, True, shadow=True)
+            given = facets, parts, pose, links, seen, index.reshape(-1, 2)
+            found[own] = find(*given)[..., 0, 0]
     return found
 
 
@@ -176,80 +175,3 @@ def _enough_facets(target: Ellipsoids, facets: int | None, wavenumber: float, wi
             f"facets an ellipsoid; {cure}"
         )
     return _for_directions(needed, wide) if facets is None else facets
-
-
-def _fields(
-    target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
-) -> NDArray[np.complex128]:
-    """Fields (n, part), spreading and all, relative to the path over the origin."""
-    parts = np.arange(len(target.centres))
-    return _integrals(target, surface, _seen(target, shadows, pairs), pairs, parts, shadow=True)
-
-
-def _rows(
-    target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
-) -> NDArray[np.complex128]:
-    """Not 0 where a part is cut or hidden (n, part)."""
-    row = _seen(target, shadows, pairs).row
-    return row.reshape(2, len(pairs.tx), -1).sum(axis=0).astype(np.complex128)
-
-
-def _fractions(
-    target: Ellipsoids, surface: Facets, shadows: FacetShadows, pairs: _Pairs
-) -> NDArray[np.complex128]:
-    """Visible fractions (n, part)."""
-    seen = _seen(target, shadows, pairs)
-    left = np.ones((len(pairs.tx), len(target.centres)), dtype=np.complex128)
-    # Parts in full view need no sum.
-    cut = np.flatnonzero(seen.row.any(axis=0))
-    if len(cut):
-        seen = seen.of(cut)
-        left[:, cut] = visible_fraction(
-            *(
-                _integrals(target, surface, own, pairs, cut, shadow=False)
-                for own in (seen, seen.unhidden())
-            )
-        )
-    return left
-
-
-def _seen(target: Ellipsoids, shadows: FacetShadows, pairs: _Pairs) -> Seen:
-    """What all Tx and then all Rx of some pairs see, a row for each of them and each part."""
-    tx, rx = pairs.tx, pairs.rx
-    antennas, view = np.unique(np.concatenate([tx, rx]), axis=0, return_inverse=True)
-    apart = float(_directions_apart(target, tx, rx).max()) if pairs.wide else 0.0
-    parts = np.arange(len(target.centres))
-    seen = shadows.seen(target.centres, target.frames, antennas, parts, apart=apart)
-    return seen._replace(row=seen.row[view.ravel()])
-
-
-def _integrals(
-    target: Ellipsoids,
-    surface: Facets,
-    seen: Seen,
-    pairs: _Pairs,
-    parts: NDArray[np.int64],
-    *,
-    shadow: bool,
-) -> NDArray[np.complex128]:
-    """Sums over the facets of some parts (n, part), see `_fields` and `with_obliquity`."""
-    tx, rx, wavenumber, polarization, _ = pairs
-    n, frames = len(tx), target.frames[parts]
-    to_antennas = np.stack([tx, rx], axis=1)[:, None] - target.centres[parts][:, None]
-    to_tx, to_rx = (to_antennas[:, :, end] for end in (0, 1))
-    local = np.einsum("pji,npaj->npai", frames, to_antennas)
-    row = np.moveaxis(seen.row.reshape(2, n, len(parts)), 0, 2)
-    ranges = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
-    carrier, k = (np.repeat(a, len(parts))[:, None] for a in (ranges[0] + ranges[1], wavenumber))
-    views = Views(np.tile(parts, n), local.reshape(-1, 2, 3), row.reshape(-1, 2), seen.fraction)
-    waves = Waves(np.array([[0, 1]]), carrier, k, spreading=True)
-    ways = to_tx[:, :, None], to_rx[:, :, None], frames
-    waves, factor = with_obliquity(waves, *ways, polarization, shadow=shadow)
-    field = facet_integral(surface, views, waves).reshape(n, len(parts))
-    return np.asarray(field * factor[:, :, 0])
-
-
-def _directions_apart(target: Ellipsoids, tx: Array, rx: Array) -> Array:
-    """Distance (n,) of the unit vectors to Tx and to Rx, 0 to 2, the largest of any part."""
-    to_tx, to_rx = (antennas[:, None] - target.centres for antennas in (tx, rx))
-    return np.asarray(directions_apart(to_tx, to_rx).max(axis=1))

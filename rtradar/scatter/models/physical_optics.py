@@ -9,18 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body, Ellipsoids
-from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import ArrayNodes
 from rtradar.scatter.common.poses import chirp_poses, has_mesh, one_echo_a_part
 from rtradar.scatter.double_reflections import (
     TwoBounceModel,
     check_bounces,
     double_scattering,
 )
-from rtradar.scatter.facets.array_envelope import ArrayEnvelope
+from rtradar.scatter.facets.envelope import ArrayEnvelope
 from rtradar.scatter.facets.skin import facets_of_people
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import select, use
@@ -148,34 +146,17 @@ class PhysicalOptics(TwoBounceModel):
         self._envelope = ArrayEnvelope(
             radar,
             body,
-            self._surface.carriers,
-            self._ratio,
+            self._surface,
             anchor_s=anchor_s,
             tolerance=tolerance,
             unevenness=unevenness,
         )
-
-    def _ratio(
-        self,
-        time: float,
-        pose: Poses,
-        nodes: ArrayNodes,
-        length: NDArray[np.float64],
-        strength: NDArray[np.float64],
-        parts: NDArray[np.int64],
-    ) -> NDArray[np.complex128]:
-        """The sum over the facets of parts, over their carriers."""
-        amplitude = self._surface.field(time, pose, nodes, length, parts)
-        # Without a specular point there is next to nothing to see either: antennas on opposite
-        # sides.
-        return np.where(strength != 0, amplitude / np.where(strength != 0, strength, 1.0), 0.0)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
         length, strength = self._surface.carriers(at)
-        nodes = len(self._surface.frequency)
-        amplitude = self._envelope.times(chirps, at.tx_index, strength, nodes)
+        amplitude = self._envelope.times(chirps, at.tx_index, strength)
         single = one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
         return self._with_doubles(single, chirps)

@@ -19,8 +19,8 @@ from rtradar.scatter.double_reflections import (
     check_bounces,
     double_scattering,
 )
+from rtradar.scatter.facets.envelope import ArrayEnvelope, visible_fractions_of
 from rtradar.scatter.facets.target import visible_fractions
-from rtradar.scatter.facets.visible_fractions import VisibleFractions
 from rtradar.scatter.specular_point.second_term import check_terms, with_second_term
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
@@ -123,9 +123,11 @@ class Specular(TwoBounceModel):
         backend = select(variant)
         self.variant: str | None = backend.kind
         self.tracer = BodyTracer(use(backend), body.semi_axes)
-        self._visibility: SpecularVisibility | VisibleFractions
+        self._visibility: SpecularVisibility | ArrayEnvelope
         if visibility == "gradual":
-            self._visibility = VisibleFractions(radar, body, variant=variant, spreading=spreading)
+            self._visibility = visible_fractions_of(
+                radar, body, variant=variant, spreading=spreading
+            )
         else:
             self._visibility = SpecularVisibility(radar, body, self.tracer)
         if bounces == 2:
@@ -139,7 +141,7 @@ class Specular(TwoBounceModel):
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude, points = self._solved(chirps, at, points=self._terms == 2)
         frequency = np.array([self._radar.centre_frequency_hz])
-        if isinstance(self._visibility, VisibleFractions):
+        if isinstance(self._visibility, ArrayEnvelope):
             echo = self._visibility.times(chirps, at.tx_index, amplitude)
             frequency = self._visibility.frequency
         else:

@@ -1,4 +1,4 @@
-"""Expected echoes, Doppler spectra, detection and angles."""
+"""Expected echoes, Doppler spectra and angles."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import numpy as np
 import scipy.fft
 
 from references.cases import Pair, filled, kernel_case, samples
-from rtradar.kernels.angles import Steering, add_interpolated, beam_power, highest_maxima
-from rtradar.kernels.cfar import os_cfar_rows
+from rtradar.kernels.angles import Steering, beam_power
 from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
 from rtradar.kernels.prime_factor_dft import add_doppler_power, pick_cells, prime_factor_dft
 
@@ -95,36 +94,6 @@ def _pick_cells() -> Pair:
     return found, pick_cells_reference(spectra, weights, cells)
 
 
-# -- detection -------------------------------------------------------------------------------------
-
-
-def os_cfar_reference(cells, thresholds, ranks, guard, outer):
-    """Mask of `os_cfar_rows`, by NumPy."""
-    padded, width = np.pad(cells, outer, constant_values=np.nan), 2 * outer + 1
-    ring = np.ones((width, width), dtype=bool)
-    ring[outer - guard : outer + guard + 1, outer - guard : outer + guard + 1] = False
-    training = np.lib.stride_tricks.sliding_window_view(padded, (width, width))[:, :, ring]
-    return (training < thresholds[..., None]).sum(axis=2) >= ranks
-
-
-def _overlap(i: np.ndarray, half: int) -> np.ndarray:
-    return np.minimum(i + half, i[-1]) - np.maximum(i - half, 0) + 1
-
-
-# A map that is narrower than its ring has no cell with all of its neighbours.
-@kernel_case(os_cfar_rows, 0, n_velocity=(61, 9))
-def _os_cfar(n_velocity: int) -> Pair:
-    power = np.random.default_rng(0).exponential(size=(80, n_velocity)).astype(np.float32)
-    i, j = (np.arange(n) for n in power.shape)
-    outer = _overlap(i, 6)[:, None] * _overlap(j, 6)
-    counts = (outer - _overlap(i, 2)[:, None] * _overlap(j, 2)).astype(np.int32)
-    thresholds, ranks = power / np.float32(3), np.ceil(0.75 * counts).astype(np.int32)
-    given, out = (power, thresholds, ranks, counts, 2, 6), np.empty(power.shape, dtype=np.bool_)
-    os_cfar_rows(0, 30, *given, out)
-    os_cfar_rows(30, 80, *given, out)
-    return out, os_cfar_reference(power, thresholds, ranks, 2, 6)
-
-
 # -- angles ----------------------------------------------------------------------------------------
 
 
@@ -152,43 +121,3 @@ def _beam_power() -> Pair:
     steering = Steering(samples(8, 48, 86), np.array(runs), 96 * np.arange(9))
     given, out = (values, still, place, np.arange(0, 96, 2), steering), np.empty((21, 86), "f4")
     return filled(beam_power, 0, 21, *given, out=(out,)), beam_power_reference(*given)
-
-
-def highest_maxima_reference(power, below, above, peaks):
-    """Index and count of `highest_maxima`, by NumPy."""
-    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
-    good = (power > padded[:, :-2]) & (power >= padded[:, 2:]) & (power > 0)
-    highest = power.max(axis=1, keepdims=True)
-    good &= power >= highest * below
-    lower = (power[:, None] * above <= power[:, :, None]).sum(axis=2)
-    good &= (power == highest) | (2 * lower > power.shape[1])
-    count = np.minimum(good.sum(axis=1), peaks)
-    order = np.argsort(np.where(good, -power, np.inf), axis=1, kind="stable")[:, :peaks]
-    index = np.where(np.arange(peaks) < count[:, None], order, order[:, :1])
-    return np.where(count[:, None] > 0, index, power.argmax(axis=1)[:, None]), count
-
-
-@kernel_case(highest_maxima, 0)
-def _maxima() -> Pair:
-    power = np.random.default_rng(0).exponential(size=(150, 200)).astype(np.float32) ** 4
-    given, out = (power, np.float32(0.25), np.float32(12)), (np.empty((150, 3), int),)
-    found = filled(highest_maxima, *given, out=(*out, np.empty(150, int)))
-    return found, highest_maxima_reference(*given, 3)
-
-
-def add_interpolated_reference(power, sines, first, step, bins, shape):
-    """The map (bin, angle) that `add_interpolated` adds, by NumPy."""
-    total = np.zeros(shape)
-    grid = first + step * np.arange(power.shape[1])
-    read = [np.interp(own, grid, values) for own, values in zip(sines, power, strict=True)]
-    np.add.at(total, bins, read)
-    return total
-
-
-@kernel_case(add_interpolated, 1e-6)
-def _interpolated() -> Pair:
-    rng, first, step = np.random.default_rng(0), -0.9, 1.8 / 199
-    power, sines = rng.exponential(size=(500, 200)).astype("f4"), rng.uniform(-1, 1, (500, 200))
-    given, out = (power, sines.clip(-0.9, 0.9), first, step, rng.integers(0, 128, 500)), (128, 200)
-    found = filled(add_interpolated, *given, out=(np.empty(out),), adds=True)
-    return found, add_interpolated_reference(*given, out)

@@ -8,7 +8,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facets import Waves
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.facets.obliquity import with_obliquity
+from rtradar.scatter.facets.radiation import with_obliquity
 
 RADIUS_M, FREQUENCY_HZ, FAR_M = 0.03, 14e9, 1e4
 

@@ -13,12 +13,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.scatter.common.polarization import Polarization, copolar
-from rtradar.scatter.facets.surfaces import (
-    ellipsoid_facets,
-    facet_integral,
-    mesh_facets,
-    subdivisions_for,
-)
+from rtradar.scatter.facets.radiation import facet_integral
+from rtradar.scatter.facets.surfaces import ellipsoid_facets, mesh_facets, subdivisions_for
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import use
 from rtradar.trace.body_tracer import BodyTracer

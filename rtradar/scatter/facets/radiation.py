@@ -1,0 +1,197 @@
+"""What facets radiate from Tx to Rx: by the reciprocal form, by the currents of Tx, or between.
+
+The reciprocal form of physical optics is of what both antennas see, as in a radar. Where Tx and Rx
+are far apart as the target sees them, the currents on all that Tx lights count. From `NEAR` to
+`WIDE` the one fades into the other.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.elementary import smoothstep
+from rtradar.kernels.scatter.facets import Facets, Views, Waves, integrate
+from rtradar.scatter.common.polarization import Polarization, copolar, driven_currents, unit
+from rtradar.system.threads import thread_map
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+Indices = NDArray[np.int64]
+
+NEAR, WIDE = 0.15, 0.25
+"""Distances of the unit vectors to Tx and to Rx between which the forms fade into each other."""
+
+FORWARD = 2 * np.sin(np.radians([165.0, 175.0]) / 2)
+"""Distances between which the reciprocal form, which has no forward scatter, returns where a body
+is not to cast its shadow on the way from Tx to Rx: clutter has that already."""
+
+_MOST_LEFT = 2.0
+"""Most that a visible fraction may be: what the first Fresnel zone alone sends."""
+
+_PARALLEL_TERMS = 4_000_000
+"""Facets times pairs times frequencies, 12 ms, below which waking threads costs as much as work."""
+
+
+class Links(NamedTuple):
+    """Pairs of antennas before a target in some poses, and the waves between them.
+
+    ``antennas (pose, antenna, 3)`` [m], world, of which ``pairs (pair, 2)`` are Tx and Rx;
+    ``length (pose, pair, part)`` is the path whose phase is taken out [m], ``wavenumber (pose,
+    node)`` [rad/m], or (1, node) for all poses. With ``spreading`` fields are divided by R_T R_R;
+    without ``shadow`` there is no scatter straight ahead.
+    """
+
+    antennas: Array
+    pairs: Indices
+    length: Array
+    wavenumber: Array
+    polarization: Polarization
+    spreading: bool
+    shadow: bool
+
+
+class Seen(NamedTuple):
+    """What antennas see: ``fraction (row, facet)``, and ``row (antenna, part)``, which is whose."""
+
+    fraction: NDArray[np.float32]
+    row: Indices
+
+
+Pose = tuple[Array, Array]
+"""Centres (pose, part, 3) [m] and axes (pose, part, 3, 3) of parts."""
+
+
+def radiated(
+    facets: Facets,
+    parts: Indices,
+    pose: Pose,
+    links: Links,
+    seen: Seen,
+    index: NDArray[np.integer],
+) -> Field:
+    """Return the scattering length F of posed parts (pose, part, pair, node) [m].
+
+    It is for exp(+j omega t), and 0 where nothing is lit. ``parts (part,)`` are whose of the facets
+    those of the pose are; ``index (pose, antenna)`` is the number of each antenna of the links
+    among those of `Seen`, which need not mark what faces away.
+    """
+    centres, frames = pose
+    nodes, shape = links.wavenumber.shape[1], centres.shape[:2]
+    ways = links.antennas[:, None] - centres[:, :, None]
+    views = Views(
+        np.tile(parts, shape[0]),
+        np.einsum("tpji,tpaj->tpai", frames, ways).reshape(-1, *ways.shape[2:]),
+        np.swapaxes(seen.row[index], 1, 2).reshape(-1, index.shape[1]),
+        seen.fraction,
+    )
+    carrier = np.swapaxes(links.length, 1, 2).reshape(-1, len(links.pairs))
+    k = np.broadcast_to(links.wavenumber[:, None], (*shape, nodes)).reshape(-1, nodes)
+    waves = Waves(links.pairs, carrier, k, links.spreading)
+    to_tx, to_rx = (ways[:, :, links.pairs[:, side]] for side in (0, 1))
+    given = to_tx, to_rx, frames, links.polarization
+    waves, factor = with_obliquity(waves, *given, shadow=links.shadow)
+    field = facet_integral(facets, views, waves).reshape(*factor.shape, nodes)
+    return np.asarray(field * factor[..., None])
+
+
+def visible(
+    facets: Facets,
+    parts: Indices,
+    pose: Pose,
+    links: Links,
+    seen: Seen,
+    index: NDArray[np.integer],
+) -> Field:
+    """Return what shadows leave of what is `radiated`, but for forward scatter: 1 in full view.
+
+    It is the sum over the facets of a part with shadows over that without: 0 where there is
+    nothing, and no more than `_MOST_LEFT` where the whole sum nearly cancels, as past the end of
+    optics.
+    """
+    # Parts in full view need no sum.
+    cut = np.flatnonzero(seen.row.any(axis=0))
+    size = *pose[0].shape[:2], len(links.pairs), links.wavenumber.shape[1]
+    left = np.ones(size, dtype=np.complex128)
+    if len(cut):
+        own = parts[cut], (pose[0][:, cut], pose[1][:, cut])
+        links = links._replace(length=links.length[..., cut], shadow=False)
+        row = seen.row[:, cut]
+        shadowed = radiated(facets, *own, links, Seen(seen.fraction, row), index)
+        unhidden = Seen(np.ones_like(seen.fraction[:1]), np.zeros_like(row))
+        free = radiated(facets, *own, links, unhidden, index)
+        some = free != 0
+        fraction = np.where(some, shadowed / np.where(some, free, 1.0), 0.0)
+        fraction /= np.maximum(np.abs(fraction) / _MOST_LEFT, 1.0)
+        left[:, cut] = np.where(some & (shadowed == free), 1.0, fraction)
+    return left
+
+
+def as_amplitude(field: Field) -> Field:
+    """Turn scattering lengths (pose, part, pair, node) into amplitudes (node, pose, pair, part)."""
+    return np.asarray(np.conj(np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))))
+
+
+def directions_apart(to_tx: Array, to_rx: Array) -> Array:
+    """Distance (...) between the unit vectors along ``to_tx`` and ``to_rx (..., 3)``, 0 to 2."""
+    return np.asarray(np.linalg.norm(unit(to_tx) - unit(to_rx), axis=-1))
+
+
+def with_obliquity(
+    waves: Waves,
+    to_tx: Array,
+    to_rx: Array,
+    frames: Array,
+    polarization: Polarization,
+    *,
+    shadow: bool,
+) -> tuple[Waves, Array]:
+    """Return waves with the obliquities of their pairs, and the factor (pose, part, pair) left.
+
+    ``to_tx`` and ``to_rx (pose, part, pair, 3)`` are the ways from the parts to the antennas [m],
+    ``frames (pose, part, 3, 3)`` the axes of the parts. Where all antennas are near each other the
+    factor is the co-polar fraction, and no currents are computed. Without ``shadow`` there is no
+    scatter straight ahead. Unit vectors of polarisation are
+    those at the middle of a part: of a sphere of radius a between antennas at R that leaves forward
+    scatter 4 a / (3 R) too weak.
+    """
+    apart = directions_apart(to_tx, to_rx)
+    factor = copolar(to_tx, to_rx, polarization)
+    if not (apart > NEAR).any():
+        return waves, factor
+    fade = smoothstep(np.clip((apart - NEAR) / (WIDE - NEAR), 0.0, 1.0))[..., None]
+    if not shadow:
+        ahead = np.clip((apart - FORWARD[0]) / (FORWARD[1] - FORWARD[0]), 0.0, 1.0)
+        fade = fade * (1 - smoothstep(ahead))[..., None]
+    along, across = driven_currents(to_tx, to_rx, polarization)
+    across = np.einsum("...ji,...nj->...ni", frames, across)
+    parts = [fade * along[..., None], fade * across, (1 - fade) * factor[..., None]]
+    currents = np.concatenate(parts, axis=-1).reshape(-1, apart.shape[-1], 5)
+    return waves._replace(currents=currents), np.ones_like(factor)
+
+
+def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.complex128]:
+    """Scattering length F of posed parts, the phase of a carrier taken out, (task, pair, node) [m].
+
+    It is for exp(+j omega t), and 0 where nothing is lit. `Views` need not mark what faces away.
+    """
+    views = Views(*map(_own, views, (np.int64, np.float64, np.int64, np.float32)))
+    pairs, carrier, wavenumber, spreading, currents = waves
+    reals = (_own(array, np.float64) for array in (carrier, wavenumber))
+    waves = Waves(_own(pairs, np.int64), *reals, spreading, _own(currents, np.float64))
+    tasks = len(views.part)
+    shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
+    out = np.empty(shape, dtype=np.complex128)
+    at_once = 1 if out.size * len(facets.faces) >= _PARALLEL_TERMS else max(1, tasks)
+    thread_map(
+        lambda first: integrate(first, min(first + at_once, tasks), facets, views, waves, out),
+        range(0, tasks, at_once),
+    )
+    return out
+
+
+def _own(array: NDArray[Any], kind: type[np.number]) -> NDArray[Any]:
+    # What may not be written to is another type to Numba, for which it would compile all again.
+    return np.require(array, kind, ["C", "W"])
