@@ -214,6 +214,3 @@ def test_cfar_laws() -> None:
         rt.process.ca_scale(cells, 1e-4, looks), 2 * looks, 2 * cells * looks
     ) == pytest.approx(1e-4, rel=1e-9)
     assert rt.process.ca_scale(cells, 1e-4) == pytest.approx(cells * (1e-4 ** (-1 / cells) - 1))
-    spread = np.array([0.5, 0.3, 0.2])
-    alpha = rt.process.clutter_map_scale(spread, 1e-4)
-    assert np.prod(1 / (1 + alpha * spread)) == pytest.approx(1e-4, rel=1e-9)

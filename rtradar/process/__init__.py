@@ -10,7 +10,6 @@ from rtradar.process.angles import (
 )
 from rtradar.process.cfar import ca_cfar, ca_scale, os_cfar, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
-from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import (
     Detector,
     PointDetector,
@@ -33,7 +32,6 @@ __all__ = [
     "CLUTTER_REMOVALS",
     "DETECTORS",
     "AngleSpectra",
-    "ClutterMap",
     "ClutterRemoval",
     "Detector",
     "PointDetector",
@@ -51,7 +49,6 @@ __all__ = [
     "ca_cfar",
     "ca_scale",
     "cell_spectra",
-    "clutter_map_scale",
     "clutter_removal",
     "measured_angles",
     "os_cfar",

@@ -345,17 +345,12 @@ def _os_scale(n_train: int, rank: int, pfa: float, looks: int) -> float:
             return -float(np.log1p(alpha / index).sum()) - goal
         return _log_os_pfa(alpha, n_train, rank, looks) - goal
 
-    return multiplier(excess, xtol=1e-12, rtol=1e-14)
-
-
-def multiplier(excess: Callable[[float], float], *, xtol: float, rtol: float) -> float:
-    """The multiplier at whose logarithm, to these tolerances, a falling function passes 0."""
     low, high = -1.0, 1.0
     while excess(low) < 0:
         low -= 2.0
     while excess(high) > 0:
         high += 1.0
-    return math.exp(brentq(excess, low, high, xtol=xtol, rtol=rtol))
+    return math.exp(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
 
 
 def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:

@@ -12,7 +12,6 @@ from scipy.signal import windows as scipy_windows
 
 from rtradar.errors import InputError
 from rtradar.process import (
-    ClutterMap,
     SlidingRangeTime,
     SlidingSpectrogram,
     WindowFunctions,
@@ -178,28 +177,6 @@ def test_doppler_division_removes_the_copies_as_wide_as_the_window_makes_them(
     bands = n // radar.n_doppler_bands * np.arange(1, radar.n_doppler_bands)[:, None]
     copies = power[:, (column + bands + lobe) % n]
     assert copies.max() < 1e-6 * power.max()
-
-
-def test_the_clutter_map_takes_the_window() -> None:
-    overlapping = Radar(
-        tx_y=1,
-        tx_z=0,
-        rx_y=1,
-        rx_z=0,
-        samples_per_chirp=2,
-        chirp_duration_s=1e-3,
-        frame_duration_s=16e-3,
-        frame_hop_s=4e-3,
-    )
-    # Frames that share chirps are the more alike the flatter their window function is; the more
-    # alike, the higher the multiplier of a young map.
-    scales = []
-    for name in ("boxcar", "hann", "blackmanharris"):
-        clutter = ClutterMap(overlapping, pfa=1e-3, window_functions=WindowFunctions(doppler=name))
-        for _ in range(12):
-            clutter.push(np.ones((1, 1)))
-        scales.append(clutter._multiplier())
-    assert scales[0] > 1.05 * scales[1] > 1.05 * scales[2]
 
 
 @pytest.mark.parametrize("name", [*NAMES, ("chebwin", 80.0), ("kaiser", 8.6)])

@@ -1,4 +1,4 @@
-"""Static-clutter removal and clutter-map CFAR, against sums written out here and counted alarms.
+"""Static-clutter removal against sums that are written out here.
 
 Removal: the IF samples of a static room of five reflectors and of three moving points, 60 dB below
 the strongest reflector, are computed in float64, rounded to complex64 as in the pipeline, and go
@@ -8,11 +8,6 @@ room and the rounding that it leaves on the moving points.
 
 Maps: a walk of 0.6 s in the living room by `rt.run` with each removal. What every map of
 ``maps.h5`` contains where nothing moves is divided by the same without removal.
-
-Clutter map: alarms are counted on noise alone, on independent maps with a Gamma distribution, and
-on white noise through range and Doppler spectra with the overlapping frames of the radar. The
-textbook's clutter map, which treats overlapping frames as independent and includes the newest
-ones, is reported beside it.
 
     python validation/closed_forms/clutter.py [--quick] [--json FILE]
 """
@@ -33,9 +28,6 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.process import (
-    ClutterMap,
-    SlidingWindows,
-    clutter_map_scale,
     clutter_removal,
     power_map,
     range_spectrum,
@@ -45,7 +37,6 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 ROOM_DB = 60.0
 MOST_LEFT_DB = -100.0
-MOST_OFF = 0.1
 SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
     "mean": ("mean", {}),
     "exponential, 0.2 s": ("exponential", {"time_constant_s": 0.2}),
@@ -314,118 +305,6 @@ def noise_rows(quick: bool) -> Iterator[Row]:
             )
 
 
-# -- clutter map -----------------------------------------------------------------------------------
-
-
-class TextBook:
-    """Clutter map by the law of independent frames; it includes a frame after ``wait`` more."""
-
-    def __init__(self, share: float, pfa: float, looks: int, wait: int) -> None:
-        self.share, self.pfa, self.looks, self.wait = share, pfa, looks, wait
-        self.queue: list[NDArray[np.float64]] = []
-        self.weights = np.zeros(0)
-        self.level: Any = 0.0
-        self.scale = math.inf
-
-    def push(self, power: NDArray[np.floating]) -> NDArray[np.bool_]:
-        found = (
-            power > self.scale * self.level if self.weights.size else np.zeros(power.shape, bool)
-        )
-        self.queue.append(power.astype(np.float64))
-        if len(self.queue) > self.wait:
-            step = max(self.share, 1 / (self.weights.size + 1))
-            self.level = (1 - step) * self.level + step * self.queue.pop(0)
-            if self.weights.size < 250:  # 6 time constants: the rest weighs 0.2 %
-                self.weights = np.append((1 - step) * self.weights, step)
-                self.scale = clutter_map_scale(self.weights, self.pfa, self.looks)
-        return found
-
-
-def independent_rows(quick: bool) -> Iterator[Row]:
-    radar = thin("paper-12ghz", 1, 1, frame_hop_s=0.1)
-    rng = np.random.default_rng(3)
-    n_windows, shape, old = (150 if quick else 500), (256 if quick else 768, 133), 30
-    for looks in (1, 96):
-        detectors = {pfa: ClutterMap(radar, pfa=pfa, looks=looks) for pfa in (1e-2, 1e-3)}
-        alarms: dict[float, list[float]] = {pfa: [] for pfa in detectors}
-        for _ in range(n_windows):
-            power = rng.standard_gamma(looks, size=shape)
-            for pfa, detector in detectors.items():
-                alarms[pfa].append(float(detector.push(power).mean()))
-        for pfa, rates in alarms.items():
-            claim = f"windows apart, {looks} look{'s' if looks > 1 else ''}, {pfa:g} asked"
-            says = "clutter-map CFAR on noise: false alarms counted over those asked"
-            for part, counted in (
-                (f"windows 2 to {old}", rates[1:old]),
-                ("all later", rates[old:]),
-            ):
-                yield alarms_row(claim, part, float(np.mean(counted)) / pfa, says)
-
-
-def alarms_row(claim: str, part: str, ratio: float, says: str) -> Row:
-    """Row of the false alarms that were counted, over those that were asked for."""
-    what = f"counted over asked, {part}"
-    return judged(claim, what, "", ratio, MOST_OFF, reference=1.0, says=says)
-
-
-def noise_maps(radar: Radar, n_windows: int, seed: int) -> Iterator[NDArray[np.floating]]:
-    """Maps of white noise in the radar's windows, all channels summed."""
-    rng, windows, block = np.random.default_rng(seed), SlidingWindows(radar), 34 * radar.n_tx
-    given = 0
-    while True:
-        shape = (block, radar.n_rx, radar.samples_per_chirp, 2)
-        noise = rng.standard_normal(shape, dtype=np.float32).view(np.complex64)[..., 0]
-        for _, _, cube in windows.push(range_spectrum(noise, radar)):
-            yield power_map(cube, radar)
-            given += 1
-            if given == n_windows:
-                return
-
-
-def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> Iterator[Row]:
-    looks, old = radar.n_channels, 44
-    share = 1 - math.exp(-radar.frame_hop_s / 1.0)
-    detectors: dict[tuple[str, float], Any] = {}
-    for pfa in pfas:
-        detectors["ours", pfa] = ClutterMap(radar, pfa=pfa, looks=looks)
-        detectors["newest kept out, taken for independent", pfa] = TextBook(
-            share, pfa, looks, wait=3
-        )
-        detectors["newest taken in, taken for independent", pfa] = TextBook(
-            share, pfa, looks, wait=0
-        )
-    alarms: dict[tuple[str, float], list[float]] = {key: [] for key in detectors}
-    for power in noise_maps(radar, n_windows, seed=4):
-        for key, detector in detectors.items():
-            alarms[key].append(float(detector.push(power).mean()))
-    for (kind, pfa), rates in alarms.items():
-        asked = f"{looks} look{'s' if looks > 1 else ''}, {pfa:g} asked"
-        claim = f"windows share 75 %, {asked}, {kind}"
-        for part, values in ((f"windows 5 to {old}", rates[4:old]), ("all later", rates[old:])):
-            ratio = float(np.mean(values)) / pfa
-            if kind == "ours":
-                says = (
-                    "clutter-map CFAR on noise, frames that overlap by 75 %: "
-                    "false alarms counted over those asked"
-                )
-                yield alarms_row(claim, part, ratio, says)
-            else:
-                yield reported(claim, f"counted over asked, {part}", "", ratio)
-
-
-def steady_rows(quick: bool) -> Iterator[Row]:
-    """Cells with a constant echo in the noise have fewer alarms than asked for."""
-    radar = thin("paper-12ghz", 1, 1, frame_hop_s=0.1)
-    rng = np.random.default_rng(5)
-    for echo_db in (0.0, 10.0, 20.0):
-        detector, rates = ClutterMap(radar, pfa=1e-2), []
-        for _ in range(60 if quick else 200):
-            noise = rng.standard_normal((256, 133, 2)).view(np.complex128)[..., 0] * math.sqrt(0.5)
-            rates.append(float(detector.push(abs(noise + 10 ** (echo_db / 20)) ** 2).mean()))
-        claim = f"steady echo {echo_db:g} dB above the noise, 1 look, 0.01 asked"
-        yield reported(claim, "counted over asked", "", float(np.mean(rates[30:])) / 1e-2)
-
-
 def map_rows(quick: bool) -> Iterator[Row]:
     """Level of maps where nothing moves: at zero Doppler, or the mean of range over time."""
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
@@ -467,12 +346,9 @@ def measure(quick: bool) -> list[Row]:
     rows: list[Row] = list(map_rows(quick))
     for name in ("paper-12ghz", "paper-77ghz"):
         rows += [*room_rows(name), *response_rows(name), *mean_rows(name)]
-    rows += [*noise_rows(quick), *independent_rows(quick), *steady_rows(quick)]
-    rows += overlapping_rows(thin("paper-12ghz", 1, 1), 150 if quick else 500, (1e-2, 1e-3))
-    if not quick:
-        rows += overlapping_rows(Radar.preset("paper-12ghz"), 200, (1e-2, 1e-3))
+    rows += noise_rows(quick)
     return rows
 
 
 if __name__ == "__main__":
-    sys.exit(main("Static-clutter removal and clutter-map CFAR.", measure))
+    sys.exit(main("Static-clutter removal.", measure))
