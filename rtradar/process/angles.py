@@ -240,18 +240,10 @@ def angle(
             f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, "
             "one for each Tx"
         )
-    row = _nearest(range_m / radar.range_bin_m, 0, radar.samples_per_chirp - 1)
-    if row is None:
-        raise InputError(
-            f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m"
-        )
+    last = radar.samples_per_chirp - 1
+    row = _nearest("range_m", range_m, radar.range_bin_m, 0, last)
     step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
-    column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
-    if column is None:
-        raise InputError(
-            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} "
-            "m/s, the unambiguous one"
-        )
+    column = _nearest("velocity", velocity, step, -n_cycles / 2, n_cycles / 2)
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
     cell = [row], [(column + n_cycles // 2) % n_cycles]
     values = cell_spectra(cube, radar, *cell, window_functions=window_functions)
@@ -262,9 +254,14 @@ def angle(
     return (math.nan if found.y is None else azimuth, math.nan if found.z is None else math.asin(w))
 
 
-def _nearest(bins: float, least: float, largest: float) -> int | None:
-    """The nearest whole number, or None where the bins lie half a bin or more outside, or NaN."""
-    return round(bins) if least - 0.5 < bins < largest + 0.5 else None
+def _nearest(name: str, value: float, step: float, least: float, largest: float) -> int:
+    """The nearest of the bins; InputError where the value is half a bin or more outside, or NaN."""
+    if not least - 0.5 < value / step < largest + 0.5:
+        raise InputError(
+            f"angle: {name} = {value}; it must lie between {least * step:.3f} and "
+            f"{largest * step:.3f}, the ends of the map"
+        )
+    return round(value / step)
 
 
 def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> float:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,11 +74,10 @@ def os_cfar(
     >>> [tuple(map(int, cell)) for cell in np.argwhere(rt.process.os_cfar(power))]
     [(20, 30)]
     """
-    cells, _ = _checked(power, guard, train, pfa, looks, scale)
-    check_quantile(quantile)
-    scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
-    thresholds = cells / scales.astype(cells.dtype)
-    return np.asarray(_count_below(cells, thresholds, guard, guard + train) >= ranks)
+    _check_quantile(quantile)
+    cells, law = _checked(power, guard, train, quantile, pfa, looks, scale)
+    thresholds = cells / law.scales.astype(cells.dtype)
+    return np.asarray(_count_below(cells, thresholds, guard, guard + train) >= law.ranks)
 
 
 def ca_cfar(
@@ -106,9 +105,8 @@ def ca_cfar(
     InputError
         Where `os_cfar` raises it.
     """
-    cells, counts = _checked(power, guard, train, pfa, looks, scale)
-    scales = _ca_law(cells.shape, guard, train, pfa, looks, scale)
-    sums_wanted = cells * (counts / scales).astype(cells.dtype)
+    cells, law = _checked(power, guard, train, None, pfa, looks, scale)
+    sums_wanted = cells * (law.counts / law.scales).astype(cells.dtype)
     inner = np.zeros(2 * (guard + train) + 1)
     inner[train : train + 2 * guard + 1] = 1
     # The rows beside the guard cells whole, theirs without them: a difference of sums over squares
@@ -122,77 +120,85 @@ def _sums(cells: NDArray[np.floating], weights: NDArray[np.float64], axis: int) 
     return correlate1d(cells, weights, axis, output=np.float64, mode="constant")
 
 
-# What depends on the shape alone is the same for all maps of a capture, and as slow as a map.
-_remembered = lru_cache(maxsize=4)
+class _Law(NamedTuple):
+    """Number of training cells, rank and multiplier of each cell (range, velocity)."""
+
+    counts: NDArray[np.int32]
+    ranks: NDArray[np.int32]
+    scales: NDArray[np.float64]
 
 
-@_remembered
-def _os_law(
+# It is the same for all maps of a capture, and as slow as a map.
+@lru_cache(maxsize=4)
+def _law(
     shape: tuple[int, int],
     guard: int,
     train: int,
-    quantile: float,
+    quantile: float | None,
     pfa: float,
     looks: int,
     scale: float | None,
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Multiplier and rank of each cell (range, velocity)."""
-    counts = _training_counts(*shape, guard, guard + train)
-    ranks = _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
-    if scale is not None:
-        return np.full(shape, scale), ranks
-    return _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks)), ranks
+) -> _Law:
+    """Law of the order statistic of a quantile, or of the mean, which has no ranks."""
 
+    def square(half: int) -> NDArray[np.int32]:
+        rows, columns = (
+            np.minimum(np.arange(n) + half, n - 1) - np.maximum(np.arange(n) - half, 0) + 1
+            for n in shape
+        )
+        return np.outer(rows, columns).astype(np.int32)
 
-@_remembered
-def _ca_law(
-    shape: tuple[int, int], guard: int, train: int, pfa: float, looks: int, scale: float | None
-) -> NDArray[np.float64]:
-    """Multiplier of each cell (range, velocity)."""
-    return _by_count(
-        _training_counts(*shape, guard, guard + train),
-        lambda n: ca_scale(n, pfa, looks) if scale is None else scale,
-    )
+    counts = square(guard + train) - square(guard)
+    if counts.size and counts.min() == 0:
+        raise InputError(
+            f"CFAR: in a map of {shape[0]} x {shape[1]} a cell has no training cells with guard = "
+            f"{guard}; each axis, or one of them, needs more than {2 * guard + 1} cells"
+        )
+    # Once for each number of training cells that occurs.
+    ranks, scales = np.zeros((2, int(counts.max(initial=0)) + 1))
+    for n in np.unique(counts).tolist():
+        if quantile is not None:
+            ranks[n] = order_rank(n, quantile)
+        if scale is not None:
+            scales[n] = scale
+        elif quantile is None:
+            scales[n] = ca_scale(n, pfa, looks)
+        else:
+            scales[n] = os_scale(n, quantile, pfa, looks)
+    return _Law(counts, ranks[counts].astype(np.int32), scales[counts])
 
 
 def _checked(
-    power: ArrayLike, guard: int, train: int, pfa: float, looks: int, scale: float | None
-) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
-    """The map as C-contiguous float32 or float64, and the number of training cells of each cell."""
-    cells = checked_power("CFAR", power)
-    check_count("guard", guard, least=0)
-    check_count("train", train)
-    check_count("looks", looks)
-    check_pfa(pfa)
-    check_scale("CFAR", scale)
-    counts = _training_counts(cells.shape[0], cells.shape[1], guard, guard + train)
-    if counts.size and counts.min() == 0:
+    power: ArrayLike,
+    guard: int,
+    train: int,
+    quantile: float | None,
+    pfa: float,
+    looks: int,
+    scale: float | None,
+) -> tuple[NDArray[np.floating], _Law]:
+    """The map as C-contiguous float32 or float64, and its law."""
+    cells = np.asarray(power)
+    if cells.ndim != 2 or cells.dtype.kind not in "fiu":
         raise InputError(
-            f"CFAR: in a map of {cells.shape[0]} x {cells.shape[1]} a cell has no training cells "
-            f"with guard = {guard}; each axis, or one of them, needs more than {2 * guard + 1} "
-            "cells"
+            f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real "
+            "(range, velocity) map"
         )
-    return cells, counts
-
-
-@_remembered
-def _training_counts(n_range: int, n_velocity: int, guard: int, outer: int) -> NDArray[np.int32]:
-    def overlap(n: int, half: int) -> NDArray[np.int32]:
-        i = np.arange(n)
-        return (np.minimum(i + half, n - 1) - np.maximum(i - half, 0) + 1).astype(np.int32)
-
-    all_of_it, inner = (
-        overlap(n_range, half)[:, None] * overlap(n_velocity, half) for half in (outer, guard)
-    )
-    return all_of_it - inner
-
-
-def _by_count(counts: NDArray[np.int32], of_count: Callable[[int], float]) -> NDArray[np.float64]:
-    """A function of the number of training cells (range, velocity), once for each that occurs."""
-    table = np.zeros(int(counts.max(initial=0)) + 1)
-    for n in np.unique(counts):
-        table[n] = of_count(int(n))
-    return table[counts]
+    cells = np.ascontiguousarray(cells, np.float32 if cells.dtype == np.float32 else np.float64)
+    if (cells < 0).any():
+        raise InputError("CFAR: power is negative; give linear power, not decibels")
+    if not np.isfinite(cells).all():
+        raise InputError(
+            "CFAR: power holds NaN or infinity; give finite samples, whose squares do not "
+            f"exceed {np.finfo(np.float32).max:.1g}"
+        )
+    _check_count("guard", guard, least=0)
+    _check_count("train", train)
+    _check_rate(pfa, looks)
+    if scale is not None and not 0 < scale < math.inf:
+        raise InputError(f"CFAR: scale = {scale!r}; a multiplier must be positive and finite")
+    rows, columns = cells.shape
+    return cells, _law((rows, columns), guard, train, quantile, pfa, looks, scale)
 
 
 def _count_below(
@@ -253,8 +259,9 @@ def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float
     InputError
         Where an argument is out of its range.
     """
-    _check_law(n_train, pfa, looks)
-    check_quantile(quantile)
+    _check_count("n_train", n_train)
+    _check_rate(pfa, looks)
+    _check_quantile(quantile)
     return _os_scale(int(n_train), order_rank(n_train, quantile), float(pfa), int(looks))
 
 
@@ -277,61 +284,28 @@ def ca_scale(n_train: int, pfa: float, looks: int = 1) -> float:
     InputError
         Where an argument is out of its range.
     """
-    _check_law(n_train, pfa, looks)
+    _check_count("n_train", n_train)
+    _check_rate(pfa, looks)
     # F.isf(pfa, 2L, 2NL) = N (1 - y) / y with y the pfa-quantile of Beta(NL, L); 1 - y by itself,
     # without cancellation.
     remainder = betainccinv(looks, n_train * looks, pfa)
     return float(n_train * remainder / betaincinv(n_train * looks, looks, pfa))
 
 
-def check_quantile(quantile: float) -> None:
-    """Raise InputError unless the quantile lies in (0, 1]."""
+def _check_quantile(quantile: float) -> None:
     if not 0 < quantile <= 1:
         raise InputError(f"CFAR: quantile = {quantile!r}; it must be above 0 and at most 1")
 
 
-def check_pfa(pfa: float) -> None:
-    """Raise InputError unless the false-alarm rate lies in (0, 1)."""
+def _check_rate(pfa: float, looks: int) -> None:
     if not 0 < pfa < 1:
         raise InputError(f"CFAR: pfa = {pfa!r}; a false-alarm rate must lie between 0 and 1")
+    _check_count("looks", looks)
 
 
-def check_count(name: str, count: int, least: int = 1) -> None:
-    """Raise InputError unless a count is a whole number of at least so many."""
+def _check_count(name: str, count: int, least: int = 1) -> None:
     if isinstance(count, bool) or count != int(count) or count < least:
         raise InputError(f"CFAR: {name} = {count!r}; it must be a whole number, at least {least}")
-
-
-def check_scale(where: str, scale: float | None) -> None:
-    """Raise InputError unless a given multiplier is positive and finite."""
-    if scale is not None and not 0 < scale < math.inf:
-        raise InputError(f"{where}: scale = {scale!r}; a multiplier must be positive and finite")
-
-
-def checked_power(where: str, power: ArrayLike) -> NDArray[np.floating]:
-    """Power (range, velocity), C-contiguous float32 or float64; InputError if it is no power."""
-    cells = np.asarray(power)
-    if cells.ndim != 2 or cells.dtype.kind not in "fiu":
-        raise InputError(
-            f"{where}: power has shape {cells.shape}, type {cells.dtype}; it must be a real "
-            "(range, velocity) map"
-        )
-    kind = np.float32 if cells.dtype == np.float32 else np.float64
-    cells = np.ascontiguousarray(cells, dtype=kind)
-    if (cells < 0).any():
-        raise InputError(f"{where}: power is negative; give linear power, not decibels")
-    if not np.isfinite(cells).all():
-        raise InputError(
-            f"{where}: power holds NaN or infinity; give finite samples, whose squares do not "
-            f"exceed {np.finfo(np.float32).max:.1g}"
-        )
-    return cells
-
-
-def _check_law(n_train: int, pfa: float, looks: int) -> None:
-    check_count("n_train", n_train)
-    check_pfa(pfa)
-    check_count("looks", looks)
 
 
 @lru_cache(maxsize=4096)

@@ -39,6 +39,7 @@ channels alike, so that directions stay.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,12 +49,6 @@ from rtradar.process.spectra import checked_chirps
 from rtradar.radar import Radar
 from rtradar.system.checks import is_real
 from rtradar.system.threads import thread_map
-
-CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
-"""Names of the methods of `clutter_removal`."""
-
-_TIME_CONSTANT_S = 1.0
-_PULSES = 2
 
 _CELLS_AT_ONCE = 2048
 """Cells of one task of a thread: a short frame of them fits the cache of a core."""
@@ -68,18 +63,27 @@ class ClutterRemoval:
     ----------
     radar : Radar
         Radar that gives the schedule and the shape.
+    background : (tx, rx, range) complex, optional
+        Range spectra that are subtracted from every cycle before.
 
     Attributes
     ----------
     works_by_windows : bool
-        Whether it is `window` that removes; `block` then gives what it gets.
+        Whether it is `window` that removes; `block` then only subtracts the background.
     """
 
     works_by_windows = False
 
-    def __init__(self, radar: Radar) -> None:
+    def __init__(self, radar: Radar, background: ArrayLike | None = None) -> None:
         self._radar = radar
         self._next: int | None = None  # chirp that the next block must begin with
+        self._room = None if background is None else _complex(background)
+        shape = radar.n_tx, radar.n_rx, radar.samples_per_chirp
+        if self._room is not None and self._room.shape != shape:
+            raise InputError(
+                f"clutter removal: background has shape {self._room.shape}; that of a cycle of "
+                f"radar '{radar.name}' is (tx, rx, range) = {shape}"
+            )
 
     def block(self, spectra: ArrayLike, first_chirp: int) -> NDArray[np.complexfloating]:
         """Range spectra of the next chirps without clutter, for a method that works on the stream.
@@ -120,6 +124,8 @@ class ClutterRemoval:
             )
         self._next = first_chirp + len(chirps)
         cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])
+        if self._room is not None:
+            cycles = cycles - self._room.astype(cycles.dtype)
         return self._stream(cycles).reshape(chirps.shape)
 
     def window(self, cycles: ArrayLike) -> NDArray[np.complexfloating]:
@@ -162,6 +168,12 @@ class ClutterRemoval:
         str
             ``none`` where nothing is removed.
         """
+        own = self._method(window_cycles)
+        if self._room is None:
+            return own
+        return "background" if own == "none" else f"background, then {own}"
+
+    def _method(self, window_cycles: int) -> str:
         return "none"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
@@ -175,7 +187,7 @@ class ClutterRemoval:
 class _Mean(ClutterRemoval):
     works_by_windows = True
 
-    def description(self, window_cycles: int) -> str:
+    def _method(self, window_cycles: int) -> str:
         seconds = window_cycles * self._radar.cycle_duration_s
         return f"mean over {window_cycles} cycles ({seconds:.3g} s)"
 
@@ -194,8 +206,15 @@ class _Mean(ClutterRemoval):
 
 
 class _Exponential(ClutterRemoval):
-    def __init__(self, radar: Radar, time_constant_s: float) -> None:
-        super().__init__(radar)
+    def __init__(
+        self, radar: Radar, background: ArrayLike | None, time_constant_s: float = 1.0
+    ) -> None:
+        super().__init__(radar, background)
+        if not is_real(time_constant_s) or not 0 < time_constant_s < math.inf:
+            raise InputError(
+                f"time_constant_s = {time_constant_s!r}; it must be a number of seconds, positive "
+                "and finite"
+            )
         self._time_constant_s = time_constant_s
         apart_s = radar.cycle_duration_s
         if radar.frame_period_s is not None:
@@ -206,7 +225,7 @@ class _Exponential(ClutterRemoval):
         # In double, because it takes steps of 1e-3 and less.
         self._background = np.zeros(shape, np.complex128)
 
-    def description(self, window_cycles: int) -> str:
+    def _method(self, window_cycles: int) -> str:
         return f"exponential background, time constant {self._time_constant_s:g} s"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
@@ -224,9 +243,11 @@ class _Exponential(ClutterRemoval):
 
 
 class _Mti(ClutterRemoval):
-    def __init__(self, radar: Radar, pulses: int) -> None:
-        super().__init__(radar)
-        self._order = pulses - 1
+    def __init__(self, radar: Radar, background: ArrayLike | None, pulses: int = 2) -> None:
+        super().__init__(radar, background)
+        if pulses not in (2, 3):
+            raise InputError(f"clutter removal 'mti': pulses = {pulses!r}; allowed: 2, 3")
+        self._order = int(pulses) - 1
         # The squares of the weights sum to this binomial coefficient.
         self._gain = 1 / math.sqrt(math.comb(2 * self._order, self._order))
         # The last cycles, as received.
@@ -234,56 +255,35 @@ class _Mti(ClutterRemoval):
         self._held = np.empty(shape, np.complex64)
         self._cycles = 0  # that have passed
 
-    def description(self, window_cycles: int) -> str:
+    def _method(self, window_cycles: int) -> str:
         return f"MTI canceller of {self._order + 1} pulses"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.zeros_like(cycles)
+        known = np.concatenate([self._held, cycles])
+        numbers = np.arange(self._cycles, self._cycles + len(cycles))
         if self._radar.in_frames:
-            return self._frames(cycles, out)
-        known = np.concatenate([self._held, cycles])
-        self._held = known[-self._order :].copy()  # a view would keep the whole block
+            # Over a gap between frames nothing is the difference of two cycles.
+            numbers %= self._radar.cycles_per_frame
+        some = np.flatnonzero(numbers >= self._order)
         # Little changes from cycle to cycle, so differences of differences hardly round.
-        differences = np.diff(known, n=self._order, axis=0)
-        out[len(out) - len(differences) :] = differences * known.real.dtype.type(self._gain)
-        return out
-
-    def _frames(
-        self, cycles: NDArray[np.complexfloating], out: NDArray[np.complexfloating]
-    ) -> NDArray[np.complexfloating]:
-        """Cancel frame by frame, for over a gap nothing is the difference of two cycles."""
-        known = np.concatenate([self._held, cycles])
-        held, first = len(self._held), self._cycles
-        within = np.arange(first, first + len(cycles)) % self._radar.cycles_per_frame
         differences = np.diff(known, n=self._order, axis=0) * known.real.dtype.type(self._gain)
-        some = np.flatnonzero(within >= self._order)
-        out[some] = differences[some + held - self._order]
-        self._held, self._cycles = known[-self._order :].copy(), first + len(cycles)
+        out[some] = differences[some + len(self._held) - self._order]
+        self._cycles += len(cycles)
+        self._held = known[-self._order :].copy()  # a view would keep the whole block
         return out
 
 
-class _Background(ClutterRemoval):
-    def __init__(self, radar: Radar, background: ArrayLike, then: ClutterRemoval) -> None:
-        super().__init__(radar)
-        cycle = _complex(background)
-        shape = radar.n_tx, radar.n_rx, radar.samples_per_chirp
-        if cycle.shape != shape:
-            raise InputError(
-                f"clutter removal: background has shape {cycle.shape}; that of a cycle of radar "
-                f"'{radar.name}' is (tx, rx, range) = {shape}"
-            )
-        self._cycle, self._then = cycle, then
-        self.works_by_windows = then.works_by_windows
+_METHODS: dict[str, tuple[type[ClutterRemoval], str]] = {
+    "none": (ClutterRemoval, ""),
+    "mean": (_Mean, ""),
+    "exponential": (_Exponential, "time_constant_s"),
+    "mti": (_Mti, "pulses"),
+}
+"""Class of each method, and the name of its setting."""
 
-    def description(self, window_cycles: int) -> str:
-        then = self._then.description(window_cycles)
-        return "background" + ("" if then == "none" else f", then {then}")
-
-    def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        return self._then._stream(cycles - self._cycle.astype(cycles.dtype))
-
-    def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        return self._then._window(cycles)
+CLUTTER_REMOVALS = tuple(_METHODS)
+"""Names of the methods of `clutter_removal`."""
 
 
 def clutter_removal(
@@ -327,10 +327,7 @@ def clutter_removal(
         Where there is no such method, a setting has no meaning or belongs to another method,
         ``mean`` has only one cycle to average, or the background is no cycle of the radar.
     """
-    if background is not None:
-        then = clutter_removal(method, radar, time_constant_s=time_constant_s, pulses=pulses)
-        return _Background(radar, background, then)
-    if method not in CLUTTER_REMOVALS:
+    if method not in _METHODS:
         raise InputError(
             f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}"
         )
@@ -339,40 +336,20 @@ def clutter_removal(
             f"clutter removal '{method}': under multiplexing = 'ddm' what does not move has a "
             "Doppler of its own for each Tx, which this would leave in; choose 'none', or TDM"
         )
-    for name, value, owner in (
-        ("time_constant_s", time_constant_s, "exponential"),
-        ("pulses", pulses, "mti"),
-    ):
-        if value is not None and method != owner:
-            raise InputError(
-                f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'"
-            )
-    if method == "mean":
-        if radar.cycles_per_frame < 2:
-            raise InputError(
-                f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and "
-                "its mean is all of it; lengthen the frame or choose 'exponential' or 'mti'"
-            )
-        return _Mean(radar)
-    if method == "exponential":
-        given = _TIME_CONSTANT_S if time_constant_s is None else time_constant_s
-        return _Exponential(radar, check_time_constant(given))
-    if method == "mti":
-        if pulses not in (None, 2, 3):
-            raise InputError(f"clutter removal 'mti': pulses = {pulses!r}; allowed: 2, 3")
-        return _Mti(radar, _PULSES if pulses is None else int(pulses))
-    return ClutterRemoval(radar)
-
-
-def check_time_constant(time_constant_s: float) -> float:
-    """The time constant as a float; InputError unless it is positive and finite."""
-    if not is_real(time_constant_s):
-        raise InputError(f"time_constant_s = {time_constant_s!r}; it must be a number of seconds")
-    if not 0 < time_constant_s < math.inf:
+    if method == "mean" and radar.cycles_per_frame < 2:
         raise InputError(
-            f"time_constant_s = {time_constant_s!r}; it must be positive and finite [s]"
+            f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and "
+            "its mean is all of it; lengthen the frame or choose 'exponential' or 'mti'"
         )
-    return float(time_constant_s)
+    make, setting = _METHODS[method]
+    given = {"time_constant_s": time_constant_s, "pulses": pulses}
+    own: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    for name in own.keys() - {setting}:
+        owner = next(other for other, (_, its) in _METHODS.items() if its == name)
+        raise InputError(
+            f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'"
+        )
+    return make(radar, background, **own)
 
 
 def _complex(values: ArrayLike) -> NDArray[np.complexfloating]:

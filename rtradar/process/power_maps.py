@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
-from rtradar.process.spectra import complex_kind
+from rtradar.process.spectra import check_channel, checked_frame, complex_kind
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
@@ -67,17 +67,9 @@ def power_map(
     InputError
         Where the shape does not fit the radar, or there is no such channel.
     """
-    cube = np.asarray(spectra)
-    if cube.ndim != 4 or cube.shape[1:3] != (radar.n_tx, radar.n_rx) or cube.shape[0] < 1:
-        raise InputError(
-            f"power_map: spectra have shape {cube.shape}; radar '{radar.name}' needs "
-            f"(cycle, tx, rx, range) = (>= 1, {radar.n_tx}, {radar.n_rx}, any)"
-        )
-    if channel is not None and not 0 <= channel < radar.n_channels:
-        raise InputError(
-            f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to "
-            f"{radar.n_channels - 1}"
-        )
+    cube = checked_frame("power_map", spectra, radar)
+    if channel is not None:
+        check_channel("power_map", channel, radar)
     n_cycles, _, _, n_range = cube.shape
     scale = weights(window_functions.doppler, n_cycles)
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)

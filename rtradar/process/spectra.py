@@ -168,6 +168,26 @@ def checked_chirps(what: str, values: ArrayLike, radar: Radar) -> NDArray[np.gen
     return chirps
 
 
+def checked_frame(where: str, spectra: ArrayLike, radar: Radar) -> NDArray[np.complexfloating]:
+    """Spectra (cycle, tx, rx, range) of a frame; InputError if they are none of the radar."""
+    cube, shape = np.asarray(spectra), (radar.n_tx, radar.n_rx)
+    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
+        raise InputError(
+            f"{where}: spectra have shape {cube.shape}, type {cube.dtype}; radar '{radar.name}' "
+            f"needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, any)"
+        )
+    return cube
+
+
+def check_channel(where: str, channel: int, radar: Radar) -> None:
+    """Raise InputError where a radar has no such channel."""
+    if not 0 <= channel < radar.n_channels:
+        raise InputError(
+            f"{where}: channel = {channel}; radar '{radar.name}' has channels 0 to "
+            f"{radar.n_channels - 1}"
+        )
+
+
 def complex_kind(values: NDArray[np.generic]) -> type[np.complex64] | type[np.complex128]:
     """Complex numbers as precise as the values."""
     return np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128
@@ -213,7 +233,7 @@ def cell_spectra(
         Where the shape does not fit the radar, the cells are no whole numbers within the map, or
         the radar has no line of channels to measure an angle.
     """
-    cube = _frame_of(radar, spectra)
+    cube = checked_frame("cell_spectra", spectra, radar)
     n_cycles, n_range = cube.shape[0], cube.shape[3]
     rows = _indices(range_bins, n_range, "range_bins")
     columns = _indices(velocity_bins, n_cycles, "velocity_bins")
@@ -251,18 +271,6 @@ def cell_spectra(
 
     thread_map(transform, range(radar.n_channels))
     return values
-
-
-def _frame_of(radar: Radar, spectra: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-    """Check that range spectra are those of one frame of a radar."""
-    cube, shape = np.asarray(spectra), (radar.n_tx, radar.n_rx)
-    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
-        raise InputError(
-            f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar "
-            f"'{radar.name}' needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, "
-            "any)"
-        )
-    return cube
 
 
 def _indices(bins: ArrayLike, n: int, name: str) -> NDArray[np.int64]:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.power_maps import without_copies
-from rtradar.process.spectra import checked_chirps, complex_kind
+from rtradar.process.spectra import check_channel, checked_chirps, complex_kind
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 
@@ -192,11 +192,7 @@ class SlidingSpectrogram:
         window_functions: WindowFunctions = DEFAULT_WINDOWS,
     ) -> None:
         window = window_cycles(radar) if window is None else window
-        if not 0 <= channel < radar.n_channels:
-            raise InputError(
-                f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to "
-                f"{radar.n_channels - 1}"
-            )
+        check_channel("spectrogram", channel, radar)
         self._radar, self._window = radar, window
         self._tx, self._rx = divmod(channel, radar.n_rx)
         self._own = self._tx, removal or ClutterRemoval(radar), window_functions

@@ -283,7 +283,7 @@ def test_no_line_no_angle(fields: dict) -> None:
         (9.7, 0.0, "range_m = 9.7; it must lie between 0"),
         (-0.1, 0.0, "range_m"),
         (math.nan, 0.0, "range_m"),
-        (4.0, 80.0, "velocity = 80.0; it must lie within"),
+        (4.0, 80.0, "velocity = 80.0; it must lie between"),
         (4.0, -80.0, "velocity"),
         (4.0, math.nan, "velocity"),
     ],
