@@ -51,7 +51,7 @@ def aligned(text: str) -> str:
     str
         Text with padded cells.
     """
-    lines = []
+    lines: list[str] = []
     for is_table, block in groupby(text.split("\n"), lambda line: line.startswith("|")):
         if not is_table:
             lines += block

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rtradar.classify import outcomes as scores
 from rtradar.classify.outcomes import HISTORY, TABLE_4, Outcome
@@ -182,14 +181,11 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
         ],
     }
     if any(one.trained_on for one in outcomes):
-        values, mean, spread = scores.transfer(outcomes)
-        content["transfer"] = {"values": values, "mean": _plain(mean), "spread": _plain(spread)}
+        values, *tables = scores.transfer(outcomes)
+        # JSON lacks NaN.
+        mean, spread = (np.where(np.isnan(each), None, each).tolist() for each in tables)
+        content["transfer"] = {"values": values, "mean": mean, "spread": spread}
     return content
-
-
-def _plain(table: NDArray[np.float64]) -> list[list[float | None]]:
-    """Replace NaN, which JSON lacks, by None."""
-    return [[None if np.isnan(value) else value for value in row] for row in table.tolist()]
 
 
 def _write_csv(out: Path, groups: Sequence[Group]) -> None:

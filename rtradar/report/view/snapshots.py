@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -196,7 +197,7 @@ def load_snapshots(path: str | Path) -> Snapshots:
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)
         if arrays["format"].tolist() == 1:
-            arrays |= _of_one_person(**arrays)
+            arrays |= _of_one_person(arrays)
         if arrays["format"].tolist() != _FORMAT:
             raise InputError("it is of another version of rtradar")
         return Snapshots(**{one.name: arrays[one.name] for one in fields(Snapshots)})
@@ -216,25 +217,21 @@ def refused(path: str | Path, error: Exception) -> InputError:
     return InputError(f"'{path}': {why}; make it anew with: rtradar run")
 
 
-def _of_one_person(
-    times: NDArray[Any], part_names: NDArray[Any], poses: NDArray[Any], **_: Any
-) -> dict[str, Any]:
-    """Return what files of the first format lack."""
-    torso = part_names.tolist().index("lower torso")
-    place = poses[:, torso, 0].astype(np.float64)
+def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
+    times, parts = arrays["times"], arrays["part_names"].tolist()
+    place = arrays["poses"][:, parts.index("lower torso"), 0].astype(np.float64)
     moved = np.gradient(place, times, axis=0) if len(times) > 1 else np.zeros_like(place)
-    none = np.zeros(0, dtype=np.int64)
-    return {
+    found = {
         "format": np.array(_FORMAT),
-        "part_person": np.zeros(len(part_names), dtype=np.int64),
         "person_names": np.array(["person"]),
         "person_position": place[:, None],
         "person_speed": np.linalg.norm(moved, axis=1)[:, None],
-        "object_names": np.array([], dtype=np.str_),
-        "mesh_faces": np.zeros((0, 3), dtype=np.int64),
-        "mesh_rows": np.zeros((len(times), 0, 3), dtype=np.float32),
-        "blend_weight": np.zeros(0, dtype=np.float32),
-        **dict.fromkeys(
-            ("mesh_source", "mesh_of_vertex", "mesh_part", "blend_vertex", "blend_row"), none
-        ),
     }
+    sizes = {"step": len(times), "part": len(parts)}
+    for one in fields(Snapshots):
+        if one.name not in arrays:
+            axes, kind = one.metadata["axes"], one.metadata["kind"]
+            shape = [axis if isinstance(axis, int) else sizes.get(axis, 0) for axis in axes]
+            found.setdefault(one.name, np.zeros(shape, kind))
+    return found

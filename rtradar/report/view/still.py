@@ -79,32 +79,31 @@ def _tints(run_view: RunView, colour: str, step: int) -> _Tints:
     if colour in _NAMED:
         if colour == "part":
             names, of_part = GROUPS, group_of_parts(snapshots.part_names.tolist())
-            table, of_cloud = to_rgba_array(list(GROUPS.values())), run_view.rdt_group()
+            of_point = run_view.rdt_group()
         else:
             names = dict(zip(run_view.source_names, run_view.source_colours, strict=True))
-            table, of_cloud = sources, run_view.rdt_source  # that of nobody is the last
-            of_part = snapshots.part_person.tolist()
+            of_part, of_point = snapshots.part_person.tolist(), run_view.rdt_source
+        table = to_rgba_array(list(names.values()))  # the last is that of nobody
         parts = table[of_part]
-        return _Tints(parts[snapshots.echo_part], parts, table[of_cloud], sources, names)
+        return _Tints(parts[snapshots.echo_part], parts, table[of_point], sources, names)
     if colour == "power":
         label, limits = run_view.power_unit.label("of an echo"), run_view.power_range_db
-        values, of_cloud, scale = (
-            run_view.power_db[step],
-            run_view.rdt_power_db,
-            colormaps["viridis"],
-        )
+        values, cloud = run_view.power_db[step], run_view.rdt_power_db
+        scale: Any = colormaps["viridis"]
     else:
         label, limits = VELOCITY_LABEL, (-run_view.fastest_mps, run_view.fastest_mps)
-        values, of_cloud = snapshots.velocity_mps[step], run_view.rdt_points[:, 2]
+        values, cloud = snapshots.velocity_mps[step], run_view.rdt_points[:, 2]
         scale = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
     painted = ScalarMappable(Normalize(*limits), scale.with_extremes(bad=_HIDDEN))
     # Each part has the colour of its strongest direct echo, the last that is set.
     strongest = np.argsort(snapshots.power_m2[step], kind="stable")
     strongest = strongest[snapshots.direct[strongest]]
-    of_part = np.full(len(snapshots.part_names), np.nan)
-    of_part[snapshots.echo_part[strongest]] = values[strongest]
-    tints = (painted.to_rgba(np.ma.masked_invalid(own)) for own in (values, of_part, of_cloud))
-    return _Tints(*tints, sources, {}, (painted, label))
+    strengths = np.full(len(snapshots.part_names), np.nan)
+    strengths[snapshots.echo_part[strongest]] = values[strongest]
+    echoes, parts, cloud = (
+        np.asarray(painted.to_rgba(np.ma.masked_invalid(own))) for own in (values, strengths, cloud)
+    )
+    return _Tints(echoes, parts, cloud, sources, {}, (painted, label))
 
 
 def _explain(figure: Any, views: list[Any], tints: _Tints) -> None:
