@@ -9,11 +9,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-_UNITS = {
-    "hz": "Hz", "s": "s", "m": "m", "m2": "m²", "mps": "m/s", "db": "dB", "deg": "°", "mb": "MB",
-    "w": "W", "k": "K", "dbm": "dBm", "wavelengths": "wavelengths at the start of the sweep",
-}  # fmt: skip
-_ACRONYMS = {"if": "IF", "pfa": "Pfa", "rdt": "RDT", "rx": "Rx", "snr": "SNR", "tx": "Tx"}
 _PREFIXED = {"Hz", "s", "W"}  # shown as 12 GHz or 62.5 µs
 
 
@@ -39,10 +34,12 @@ def quantity(name: str, value: object) -> tuple[str, str]:
     None. Nothing is escaped yet.
     """
     words = name.split("_")
-    unit = _UNITS.get(words[-1], "") if len(words) > 1 else ""
+    units = _words()["units"]
+    unit = units.get(words[-1], "") if len(words) > 1 else ""
     if unit:
         words = words[:-1]
-    spoken = " ".join(_ACRONYMS.get(word, word) for word in words)
+    acronyms = _words()["acronyms"]
+    spoken = " ".join(acronyms.get(word, word) for word in words)
     label = _words()["labels"].get(name, spoken[:1].upper() + spoken[1:])
     return label, with_unit(value, unit)
 

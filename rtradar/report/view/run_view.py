@@ -6,6 +6,7 @@ The page has body, room, paths and echoes beside the maps and the cloud of the s
 from __future__ import annotations
 
 import base64
+import tomllib
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,8 +24,7 @@ from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.html import write_page
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import (
-    packed_floats,
-    packed_integers,
+    packed,
     posed_figure,
     rdt_data,
     spatial_data,
@@ -33,27 +33,13 @@ from rtradar.report.view.three_d import (
 COLOURS = ("person", "part", "power", "velocity")
 """Quantities that colours may show."""
 
-VELOCITY_COLOURS = (
-    (0.0, "#0b2e6b"), (0.25, "#1f6fd6"), (0.44, "#79b4f0"), (0.5, "#9a9aa2"),
-    (0.56, "#f0a184"), (0.75, "#d9371f"), (1.0, "#6b0f0f"),
-)  # fmt: skip
-"""Colour scale from approaching to receding, in which slow motion differs clearly from rest."""
+_TINTS = tomllib.loads(Path(__file__).with_name("colours.toml").read_text(encoding="utf-8"))
 
-GROUPS = {
-    "head, neck": "#cc79a7",
-    "torso": "#3f7fd1",
-    "left arm": "#56b4e9",
-    "right arm": "#009e73",
-    "left leg": "#e69f00",
-    "right leg": "#d55e00",
-    "no part near": "#8c8c94",
-}
+VELOCITY_COLOURS: list[tuple[float, str]] = _TINTS["velocity"]
+"""Colour scale from approaching to receding."""
+
+GROUPS: dict[str, str] = _TINTS["groups"]
 """Names and colours of the groups of body parts; the last is for what belongs to none."""
-
-SOURCE_COLOURS = (
-    "#3f7fd1", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8a5fc7", "#a3742a",
-)  # fmt: skip
-"""Colours of people and, after them, of objects, in turn; nobody has that of no part."""
 
 _ARM = ("clavicle", "upper arm", "forearm", "hand")
 
@@ -163,7 +149,7 @@ class RunView:
     def source_colours(self) -> list[str]:
         """Colours of `source_names`."""
         count = len(self.snapshots.sources)
-        return [*islice(cycle(SOURCE_COLOURS), count), GROUPS["no part near"]]
+        return [*islice(cycle(_TINTS["sources"]), count), GROUPS["no part near"]]
 
     @property
     def power_unit(self) -> FieldUnit:
@@ -295,7 +281,7 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
     points = {
-        "power_db": packed_floats(run_view.rdt_power_db[::every]),
+        "power_db": packed(run_view.rdt_power_db[::every]),
         "group": run_view.rdt_group()[::every].tolist(),
         "source": run_view.rdt_source[::every].tolist(),
     }
@@ -306,16 +292,16 @@ def view_data(run_view: RunView) -> dict[str, Any]:
             "path": snapshots.echo_path.tolist(),
             "part": snapshots.echo_part.tolist(),
             "bounces": snapshots.echo_bounces.tolist(),
-            "range_m": packed_floats(snapshots.range_m),
-            "velocity_mps": packed_floats(snapshots.velocity_mps),
-            "power_db": packed_floats(run_view.power_db),
-            "corners": packed_floats(snapshots.corners),
+            "range_m": packed(snapshots.range_m),
+            "velocity_mps": packed(snapshots.velocity_mps),
+            "power_db": packed(run_view.power_db),
+            "corners": packed(snapshots.corners),
             "radar_m": np.round(radar.poses_at(moments)[1], 4).tolist(),
         },
         "room": {
             "walls": np.round(snapshots.walls, 4).tolist(),
             "furniture": snapshots.furniture_names.tolist(),
-            "vertices": packed_floats(snapshots.furniture_vertices),
+            "vertices": packed(snapshots.furniture_vertices),
             "faces": snapshots.furniture_faces.ravel().tolist(),
             "piece": snapshots.furniture_piece.tolist(),
         },
@@ -328,8 +314,8 @@ def view_data(run_view: RunView) -> dict[str, Any]:
             "names": run_view.source_names,
             "colours": run_view.source_colours,
             "of_part": snapshots.part_person.tolist(),
-            "position_m": packed_floats(snapshots.person_position),
-            "speed_mps": packed_floats(snapshots.person_speed),
+            "position_m": packed(snapshots.person_position),
+            "speed_mps": packed(snapshots.person_speed),
         },
         "n_objects": len(snapshots.object_names),
         "meshes": _meshes(snapshots),
@@ -348,12 +334,10 @@ def view_data(run_view: RunView) -> dict[str, Any]:
 
 def _meshes(snapshots: Snapshots) -> dict[str, Any]:
     """Return the moving meshes: vertices are sums of rows that change from step to step."""
-    numbers = ("mesh_faces", "mesh_of_vertex", "mesh_part", "blend_vertex", "blend_row")
-    packed = {name: packed_integers(getattr(snapshots, name)) for name in numbers}
-    floats = {
-        name: packed_floats(getattr(snapshots, name)) for name in ("blend_weight", "mesh_rows")
-    }
-    return {"source": snapshots.mesh_source.tolist(), **packed, **floats}
+    names = ("mesh_faces", "mesh_of_vertex", "mesh_part", "mesh_rows")
+    names += ("blend_vertex", "blend_row", "blend_weight")
+    arrays = {name: packed(getattr(snapshots, name)) for name in names}
+    return {"source": snapshots.mesh_source.tolist(), **arrays}
 
 
 def _with_room(ranges: list[list[float]], snapshots: Snapshots) -> list[list[float]]:

@@ -77,8 +77,8 @@ def posed_figure(
     return {
         "parts": list(part_names),
         "times": np.round(times, 4).tolist(),
-        "poses": packed_floats(poses),
-        "vertices": packed_floats(vertices),
+        "poses": packed(poses),
+        "vertices": packed(vertices),
         "faces": faces.ravel().tolist(),
         "tx": np.round(tx, 4).tolist(),
         "rx": np.round(rx, 4).tolist(),
@@ -130,18 +130,14 @@ def _every(count: int) -> int:
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
     every = _every(len(points))
     arrays = {"points": points, **values}
-    packed = {name: packed_floats(array[::every]) for name, array in arrays.items()}
-    return {"count": len(points), "shown": len(points[::every]), **packed}
+    found = {name: packed(array[::every]) for name, array in arrays.items()}
+    return {"count": len(points), "shown": len(points[::every]), **found}
 
 
-def packed_floats(array: NDArray[np.floating]) -> str:
-    """Base64 of little-endian float32, last axis fastest."""
-    return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
-
-
-def packed_integers(array: NDArray[np.integer]) -> str:
-    """Base64 of little-endian int32, last axis fastest."""
-    return base64.b64encode(np.ascontiguousarray(array, dtype="<i4").tobytes()).decode()
+def packed(array: NDArray[np.floating] | NDArray[np.integer]) -> str:
+    """Base64 of little-endian float32, or int32 of whole numbers, last axis fastest."""
+    kind = "<f4" if array.dtype.kind == "f" else "<i4"
+    return base64.b64encode(np.ascontiguousarray(array, dtype=kind).tobytes()).decode()
 
 
 def _ranges(body: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
