@@ -15,15 +15,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
-from rtradar.bench.plan import Case
 from rtradar.system.files import temporary_folder
 from rtradar.validate import validation_folder
 
 MOTION = "synthetic:walk"
+
+CHEAPEST = "analytic"
+"""Model with which all others are compared."""
 
 OTHER_PRODUCTS = ("spectrogram", "angle", "sources")
 """Stages of a run that the range-Doppler-time cloud does not need."""
@@ -40,6 +42,14 @@ IF_STAGE = "echoes and IF"
 """Stage of the paper's method that compares with our ``scatter`` and ``signal``."""
 
 _QUICK_CYCLES = 12
+
+
+class Case(NamedTuple):
+    """One whole run: options of the command line, and the length of the capture [s]."""
+
+    radar: str
+    fidelity: str
+    duration_s: float
 
 
 class RunError(RuntimeError):

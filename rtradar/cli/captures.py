@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> Mapping[str, Any]:
 
 def _choose_as_paper(options: argparse.Namespace) -> None:
     """Set the paper's choices and warn of its faults; InputError where another choice is given."""
-    from rtradar.paper.choices import AS_PAPER, paper_warnings
+    from rtradar.paper.items import AS_PAPER, paper_warnings
     from rtradar.settings import RunSettings
 
     defaults = RunSettings()

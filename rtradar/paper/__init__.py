@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from rtradar.paper.choices import AS_PAPER, paper_warnings
-from rtradar.paper.items import Item
+from rtradar.paper.items import AS_PAPER, Item, paper_warnings
 from rtradar.paper.make import make_paper
 
 __all__ = ["AS_PAPER", "Item", "make_paper", "paper_warnings"]

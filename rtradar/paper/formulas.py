@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.paper.choices import PAPER_OS_SCALE
+from rtradar.paper.items import PAPER_OS_SCALE
 from rtradar.paper.sources import Sources
 from rtradar.process.window_functions import hann
 from rtradar.radar import Radar

@@ -1,4 +1,4 @@
-"""The items of the paper in its order: what it shows, what we show, the difference and why.
+"""The items of the paper in its order, and its own choices of a run with a warning for each fault.
 
 The texts are in ``items.toml``. Figures in braces, such as ``{v_max:.2f}``, are filled in with what
 the parts of `rtradar.paper` have measured, so that no figure of ours is typed.
@@ -13,8 +13,31 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from rtradar.settings import RunOptions
+
 TEXTS = ("paper", "ours", "difference", "reason")
 """Texts of an item, in the order of the page."""
+
+
+PAPER_OS_SCALE = 5.0003
+"""OS-CFAR multiplier of the paper's program, where its search ends for any number of cells."""
+
+AS_PAPER: RunOptions = {
+    "fidelity": "analytic-paper",
+    "spreading": False,
+    "snr_db": 20.0,
+    "detector": "os-cfar",
+    "detector_options": {"guard": 2, "train": 4, "quantile": 0.75, "scale": PAPER_OS_SCALE},
+    "range_window": "hann",
+    "doppler_window": "hann",
+}
+"""Options of `rtradar.run` that the paper chose; `paper_warnings` says which are faults."""
+
+SIZES = ("500", "1000", "2000", "3000")
+"""Points of a cloud, the columns of table 4."""
+
+CURVES = ("train_loss", "train_accuracy", "test_loss", "test_accuracy")
+"""What is kept of each epoch of a training."""
 
 
 @dataclass(frozen=True)
@@ -83,3 +106,20 @@ def load_items() -> tuple[Item, ...]:
         Items in the order of the paper.
     """
     return tuple(Item(**entry) for entry in contents()["items"])
+
+
+def paper_warnings() -> tuple[str, ...]:
+    """Say what is wrong with the choices of `AS_PAPER`, and which faults are not repeated.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each.
+
+    Examples
+    --------
+    >>> from rtradar.paper import paper_warnings
+    >>> len(paper_warnings())
+    5
+    """
+    return tuple(contents()["warnings"])

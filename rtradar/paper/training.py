@@ -16,7 +16,7 @@ from rtradar.classify.recipes import LEAN, PAPER, Precision
 from rtradar.classify.study import Study, train_study
 from rtradar.classify.training import pick_device, pick_precision
 from rtradar.clouds.collection import Collection
-from rtradar.paper.choices import CURVES, SIZES
+from rtradar.paper.items import CURVES, SIZES
 from rtradar.system.seeds import stream
 from rtradar.validate.claims import validation_folder
 

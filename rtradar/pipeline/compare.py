@@ -30,9 +30,8 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit, thinned
 from rtradar.report.figures.fitting import above_floor
-from rtradar.report.figures.maps import thinned
 from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget

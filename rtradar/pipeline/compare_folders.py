@@ -24,9 +24,8 @@ from rtradar.pipeline.compare import (
 from rtradar.pipeline.output.view import run_maps, run_points, run_summary
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit, thinned
 from rtradar.report.figures.fitting import above_floor
-from rtradar.report.figures.maps import thinned
 from rtradar.report.pages import comparison
 from rtradar.system.checks import printable
 from rtradar.system.output_folder import atomic_folder, check_whole

@@ -12,8 +12,16 @@ import pytest
 import rtradar.bench
 from rtradar.bench import runs
 from rtradar.bench.floors import Rates
-from rtradar.bench.plan import Case
-from rtradar.bench.runs import Run, RunError, Runner, by_stage, paired_ratio, spread, to_cloud_s
+from rtradar.bench.runs import (
+    Case,
+    Run,
+    RunError,
+    Runner,
+    by_stage,
+    paired_ratio,
+    spread,
+    to_cloud_s,
+)
 from rtradar.cli import main
 
 pytestmark = pytest.mark.drawn

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench.plan import Plan, model_cases, plan_of
+from rtradar.bench import Plan, model_cases, plan_of
 from rtradar.cli import main
 
 

@@ -22,8 +22,7 @@ import numpy as np
 import scipy.fft
 from tqdm import tqdm
 
-from rtradar.bench.plan import Case
-from rtradar.bench.runs import Runner
+from rtradar.bench.runs import Case, Runner
 from rtradar.radar import Radar
 
 CASES = {

@@ -19,8 +19,7 @@ from rtradar.pipeline.output.map_store import read_maps
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import FieldUnit, field_unit
-from rtradar.report.figures.maps import thinned
+from rtradar.report.figures.canvas import FieldUnit, field_unit, thinned
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import DAMAGE, Snapshots, load_snapshots, refused
 from rtradar.system.checks import printable

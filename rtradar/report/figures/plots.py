@@ -20,8 +20,12 @@ from rtradar.report.figures.canvas import (
     VELOCITY_LABEL,
     FieldUnit,
     add_colour_bar,
+    angle_label,
+    angle_view,
     draw_view,
     field_unit,
+    rdt_points,
+    thinned,
 )
 from rtradar.report.figures.fitting import (
     HANDFUL,
@@ -30,7 +34,6 @@ from rtradar.report.figures.fitting import (
     masking_note,
     place_limits,
 )
-from rtradar.report.figures.maps import angle_label, angle_view, rdt_points, thinned
 from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of
 

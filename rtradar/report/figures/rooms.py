@@ -21,12 +21,13 @@ from rtradar.radar import Radar
 from rtradar.report.figures.canvas import (
     VELOCITY_LABEL,
     add_colour_bar,
+    angle_label,
+    angle_view,
     draw_levels,
     draw_view,
     field_unit,
 )
 from rtradar.report.figures.fitting import fitted_limits, masking_note
-from rtradar.report.figures.maps import angle_label, angle_view
 from rtradar.scene import Furniture, Scene
 from rtradar.scene.plan import (
     draw_plan,

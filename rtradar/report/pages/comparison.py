@@ -9,9 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures.canvas import FieldUnit, add_colour_bar, colour_limits, draw_levels
+from rtradar.report.figures.canvas import (
+    FieldUnit,
+    add_colour_bar,
+    colour_limits,
+    draw_levels,
+    rdt_points,
+)
 from rtradar.report.figures.fitting import fitted_limits
-from rtradar.report.figures.maps import rdt_points
 from rtradar.report.pages.html import write_page
 from rtradar.report.view.run_view import RunView
 from rtradar.report.view.three_d import posed_figure

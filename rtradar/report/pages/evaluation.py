@@ -183,7 +183,10 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     if any(one.trained_on for one in outcomes):
         values, *tables = scores.transfer(outcomes)
         # JSON lacks NaN.
-        mean, spread = (np.where(np.isnan(each), None, each).tolist() for each in tables)
+        mean, spread = (
+            [[None if np.isnan(value) else value for value in row] for row in each.tolist()]
+            for each in tables
+        )
         content["transfer"] = {"values": values, "mean": mean, "spread": spread}
     return content
 

@@ -334,8 +334,8 @@ def view_data(run_view: RunView) -> dict[str, Any]:
 
 def _meshes(snapshots: Snapshots) -> dict[str, Any]:
     """Return the moving meshes: vertices are sums of rows that change from step to step."""
-    names = ("mesh_faces", "mesh_of_vertex", "mesh_part", "mesh_rows")
-    names += ("blend_vertex", "blend_row", "blend_weight")
+    names = ["mesh_faces", "mesh_of_vertex", "mesh_part", "mesh_rows"]
+    names += ["blend_vertex", "blend_row", "blend_weight"]
     arrays = {name: packed(getattr(snapshots, name)) for name in names}
     return {"source": snapshots.mesh_source.tolist(), **arrays}
 
