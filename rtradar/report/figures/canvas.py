@@ -1,4 +1,4 @@
-"""Units of power in all pictures, in place of the square metres of the maps, their canvases, and maps.
+"""Units of power in all pictures, in place of square metres, their canvases, and what maps share.
 
 Maps hold abs(amplitude)^2 [m^2] including the spreading loss 1 / (R1^2 R2^2)
 (`rtradar.conventions`). Read as a cross-section, a person of 1 m^2 at 4 m would be 24 dB too low.

@@ -19,6 +19,7 @@ from rtradar.system.checks import printable
 from rtradar.system.figure_style import LIGHT, WIDTH_IN, dress, new_figure, save_figure
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles
+from rtradar.system.templates import templates
 
 Group = tuple[str, Sequence[Outcome]]
 
@@ -105,20 +106,10 @@ def scores_of(answers: Answers) -> dict[str, Any]:
 
 def score_table(judged: Sequence[tuple[str, Answers]]) -> str:
     """Format balanced accuracies [%] of clouds and of recordings."""
+    template = templates(Path(__file__).parent, escaped=False).get_template("scores.txt")
     width = max(len("balanced, in %"), *(len(title) for title, _ in judged))
-    heads = ("clouds", "recordings", "95 % over people", "calibration error")
-    lines = [f"{'balanced, in %':<{width}}" + "".join(f"  {head:>17}" for head in heads)]
-    for title, answers in judged:
-        found = scores_of(answers)
-        low, high = found["interval"]
-        cells = (
-            f"{100 * found['balanced']:.1f}",
-            f"{100 * found['balanced_by_recording']:.1f}",
-            f"{100 * low:.1f} to {100 * high:.1f}",
-            f"{100 * found['calibration_error']:.1f}",
-        )
-        lines.append(f"{title:<{width}}" + "".join(f"  {cell:>17}" for cell in cells))
-    return "\n".join(lines)
+    found = [(title, scores_of(answers)) for title, answers in judged]
+    return template.render(width=width, judged=found).rstrip()
 
 
 def _accuracies(outcomes: Sequence[Outcome]) -> list[float]:
