@@ -187,18 +187,8 @@ def test_overwrite_replaces_what_the_run_makes_and_leaves_the_rest(
 def test_compare_and_its_runs_replace_their_own_and_refuse_the_users(
     tmp_path: Path, small_file: Path, run_into: Runner
 ) -> None:
-    words = [
-        "compare",
-        "synthetic:walk",
-        "--duration",
-        "0.2",
-        "--fidelities",
-        "analytic,analytic-paper",
-        "--radar",
-        str(small_file),
-        "--out",
-        str(tmp_path),
-    ]
+    words = ["compare", "synthetic:walk", "--duration", "0.1", "--radar", str(small_file)]
+    words += ["--fidelities", "analytic,analytic-paper", "--out", str(tmp_path)]
     (tmp_path / "analytic").mkdir()
     (tmp_path / "analytic" / "notes.txt").write_text("mine")
     assert main(words) == 0

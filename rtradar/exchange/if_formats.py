@@ -25,6 +25,7 @@ from rtradar.exchange.recording import (
     SampleFile,
     check_store,
     in_short,
+    new_store,
     radar_of,
 )
 from rtradar.signal.real_samples import complex_of_real
@@ -243,21 +244,12 @@ def open_npy(path: Path) -> SampleFile:
 
 def write_zarr(path: Path, recording: IfRecording) -> dict[str, Any]:
     """Write a Zarr array (chirp, rx, sample) complex64, with the radar as an attribute."""
-    import zarr  # slow to import
-
     shape = recording.shape
     if os.path.lexists(path):
         raise InputError(f"'{path}' is there; remove it, or give another name (--out)")
     with new_folder(path) as folder:
-        array = zarr.create_array(
-            folder,
-            shape=shape,
-            chunks=(min(recording.together, shape[0]), *shape[1:]),
-            dtype="complex64",
-            dimension_names=ROW_AXES,
-            attributes={"units": IF_UNIT, "radar": recording.radar_text},
-            config={"write_empty_chunks": True},  # a chunk that is not there was lost
-        )
+        together = min(recording.together, shape[0])
+        array = new_store(folder, shape, together, {"radar": recording.radar_text})
         for first, block in recording.blocks("writing"):
             rows = block.reshape(-1, *shape[1:])
             begin = first * block.shape[1]

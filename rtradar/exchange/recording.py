@@ -9,7 +9,7 @@ import os
 import stat
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -246,6 +246,21 @@ def open_recording(folder: Path) -> IfRecording:
         return np.asarray(stored[first:last])
 
     return IfRecording(folder, radar, (whole, *expected), read, together=stored.chunks[0])
+
+
+def new_store(path: Path, shape: tuple[int, ...], rows: int, attributes: Mapping[str, Any]) -> Any:
+    """Make a Zarr array (chirp, rx, sample) of samples, in chunks of so many rows."""
+    import zarr  # slow to import
+
+    return zarr.create_array(
+        path,
+        shape=shape,
+        chunks=(rows, *shape[1:]),
+        dtype="complex64",
+        dimension_names=ROW_AXES,
+        attributes={"units": IF_UNIT, **attributes},
+        config={"write_empty_chunks": True},  # a chunk that is not there was lost
+    )
 
 
 def check_store(store: Path) -> Any:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager, suppress
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Literal, TextIO
 
 from rtradar.errors import InputError
 
@@ -187,10 +187,10 @@ def read_arrays(
             name = entry.filename.removesuffix(".npy")
             if name != entry.filename and (names is None or name in names):
                 with archive.open(entry) as member:
-                    _read_header(member, entry.file_size)
-                    member.seek(0)
-                    found[name] = np.lib.format.read_array(member, allow_pickle=False)
-                    _check_text(found[name])
+                    shape, order, kind = _read_header(member, entry.file_size)
+                    data = bytearray(member.read())  # so that the array may be changed
+                found[name] = np.ndarray(shape, kind, data, order=order)
+                _check_text(found[name])
     return found
 
 
@@ -199,7 +199,8 @@ def array_header(
 ) -> tuple[tuple[int, ...], np.dtype[Any]]:
     """Read shape and type of an array of a NumPy archive; errors as of `read_arrays`."""
     with _archive(path, most_bytes, comment) as archive, archive.open(f"{name}.npy") as member:
-        return _read_header(member, archive.getinfo(f"{name}.npy").file_size)
+        shape, _, kind = _read_header(member, archive.getinfo(f"{name}.npy").file_size)
+        return shape, kind
 
 
 @contextmanager
@@ -219,16 +220,20 @@ def _archive(path: Path, most_bytes: int, comment: int | None) -> Iterator[zipfi
             raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
 
 
-def _read_header(member: Any, size: int) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read shape and type of an array, which NumPy allocates; ValueError if its file has less."""
+def _read_header(
+    member: Any, size: int
+) -> tuple[tuple[int, ...], Literal["C", "F"], np.dtype[Any]]:
+    """Read shape, order and type of an array; ValueError if its file of that size has less."""
     import numpy as np
 
     of_old = np.lib.format.read_magic(member) == (1, 0)
     read = np.lib.format.read_array_header_1_0 if of_old else np.lib.format.read_array_header_2_0
-    shape, _, kind = read(member)
+    shape, fortran, kind = read(member)
     if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
         raise ValueError("it claims more than it holds")
-    return shape, kind
+    if kind.hasobject:
+        raise ValueError("it holds Python objects")
+    return shape, "F" if fortran else "C", kind
 
 
 def _check_text(array: NDArray[Any]) -> None:

@@ -331,32 +331,24 @@ def test_a_folder_that_becomes_a_link_is_not_followed(
 
 
 @POSIX
-def test_an_output_folder_that_is_renamed_meanwhile_is_told(tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    (tmp_path / "decoy").mkdir()
-
-    def rename() -> None:
-        out.rename(tmp_path / "moved")
-        (tmp_path / "decoy").rename(out)
+@pytest.mark.parametrize("left", [["moved", "out"], []])
+def test_an_output_folder_that_is_renamed_or_vanishes_is_told(
+    tmp_path: Path, left: list[str]
+) -> None:
+    def disturbed(out: Path) -> None:
+        with atomic_folder(out, KIND) as folder:
+            if left:
+                (tmp_path / "decoy").mkdir()
+                out.rename(tmp_path / "moved")
+                (tmp_path / "decoy").rename(out)
+            else:
+                shutil.rmtree(out)
+            fill(folder, "first")
 
     with pytest.raises(InputError, match="was renamed, moved or removed while"):
-        disturbed(out, rename)
-    assert sorted(path.name for path in tmp_path.rglob("*")) == [
-        "moved",
-        "out",
-    ]  # no work folder is left in it
-
-
-def test_an_output_folder_that_vanishes_is_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="was renamed, moved or removed while"):
-        disturbed(tmp_path / "out", lambda: shutil.rmtree(tmp_path / "out"))
-    assert not list(tmp_path.iterdir())
-
-
-def disturbed(out: Path, disturb: Callable[[], object]) -> None:
-    with atomic_folder(out, KIND) as folder:
-        disturb()
-        fill(folder, "first")
+        disturbed(tmp_path / "out")
+    # No work folder is left in it.
+    assert sorted(path.name for path in tmp_path.rglob("*")) == left
 
 
 # -- disks and permissions -------------------------------------------------------------------------
@@ -403,16 +395,12 @@ def test_folders_that_were_made_go_again_and_others_stay(tmp_path: Path) -> None
     assert [path.name for path in tmp_path.rglob("*")] == ["there"]
 
 
-def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "says"), [("file/out", "file"), ("x" * 300, "too long")])
+def test_a_place_where_no_folder_can_be_is_refused(tmp_path: Path, name: str, says: str) -> None:
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(InputError, match=r"cannot write to .*file.*--out"):
-        make(tmp_path / "file" / "out", "first")
+    with pytest.raises(InputError, match=rf"cannot write to .*{says}.*--out"):
+        make(tmp_path / name, "first")
     assert contents(tmp_path) == {"file": "mine"}
-
-
-def test_a_name_that_cannot_be_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"cannot write to .*too long.*--out"):
-        make(tmp_path / ("x" * 300), "first")
 
 
 @pytest.mark.skipif(

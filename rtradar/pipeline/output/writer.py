@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
+from rtradar.exchange.recording import new_store
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import MapStore
@@ -211,19 +212,9 @@ class ReceivedFrame:
 
 def if_array(path: Path, capture: Capture) -> Any:
     """Make a new Zarr array (chirp, rx, sample) for all IF samples, described by attributes."""
-    import zarr
-
     radar = capture.radar
     together = chirps_together(radar)
-    shape = (radar.n_rx, radar.samples_per_chirp)
-    array = zarr.create_array(
-        path,
-        shape=(capture.n_chirps // together, *shape),
-        chunks=(block_chirps(radar) // together, *shape),
-        dtype="complex64",
-        dimension_names=("chirp", "rx", "sample"),
-        config={"write_empty_chunks": True},  # a chunk that is not there was lost
-    )
+    shape = (capture.n_chirps // together, radar.n_rx, radar.samples_per_chirp)
     described = ("multiplexing", "chirp_duration_s", "sample_rate_hz")
-    array.attrs.update({"units": "m"} | {name: getattr(radar, name) for name in described})
-    return array
+    attributes = {name: getattr(radar, name) for name in described}
+    return new_store(path, shape, block_chirps(radar) // together, attributes)

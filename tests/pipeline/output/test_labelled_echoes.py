@@ -47,30 +47,22 @@ def test_they_are_those_that_make_the_samples() -> None:
     assert np.abs(found - expected).max() < 2e-5 * np.abs(expected).max()
 
 
-def test_in_a_room_the_walls_name_the_paths() -> None:
-    scene = rt.Scene.load("living-room")
-    capture = rt.simulate(KICK, RADAR, scene, duration_s=0.2, keep_all=True, fidelity="specular")
+def test_in_a_room_the_walls_name_the_paths(beside_a_wall: tuple[rt.Radar, rt.Scene]) -> None:
+    capture = rt.simulate(KICK, *beside_a_wall, duration_s=0.2, keep_all=True, fidelity="specular")
     echoes = capture.echoes(duration_s=0.001)
-    names = set(echoes["path"].values.tolist())
-    assert "body" in names
-    assert {"floor > body", "body > floor"} <= names
-    # A way over the floor is longer than the direct one of the same part.
+    assert {"body", "left > body", "body > left"} <= set(echoes["path"].values.tolist())
+    # A way over the wall is longer than the direct one of the same part.
     part = echoes["part"].values[0]
     own = echoes.isel(chirp=0, rx=0, echo=echoes["part"].values == part)
     by_path = dict(zip(own["path"].values.tolist(), own["length_m"].values.tolist(), strict=False))
-    assert by_path["floor > body"] > by_path["body"]
+    assert by_path["left > body"] > by_path["body"]
 
 
-def test_a_time_without_chirps_is_refused_in_one_line() -> None:
+def test_no_chirp_and_too_many_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     capture = rt.simulate(KICK, RADAR, duration_s=0.2, fidelity="analytic")
-    with pytest.raises(InputError, match=r"no chirp is between start_s = 3\.0") as caught:
+    with pytest.raises(InputError, match=r"^[^\n]*no chirp is between start_s = 3\.0[^\n]*$"):
         capture.echoes(start_s=3.0)
-    assert "\n" not in str(caught.value)
-
-
-def test_too_many_are_refused_before_they_are_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtradar.pipeline.memory.MEMORY_LIMIT_BYTES", 1_000_000)
-    capture = rt.simulate(KICK, RADAR, duration_s=0.2, fidelity="analytic")
     with pytest.raises(InputError, match=r"take them for a shorter time \(start_s, duration_s\)"):
         capture.echoes()
 
