@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.clouds.arrays import ARRAYS, KINDS
 from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output.writer import axes_of
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
@@ -134,21 +135,10 @@ class MapKeeper:
         if not self._keep:
             return {}
         maps = {name: np.concatenate(self._steps.pop(name)) for name in list(self._steps)}
-        return maps | _axes(self._processing, maps)
+        needed = {axis for name in maps for axis in ARRAYS[name].dims}
+        axes = axes_of(self._processing)
+        return maps | {name: values for name, values in axes.items() if name in needed}
 
     def finish(self) -> Clouds:
         """Return the clouds of all frames so far."""
         return (self._clouds if self._makes_clouds else CloudMaker(self._processing)).finish()
-
-
-def _axes(processing: Processing, maps: Mapping[str, object]) -> dict[str, NDArray[np.float64]]:
-    """Return the axes beside time that these maps have."""
-    radar = processing.radar
-    known = {
-        "range": radar.range_m,
-        "velocity": radar.velocity_mps(radar.cycles_per_frame),
-        "spectrogram_velocity": radar.velocity_mps(processing.window_cycles),
-        "azimuth": angle_grid(radar) if measured_angles(radar) else np.zeros(0),
-    }
-    needed = {axis for name in maps for axis in ARRAYS[name].dims}
-    return {name: values for name, values in known.items() if name in needed}

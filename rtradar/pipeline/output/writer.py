@@ -65,6 +65,17 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
     )
 
 
+def axes_of(processing: Processing) -> dict[str, NDArray[np.float64]]:
+    """Return the axes of maps beside those of time; angles that are not measured have none."""
+    radar = processing.radar
+    axes = {
+        "range": radar.range_m,
+        "velocity": radar.velocity_mps(radar.cycles_per_frame),
+        "spectrogram_velocity": radar.velocity_mps(processing.window_cycles),
+    }
+    return axes | {name: angle_grid(radar) for name in measured_angles(radar)}
+
+
 class RunWriter:
     """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
@@ -90,11 +101,6 @@ class RunWriter:
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.max_chirps = self._clouds.max_chirps
         self._angle_names = measured_angles(radar)
-        axes = {
-            "range": radar.range_m,
-            "velocity": radar.velocity_mps(radar.cycles_per_frame),
-            "spectrogram_velocity": radar.velocity_mps(processing.window_cycles),
-        } | {name: angle_grid(radar) for name in self._angle_names}
         removed = {
             "time": removal.description(radar.cycles_per_frame),
             "slow_time": removal.description(self._range_time.window_cycles),
@@ -106,7 +112,9 @@ class RunWriter:
         left_out = ("source",) if table is None else ()
         said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
         parts = None if table is None else parts_of(table.capture)
-        self._store = MapStore(file, axes, said, removed, left_out, processing.unit, parts)
+        self._store = MapStore(
+            file, axes_of(processing), said, removed, left_out, processing.unit, parts
+        )
 
     def __enter__(self) -> RunWriter:
         return self
