@@ -171,13 +171,19 @@ def read_sample(path: Path, name: str) -> Any:
     damaged or larger than 200 MB.
     """
     try:
-        array = read_arrays(path, _MAX_BYTES, [name], _DIGEST)[name]
-        _check(name, array.shape, array.dtype)
-        if name == "about":
-            return _parse_about(array)
-        return array.astype(array.dtype.newbyteorder("="), copy=False)
+        size = path.stat().st_size
+        if size <= _MAX_BYTES:
+            array = read_arrays(path, _MAX_BYTES, [name], _DIGEST)[name]
+            _check(name, array.shape, array.dtype)
+            if name == "about":
+                return _parse_about(array)
+            return array.astype(array.dtype.newbyteorder("="), copy=False)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise damaged(path) from None
+    raise InputError(
+        f"sample '{path}' has {size / 1e6:.0f} MB; {_MAX_BYTES / 1e6:.0f} MB are allowed: "
+        "it is none of rtradar's"
+    )
 
 
 def read_shape(path: Path, name: str) -> tuple[int, ...]:

@@ -227,9 +227,7 @@ def open_recording(folder: Path) -> IfRecording:
     try:
         stored = check_store(folder / "if.zarr")
     except DAMAGE as error:
-        raise InputError(
-            f"'{folder / 'if.zarr'}' cannot be read ({in_short(error)}); run it again"
-        ) from None
+        raise unreadable(folder / "if.zarr", "IF samples", error) from None
     shape, kind = stored.shape, np.dtype(stored.dtype)
     expected = (radar.n_rx, radar.samples_per_chirp)
     least = rows_in_cycle(radar)

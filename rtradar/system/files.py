@@ -174,8 +174,8 @@ def read_arrays(
 ) -> dict[str, NDArray[Any]]:
     """Read the arrays of a NumPy archive that may be anybody's; none of Python objects.
 
-    Without ``names`` all are read. ``comment`` is the length of the archive's comment, where that
-    is known: what is cut off there nobody else sees. Raises OSError if it cannot be read, and
+    Without ``names`` all are read. ``comment`` is the length of the comment of an archive that is
+    not compressed: what is cut off there nobody else sees. Raises OSError if it cannot be read, and
     ValueError if it is no such archive, is damaged, claims more than it holds, or is larger than
     ``most_bytes`` when unpacked.
     """
@@ -208,6 +208,8 @@ def _archive(path: Path, most_bytes: int, comment: int | None) -> Iterator[zipfi
     """Open an archive; OSError, or ValueError if it is none, is damaged or larger than that."""
     with open_regular(path) as file:
         try:
+            if comment is not None:
+                most_bytes = min(most_bytes, os.fstat(file.fileno()).st_size)
             with zipfile.ZipFile(file) as archive:
                 if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
                     raise ValueError(f"it claims more than {most_bytes / 1e6:g} MB")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import trimesh
 
 from rtradar.clouds import save_cloud_npz, save_ply
 from rtradar.errors import InputError
@@ -26,21 +25,6 @@ def test_npz_of_the_same_cloud_is_the_same_file(tmp_path) -> None:
     for name in ("a.npz", "b.npz"):
         save_cloud_npz(tmp_path / name, POINTS)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-
-
-def test_ply_reads_back(tmp_path) -> None:
-    path = tmp_path / "cloud.ply"
-    save_ply(path, POINTS)
-    np.testing.assert_array_equal(trimesh.load(path).vertices, POINTS)
-    assert b"x = time [s], y = range [m], z = velocity [m/s]" in path.read_bytes()
-
-
-def test_ply_of_nothing_is_a_header(tmp_path) -> None:
-    path = tmp_path / "cloud.ply"
-    save_ply(path, np.zeros((0, 3)))
-    text = path.read_bytes()
-    assert b"element vertex 0\n" in text
-    assert text.endswith(b"end_header\n")
 
 
 def test_failure_leaves_the_old_file_and_nothing_else(tmp_path) -> None:

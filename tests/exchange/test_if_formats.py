@@ -297,7 +297,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(
     with pytest.raises(InputError, match="the radar of its summary gives"):
         export(folder, tmp_path / "cube.mat")
     (folder / "if.zarr" / "zarr.json").write_text("{")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="cannot read IF samples"):
         export(folder, tmp_path / "cube.mat")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "walk"]
 
