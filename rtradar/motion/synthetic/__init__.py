@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from functools import partial, wraps
+from contextlib import suppress
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -17,8 +17,6 @@ from rtradar.motion.synthetic.balance import stand
 from rtradar.motion.synthetic.daily import bend, fall, sit, squat, wave
 from rtradar.motion.synthetic.figure import (
     STYLES,
-    Array,
-    Pose,
     PosesAt,
     Subject,
     draw_subject,
@@ -30,19 +28,10 @@ from rtradar.motion.synthetic.gait import walk, walk_in_place
 from rtradar.motion.synthetic.jacks import jump, jumping_jack
 from rtradar.motion.synthetic.strikes import boxing, kick, punch
 from rtradar.recordings import SYNTHETIC, Source
-from rtradar.system.checks import is_whole
+from rtradar.system.checks import brief, check_number, is_whole
 from rtradar.system.registries import check_activity
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
-
-
-def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subject], PosesAt]:
-    @wraps(poses)
-    def moving(_: float, subject: Subject) -> PosesAt:
-        return partial(poses, subject)
-
-    return moving
-
 
 ACTORS = 3
 """Version of the actors, raised whenever one of them moves otherwise than before."""
@@ -52,7 +41,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "kick": kick,
     "punch": punch,
     "jumping_jack": jumping_jack,
-    "stand": _repeating(stand),
+    "stand": stand,
     "sit": sit,
     "bend": bend,
     "squat": squat,
@@ -80,7 +69,7 @@ class Traits(TypedDict, total=False):
 
 
 _RANGES = {
-    "duration_s": (3.0, 0.0, 3600.0),
+    "duration_s": (3.0, 1e-6, 3600.0),
     "height_m": (1.75, 0.8, 2.5),
     "build": (1.0, 0.4, 2.5),
     "tempo": (1.0, 0.4, 2.0),
@@ -177,40 +166,31 @@ def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:
             raise TypeError(f"synthetic_motion() got an unexpected keyword argument {name!r}")
     for text in texts:
         name, _, value = text.partition("=")
-        allowed = [known for known in chosen if known not in ("duration_s", "rate_hz")]
-        if name not in allowed or not value:
+        names = [known for known in chosen if known not in ("duration_s", "rate_hz")]
+        if name not in names or not value:
             raise InputError(
-                f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(allowed)}"
+                f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(names)}"
             )
-        chosen[name] = value if name in ("side", "style") else _number(asked, name, value)
+        chosen[name] = _parsed(value)
     chosen |= traits
-    if chosen["side"] not in ("left", "right"):
-        raise InputError(f"side {chosen['side']!r}; allowed are left and right")
-    styles = STYLES.get(activity, ())
-    if chosen["style"] and chosen["style"] not in styles:
-        raise InputError(
-            f"style {chosen['style']!r} of {activity}; allowed are {', '.join(styles) or 'none'}"
-        )
-    take = chosen["take"]
-    if not is_whole(take) or take < 0:
-        raise InputError(f"take {take!r}; it must be a whole number, zero or more")
-    for name, (_, low, high) in _RANGES.items():
-        value = chosen[name]
-        if not (math.isfinite(value) and low <= value <= high) or value == 0:
+    for name, allowed in (("side", ("left", "right")), ("style", STYLES.get(activity, ()))):
+        if chosen[name] not in allowed and (name, chosen[name]) != ("style", ""):
             raise InputError(
-                f"synthetic {activity}: {name} = {value}; allowed is "
-                f"{low:g}{'' if low else ', excluded,'} to {high:g}"
+                f"{name} {brief(chosen[name])} of {activity}; allowed are "
+                f"{', '.join(allowed) or 'none'}"
             )
+    if not is_whole(chosen["take"]) or chosen["take"] < 0:
+        raise InputError(f"take {chosen['take']!r}; it must be a whole number, zero or more")
+    for name, (_, low, high) in _RANGES.items():
+        check_number(f"synthetic {activity}", name, chosen[name], low, high)
     return activity, chosen
 
 
-def _number(asked: str, name: str, value: str) -> float:
-    try:
-        return int(value) if name == "take" else float(value)
-    except ValueError:
-        raise InputError(
-            f"{asked!r}: {name} = {value!r} is no number; allowed are numbers"
-        ) from None
+def _parsed(value: str) -> float | str:
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(value)
+    return value
 
 
 def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:

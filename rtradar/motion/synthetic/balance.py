@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,7 @@ from rtradar.motion.synthetic.figure import (
     SIDES,
     Array,
     Pose,
+    PosesAt,
     Subject,
     about,
     offsets,
@@ -207,8 +209,13 @@ def sway(t: Array, phases: Array) -> Array:
     return np.asarray(np.cos(turned) @ amplitudes)
 
 
-def stand(subject: Subject, t: Array) -> Pose:
+def stand(_: float, subject: Subject) -> PosesAt:
     """Stand quietly, facing +x."""
+    return partial(quiet, subject)
+
+
+def quiet(subject: Subject, t: Array) -> Pose:
+    """Pose of somebody who stands quietly."""
     height = subject.height_m
     begun = subject.tempo * t + _LONGEST_S * subject.phase
     forward, sideways = (

@@ -18,10 +18,10 @@ import numpy as np
 from rtradar.motion.synthetic.balance import (
     AHEAD,
     over_feet,
+    quiet,
     repetitions,
     restless,
     soles,
-    stand,
     standing,
 )
 from rtradar.motion.synthetic.figure import (
@@ -194,7 +194,7 @@ def wave(duration_s: float, subject: Subject) -> PosesAt:
     rate, swing = 2 * math.pi * own.rate * subject.tempo, own.swing * subject.amplitude
 
     def poses(t: Array) -> Pose:
-        body = stand(subject, t)
+        body = quiet(subject, t)
         up = done(t)
         arms = dict(body.arms)
         for side, sign in SIDES.items():

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -93,32 +94,6 @@ class Track:
         return keyed(t, self._times[first:last], self._values[first:last]).T
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bearing:
-    """How a fighter stands and never quite rests; each subject has its own.
-
-    ``lead`` is the side of the foot in front. Its foot is ``stagger`` ahead and ``spread`` aside of
-    the other, hips and shoulders are turned away by ``bladed`` [rad], the root is lower by
-    ``depth`` and the trunk leans forward by ``lean`` [rad]. The heel behind is raised by ``heel``
-    [rad]. ``guard`` is the place of the wrists from the shoulders, forward, inward and up. The body
-    bounces by ``bounce`` at ``pulse_hz`` and sways by ``sway``; hands move by ``restless``.
-    """
-
-    lead: str
-    stagger: float
-    spread: float
-    bladed: float
-    depth: float
-    lean: float
-    heel: float
-    guard: tuple[float, float, float]
-    elbow: float
-    bounce: float
-    pulse_hz: float
-    sway: float
-    restless: float
-
-
 @dataclass(kw_only=True)
 class _Foot:
     """Plans of one foot: its toe, yaw and raised heel on the floor, and the leg in the air.
@@ -148,9 +123,15 @@ class _Foot:
 
 
 class Fighter:
-    """Plans of a fighter, who begins in the stance of a bearing, facing +x."""
+    """Plans of a fighter, who begins in a stance, facing +x.
 
-    def __init__(self, subject: Subject, bearing: Bearing) -> None:
+    The ``bearing`` is a stance of ``traits.toml``; its ``lead`` is the side of the foot in front.
+    """
+
+    def __init__(self, subject: Subject, bearing: SimpleNamespace) -> None:
+        bearing.heel = max(bearing.heel, 0.0)
+        for angle in ("bladed", "lean", "heel", "elbow"):
+            setattr(bearing, angle, math.radians(getattr(bearing, angle)))
         self.subject, self.bearing, self.lead = subject, bearing, bearing.lead
         self.facing = 0.0
         """Yaw of the opponent [rad], a multiple of full turns."""
@@ -176,8 +157,8 @@ class Fighter:
 
     def guard(self, side: str) -> tuple[float, float, float]:
         """Wrist of a side from its shoulder, in arm lengths along the axes of the thorax."""
-        ahead, inward, up = self.bearing.guard
-        return ahead + 0.12 * (side == self.lead), -SIDES[side] * inward, up
+        own = self.bearing
+        return own.ahead + 0.12 * (side == self.lead), -SIDES[side] * own.inward, own.up
 
     def place(self, side: str, x: float, y: float) -> tuple[float, float, float]:
         """Toe and yaw of a foot in a stance about the point (x, y)."""
@@ -270,7 +251,7 @@ class Fighter:
 
     def poses(self, t: Array) -> Pose:
         """Poses at times (n,) [s]."""
-        own, height, hz = self.bearing, self.subject.height_m, self.bearing.pulse_hz
+        own, height, hz = self.bearing, self.subject.height_m, self.bearing.pulse
         x, y = self.root.at(t)
         x, y = x + own.sway * self._idle(t, 0, 0.5 * hz), y + own.sway * self._idle(t, 1, 0.5 * hz)
         idle = 2.5 * own.sway * np.stack([self._idle(t, k, 0.5 * hz) for k in (2, 3, 4)])

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rtradar.motion.synthetic.fighter import Bearing, Fighter
+from rtradar.motion.synthetic.fighter import Fighter
 from rtradar.motion.synthetic.figure import (
     OTHER,
     SIDES,
@@ -43,42 +43,17 @@ def _only(style: str, kinds: Mapping[str, SimpleNamespace]) -> Array:
     return np.array([float(kind == style) for kind in kinds])
 
 
-def _bearing(
-    own: SimpleNamespace, *, lead: str, stagger: float, depth: float, lean: float
-) -> Bearing:
-    return Bearing(
-        lead=lead,
-        stagger=stagger,
-        spread=own.spread,
-        bladed=math.radians(own.bladed),
-        depth=depth,
-        lean=math.radians(lean),
-        heel=math.radians(max(own.heel, 0.0)),
-        guard=(own.ahead, own.inward, own.up),
-        elbow=math.radians(own.elbow),
-        bounce=own.bounce,
-        pulse_hz=own.pulse,
-        sway=own.sway,
-        restless=own.restless,
-    )
-
-
 # -- kicks -----------------------------------------------------------------------------------------
 
 
 def kick(duration_s: float, subject: Subject) -> PosesAt:
     """Kicks of any kind, facing +x."""
     own = subject.traits("kick")
-    fighter = Fighter(
-        subject,
-        _bearing(
-            own,
-            lead=subject.other if own.behind < 0.7 else subject.side,
-            stagger=0.04 + 0.10 * own.stagger + 0.12 * own.depth**3,
-            depth=0.018 + 0.03 * own.depth + 0.15 * own.depth**3,
-            lean=own.lean,
-        ),
-    )
+    stance = subject.traits("kick_stance")
+    stance.lead = subject.other if stance.behind < 0.7 else subject.side
+    stance.stagger = 0.04 + 0.10 * stance.stagger + 0.12 * stance.depth**3
+    stance.depth = 0.018 + 0.03 * stance.depth + 0.15 * stance.depth**3
+    fighter = Fighter(subject, stance)
     own.step *= min(subject.amplitude, 1.0)
     own.height += 30 * (subject.amplitude - 1)
     own.load = -0.01 + 0.12 * own.load + 0.12 * own.load**4
@@ -252,16 +227,12 @@ def _habits(subject: Subject, *, boxing: bool) -> SimpleNamespace:
 
 def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> PosesAt:
     own = _habits(subject, boxing=boxing)
-    fighter = Fighter(
-        subject,
-        _bearing(
-            own,
-            lead=subject.other,
-            stagger=0.06 + 0.10 * own.stagger + 0.06 * own.low**2,
-            depth=0.015 + 0.05 * own.low,
-            lean=2 + 36 * own.upright**2,
-        ),
-    )
+    stance = subject.traits("boxing_stance" if boxing else "punch_stance")
+    stance.lead = subject.other
+    stance.stagger = 0.06 + 0.10 * stance.stagger + 0.06 * stance.low**2
+    stance.depth = 0.015 + 0.05 * stance.low
+    stance.lean = 2 + 36 * stance.upright**2
+    fighter = Fighter(subject, stance)
     rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
     t = -1.2 * subject.phase
     while t < duration_s + 0.5:

@@ -291,7 +291,7 @@ def test_frames_cover_the_duration() -> None:
     ],
 )
 def test_impossible_actors_are_refused(arguments: dict) -> None:
-    with pytest.raises(InputError, match=r"allowed|whole"):
+    with pytest.raises(InputError, match=r"allowed|must be"):
         synthetic_motion(**{"activity": "walk"} | arguments)
 
 
