@@ -1,4 +1,4 @@
-"""The byte order mark that editors of Windows write before a text is not part of the text."""
+"""Texts as programs write them: a byte order mark is no part of them, and line ends are mixed."""
 
 from __future__ import annotations
 
@@ -8,78 +8,41 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rtradar as rt
 from rtradar.errors import InputError
+from rtradar.motion import load_motion
 from rtradar.motion.formats.text_file import TextFile
 from rtradar.system.checks import read_toml
 from rtradar.system.files import read_json
 
-ASF = """:version 1.10
-:units
-length 0.45
-angle deg
-:root
-order TX TY TZ RX RY RZ
-axis XYZ
-position 0 0 0
-orientation 0 0 0
-:bonedata
-begin
-name thorax
-direction 0 1 0
-length 2
-axis 0 0 0 XYZ
-dof rx
-end
-:hierarchy
-begin
-root thorax
-end
-"""
-AMC = ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 0 1 0 0 0 0\nthorax 5\n2\nroot 0 1 0 0 0 10\nthorax 6\n"
 BVH = """HIERARCHY
-ROOT hips
-{
-  OFFSET 0 0 0
-  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
-  End Site
-  {
-    OFFSET 0 1 0
-  }
-}
+ROOT hips { OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+End Site { OFFSET 0 1 0 } }
 MOTION
-Frames: 2
+Frames: 1
 Frame Time: 0.1
-0 1 0 0 0 0
 0 1 0 0 0 10
 """
-MARK = codecs.BOM_UTF8.decode("latin-1")
+COMMENT = "# \u00c5ngstr\u00f6m\n".encode("latin-1")
 
 
-def motions(folder: Path, mark: str, comment: str = "") -> list[rt.Motion]:
-    for name, text in (("a.asf", ASF), ("a.amc", AMC), ("b.bvh", BVH)):
-        (folder / name).write_text(
-            mark + (f"# {comment}\n" if name != "b.bvh" else "") + text, encoding="latin-1"
-        )
-    return [
-        rt.load_motion(folder / "a.amc", skeleton=folder / "a.asf"),
-        rt.load_motion(folder / "b.bvh", unit_m=1.0),
-    ]
-
-
-def test_a_recording_is_the_same_with_it(tmp_path: Path) -> None:
-    for plain, marked in zip(
-        motions(tmp_path, ""), motions(tmp_path, MARK, "ÅngströmÀ"), strict=True
-    ):
-        assert plain.joints == marked.joints
+def test_a_recording_is_the_same_with_it(tmp_path: Path, asf_files: tuple[Path, Path]) -> None:
+    bvh = tmp_path / "b.bvh"
+    bvh.write_text(BVH)
+    plain = load_motion(*asf_files), load_motion(bvh, unit_m=1.0)
+    for path in (*asf_files, bvh):
+        comment = b"" if path == bvh else COMMENT
+        path.write_bytes(codecs.BOM_UTF8 + comment + path.read_bytes())
+    marked = load_motion(*asf_files), load_motion(bvh, unit_m=1.0)
+    for one, other in zip(plain, marked, strict=True):
+        assert one.joints == other.joints
         for field in ("offsets", "root_positions", "rotations"):
-            np.testing.assert_array_equal(getattr(plain, field), getattr(marked, field))
+            np.testing.assert_array_equal(getattr(one, field), getattr(other, field))
 
 
 def test_a_recording_in_utf_16_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.bvh").write_text(BVH, encoding="utf-16")
     with pytest.raises(InputError, match="binary data; expected BVH"):
-        rt.load_motion(tmp_path / "a.bvh")
+        load_motion(tmp_path / "a.bvh")
 
 
 def test_line_ends_may_be_mixed(tmp_path: Path) -> None:
@@ -88,7 +51,7 @@ def test_line_ends_may_be_mixed(tmp_path: Path) -> None:
 
 
 def test_toml_and_json_are_the_same_with_it(tmp_path: Path) -> None:
-    for name, text in (("a.toml", 'a = "é"\n'), ("a.json", '{"a": "é"}\n')):
+    for name, text in (("a.toml", 'a = "\u00e9"\n'), ("a.json", '{"a": "\u00e9"}\n')):
         (tmp_path / name).write_text(text, encoding="utf-8-sig")
-    assert read_toml(tmp_path / "a.toml", "some", "give another") == {"a": "é"}
-    assert read_json(tmp_path / "a.json") == {"a": "é"}
+    assert read_toml(tmp_path / "a.toml", "some", "give another") == {"a": "\u00e9"}
+    assert read_json(tmp_path / "a.json") == {"a": "\u00e9"}

@@ -11,101 +11,31 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import load_motion
 from rtradar.motion.formats.c3d import LONGEST_GAP_S, _Bounded, read_markers
-from rtradar.motion.formats.markers import CENTRES, NEEDED, SHANK_M
+from rtradar.motion.formats.markers import NEEDED
 from rtradar.motion.skeleton import NODES, to_nodes
 
 FRAMES, RATE = 90, 120.0
 
 # The set of the HDM05 recordings, in the order of their files; some of it is not needed.
 HDM05 = [
-    *("LFHD", "RFHD", "LBHD", "RBHD", "C7", "T10", "CLAV", "STRN", "RBAC"),
-    *(
-        "LSHO",
-        "LUPA",
-        "LELB",
-        "LFRM",
-        "LWRA",
-        "LWRB",
-        "LFIN",
-        "RSHO",
-        "RUPA",
-        "RELB",
-        "RFRM",
-        "RWRA",
-        "RWRB",
-        "RFIN",
-    ),
-    *("LFWT", "RFWT", "LBWT", "RBWT", "LTHI", "LKNE", "LSHN", "LANK", "LHEE", "LTOE", "LMT5"),
-    *("RTHI", "RKNE", "RSHN", "RANK", "RHEE", "RTOE", "RMT5"),
-]
-
-# A person at the origin who looks along +x, forearms forward, thumbs up [m]; the left side of what
-# is on both.
-STANDING = {
-    "FHD": (0.10, 0.07, 1.62),
-    "BHD": (-0.08, 0.05, 1.62),
-    "C7": (-0.05, 0.0, 1.45),
-    "CLAV": (0.05, 0.0, 1.45),
-    "T10": (-0.10, 0.0, 1.15),
-    "STRN": (0.10, 0.0, 1.15),
-    "SHO": (0.0, 0.2, 1.42),
-    "ELB": (0.0, 0.2, 1.12),
-    "WRA": (0.28, 0.2, 1.16),
-    "WRB": (0.28, 0.2, 1.08),
-    "FIN": (0.37, 0.2, 1.12),
-    "FWT": (0.12, 0.12, 0.95),
-    "BWT": (-0.12, 0.08, 0.95),
-    "KNE": (0.0, 0.12, 0.08 + SHANK_M),
-    "ANK": (0.0, 0.12, 0.08),
-    "TOE": (0.16, 0.12, 0.08),
-}
-
-# In the world, the directions that are forward, left and up of a segment in this pose.
-UPRIGHT = np.eye(3)
-AXES = {
-    "forearm": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-}  # thumb up, elbow behind
-
-
-def place(name: str) -> np.ndarray:
-    """A marker of the standing person."""
-    if name in STANDING:
-        return np.array(STANDING[name])
-    if name[1:] in STANDING:
-        return np.array(STANDING[name[1:]]) * [1, 1 if name[0] == "L" else -1, 1]
-    return np.array([0.0, 0.0, 1.0])
-
-
-def joint(node: str) -> np.ndarray:
-    """Where the table puts a joint of the standing person."""
-    side = {"l_": "L", "r_": "R"}.get(node[:2], "")
-    centre = CENTRES[node[2:] if side else node]
-    forward, left, up = centre.offset_m
-    axes = AXES.get(centre.segment, UPRIGHT)
-    offset = np.array([forward, -left if side == "R" else left, up]) @ axes
-    return np.mean([place(name.replace("@", side)) for name in centre.markers], axis=0) + offset
+    "LFHD", "RFHD", "LBHD", "RBHD", "C7", "T10", "CLAV", "STRN", "RBAC", "LSHO", "LUPA", "LELB",
+    "LFRM", "LWRA", "LWRB", "LFIN", "RSHO", "RUPA", "RELB", "RFRM", "RWRA", "RWRB", "RFIN", "LFWT",
+    "RFWT", "LBWT", "RBWT", "LTHI", "LKNE", "LSHN", "LANK", "LHEE", "LTOE", "LMT5", "RTHI", "RKNE",
+    "RSHN", "RANK", "RHEE", "RTOE", "RMT5",
+]  # fmt: skip
 
 
 def moved(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) as the person walks a curve and turns, (frame, n, 3)."""
     time = np.arange(FRAMES) / RATE
-    cosine, sine = np.cos(0.3 + 1.2 * time), np.sin(0.3 + 1.2 * time)
-    turn = np.zeros((FRAMES, 3, 3))
-    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = (
-        cosine,
-        -sine,
-        sine,
-        cosine,
-        1,
-    )
-    return (
-        points @ turn.transpose(0, 2, 1)
-        + np.stack([1.1 * time, 0.2 * np.sin(3 * time), 0.02 * np.cos(9 * time)], axis=1)[:, None]
-    )
+    turn = Rotation.from_euler("z", 0.3 + 1.2 * time[:, None]).as_matrix()
+    way = np.stack([1.1 * time, 0.2 * np.sin(3 * time), 0.02 * np.cos(9 * time)], axis=1)
+    return points @ turn.transpose(0, 2, 1) + way[:, None]
 
 
 def write(
@@ -132,25 +62,6 @@ def write(
     file["data"]["points"] = points
     file.write(str(path))
     return path
-
-
-@pytest.fixture
-def walk() -> np.ndarray:
-    return moved(np.array([place(name) for name in HDM05]))
-
-
-@pytest.mark.parametrize(("unit", "prefix"), [("mm", ""), ("cm", "male:"), ("m", "")])
-def test_joints_stand_where_the_table_puts_them(
-    tmp_path: Path, walk: np.ndarray, unit: str, prefix: str
-) -> None:
-    motion = load_motion(write(tmp_path / "walk.c3d", walk, unit=unit, prefix=prefix))
-    assert motion.joints == NODES
-    assert motion.rate_hz == RATE
-    known = moved(np.array([joint(node) for node in NODES]))
-    np.testing.assert_allclose(
-        motion.positions, known, atol=2e-6
-    )  # float32 in the file: 2 m are kept to 1e-7 m
-    assert to_nodes(motion) is motion
 
 
 def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -201,19 +112,43 @@ def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
     )  # type: ignore[return-value]
 
 
+def worn(markers: dict[str, np.ndarray], names: list[str]) -> np.ndarray:
+    """Places of markers, or of nodes, on both sides; what is not needed is anywhere."""
+    anywhere = np.array([0.0, 0.0, 1.0])
+    places = []
+    for name in names:
+        side, plain = (name[0], name[2:]) if name[1] == "_" else (name[0], name[1:])
+        own = markers.get(plain, anywhere) * [1, 1 if side in "lL" else -1, 1]
+        places.append(markers.get(name, own))
+    return np.array(places)
+
+
+@pytest.fixture
+def walk() -> np.ndarray:
+    return moved(worn(anatomical(1.77)[0], HDM05))
+
+
+@pytest.mark.parametrize(("unit", "prefix"), [("cm", "male:"), ("m", "")])
+def test_any_unit_and_any_prefix_are_the_same_person(
+    tmp_path: Path, walk: np.ndarray, unit: str, prefix: str
+) -> None:
+    expected = load_motion(write(tmp_path / "walk.c3d", walk))
+    motion = load_motion(write(tmp_path / "walk.c3d", walk, unit=unit, prefix=prefix))
+    assert motion.joints == NODES
+    assert motion.rate_hz == RATE
+    # float32 in the file: 2 m are kept to 1e-7 m
+    np.testing.assert_allclose(motion.positions, expected.positions, atol=2e-6)
+    assert to_nodes(motion) is motion
+
+
 @pytest.mark.parametrize("height", [1.2, 1.77, 2.05])
 def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> None:
     """Joints agree to 3 % of the height, 5.3 cm of an adult: mean offsets fit no one better."""
     markers, joints = anatomical(height)
-
-    def mirrored(places: dict[str, np.ndarray], name: str, side: str, plain: str) -> np.ndarray:
-        return places[name] if name in places else places[plain] * [1, 1 if side in "lL" else -1, 1]
-
-    worn = [name for name in HDM05 if name in NEEDED]
-    path = moved(np.array([mirrored(markers, name, name[0], name[1:]) for name in worn]))
-    motion = load_motion(write(tmp_path / "walk.c3d", path, worn))
+    needed = [name for name in HDM05 if name in NEEDED]
+    motion = load_motion(write(tmp_path / "walk.c3d", moved(worn(markers, needed)), needed))
     known = [node for node in NODES if node in joints or node[2:] in joints]
-    expected = moved(np.array([mirrored(joints, node, node[0], node[2:]) for node in known]))
+    expected = moved(worn(joints, known))
     found = motion.positions[:, [NODES.index(node) for node in known]]
     apart = np.linalg.norm(found - expected, axis=2).max(axis=0) / height
     assert dict(zip(known, apart.round(3), strict=True)) == {
@@ -237,14 +172,9 @@ def test_straight_arms_of_both_sides_mirror_each_other(tmp_path: Path, down: flo
     for name, far in {"ELB": 0.33, "WRA": 0.59, "WRB": 0.59, "FIN": 0.68}.items():
         markers[name] = shoulder + far * way
     markers["WRA"], markers["WRB"] = markers["WRA"] + [0.03, 0, 0], markers["WRB"] - [0.03, 0, 0]
-    worn = [name for name in HDM05 if name in NEEDED]
-    points = [
-        markers[n] if n in markers else markers[n[1:]] * [1, 1 if n[0] == "L" else -1, 1]
-        for n in worn
-    ]
-    motion = load_motion(
-        write(tmp_path / "straight.c3d", np.repeat([points], FRAMES, axis=0), worn)
-    )
+    needed = [name for name in HDM05 if name in NEEDED]
+    points = np.repeat([worn(markers, needed)], FRAMES, axis=0)
+    motion = load_motion(write(tmp_path / "straight.c3d", points, needed))
     left, right = (
         [j for j, node in enumerate(NODES) if node.startswith(side)] for side in ("l_", "r_")
     )
@@ -257,18 +187,10 @@ def test_straight_arms_of_both_sides_mirror_each_other(tmp_path: Path, down: flo
 def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.ndarray) -> None:
     motion = load_motion(write(tmp_path / "walk.c3d", walk))
     # He turns by 1.2 rad/s as a whole: every bone's rotation from the first frame on is that turn.
-    half = 0.6 * np.arange(FRAMES) / RATE
+    turns = Rotation.from_euler("z", 1.2 * np.arange(FRAMES)[:, None] / RATE)
     for j in range(1, len(NODES)):
-        x, y, z, w = motion.rotations[:, j].T
-        x0, y0, z0, w0 = motion.rotations[0, j]
-        turned = np.stack(
-            [
-                -w * x0 + x * w0 - y * z0 + z * y0,
-                -w * y0 + x * z0 + y * w0 - z * x0,
-                -w * z0 - x * y0 + y * x0 + z * w0,
-            ]
-        )
-        np.testing.assert_allclose(np.abs(turned), [0 * half, 0 * half, np.sin(half)], atol=1e-5)
+        found = Rotation.from_quat(motion.rotations[:, j])
+        assert (turns.inv() * found * found[0].inv()).magnitude().max() < 3e-5
 
 
 def test_a_file_that_says_y_is_up_is_turned(tmp_path: Path, walk: np.ndarray) -> None:
@@ -386,7 +308,7 @@ def test_a_file_gives_no_more_than_it_has(tmp_path: Path) -> None:
 def good(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """Bytes of a good file of few frames."""
     path = tmp_path_factory.mktemp("c3d") / "good.c3d"
-    return write(path, moved(np.array([place(name) for name in HDM05]))[:4]).read_bytes()
+    return write(path, moved(worn(anatomical(1.77)[0], HDM05))[:4]).read_bytes()
 
 
 @pytest.mark.filterwarnings("ignore::rtradar.ValidityWarning")
@@ -429,15 +351,15 @@ def test_junk_is_refused_in_one_line(
 
 def test_names_of_plug_in_gait_are_those_of_cmu(tmp_path: Path, walk: np.ndarray) -> None:
     known = load_motion(write(tmp_path / "walk.c3d", walk))
-    worn = [name.replace("FWT", "ASI").replace("BWT", "PSI") for name in HDM05]
-    found = load_motion(write(tmp_path / "walk.c3d", walk, worn))
+    names = [name.replace("FWT", "ASI").replace("BWT", "PSI") for name in HDM05]
+    found = load_motion(write(tmp_path / "walk.c3d", walk, names))
     np.testing.assert_array_equal(found.positions, known.positions)
     # One marker on the sacrum in place of two beside it.
     one, other = HDM05.index("LBWT"), HDM05.index("RBWT")
     middle = walk.copy()
     middle[:, one] = middle[:, [one, other]].mean(axis=1)
-    worn[one], worn[other] = "SACR", "other"
-    found = load_motion(write(tmp_path / "sacrum.c3d", middle, worn))
+    names[one], names[other] = "SACR", "other"
+    found = load_motion(write(tmp_path / "sacrum.c3d", middle, names))
     assert np.linalg.norm(found.positions - known.positions, axis=2).max() < 0.02
 
 
