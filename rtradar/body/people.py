@@ -178,20 +178,19 @@ class Bodies(Body):
         names = distinct_names([person.motion.name for person in people])
         sizes = [len(person.part_names) for person in people]
         shortest = min((person.duration_s for person in people), default=0.0)
-        own = list(zip(names, people, strict=True))
-        for name, value in (
-            ("semi_axes", np.concatenate([np.empty((0, 3)), *(one.semi_axes for one in people)])),
-            ("_people", tuple(people)),
-            ("names", names),
-            (
-                "part_names",
-                tuple(f"{name}: {part}" for name, one in own for part in one.part_names),
+        vars(self).update(
+            semi_axes=np.concatenate([np.empty((0, 3)), *(one.semi_axes for one in people)]),
+            _people=tuple(people),
+            names=names,
+            part_names=tuple(
+                f"{name}: {part}"
+                for name, one in zip(names, people, strict=True)
+                for part in one.part_names
             ),
-            ("owner", np.repeat(np.arange(len(sizes)), np.array(sizes, np.int64))),
-            ("materials", tuple(name for person in people for name in person.materials)),
-            ("duration_s", shortest if duration_s is None else duration_s),
-        ):
-            object.__setattr__(self, name, value)
+            owner=np.repeat(np.arange(len(sizes)), np.array(sizes, np.int64)),
+            materials=tuple(name for person in people for name in person.materials),
+            duration_s=shortest if duration_s is None else duration_s,
+        )
 
     _people: tuple[Body, ...]
 
@@ -239,26 +238,25 @@ class OnePart(Body):
     """
 
     def __init__(self, body: Body, part: int) -> None:
-        for name, value in (
-            ("semi_axes", body.semi_axes[part : part + 1]),
-            ("names", (body.names[body.owner[part]],)),
-            ("owner", np.zeros(1, np.int64)),
-            ("materials", body.materials[part : part + 1]),
-            ("part_names", body.part_names[part : part + 1]),
-            ("duration_s", body.duration_s),
-            ("_whole", body),
-            ("_part", part),
-        ):
-            object.__setattr__(self, name, value)
+        own = slice(part, part + 1)
+        vars(self).update(
+            semi_axes=body.semi_axes[own],
+            names=(body.names[body.owner[part]],),
+            owner=np.zeros(1, np.int64),
+            materials=body.materials[own],
+            part_names=body.part_names[own],
+            duration_s=body.duration_s,
+            _whole=body,
+            _own=own,
+        )
 
     _whole: Body
-    _part: int
+    _own: slice
 
     def at(self, times: ArrayLike) -> Poses:
         """Poses of the part; see `Body.at`."""
-        own = slice(self._part, self._part + 1)
         centres, frames, semi_axes = self._whole.at(times)
-        return Poses(centres[:, own], frames[:, own], semi_axes[own])
+        return Poses(centres[:, self._own], frames[:, self._own], semi_axes[self._own])
 
 
 def distinct_names(names: Sequence[str]) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
 from rtradar.motion import display
-from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, sign_continuous
 from rtradar.recordings import Finding, Source
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
@@ -347,19 +347,25 @@ class Motion:
         -------
         Motion
         """
-        yaw = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
-        s, c = yaw[2:]
+        return self.rotated(np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)]))
 
-        def rotated(rotations: Array) -> Array:  # quaternion_multiply, without the zeros of yaw
-            x, y, z, w = (rotations[..., k] for k in range(4))
-            return np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+    def rotated(self, turn: Array) -> Motion:
+        """Rotate the motion about the world's origin.
 
+        Parameters
+        ----------
+        turn : (4,) float64
+            Unit quaternion, scalar last.
+
+        Returns
+        -------
+        Motion
+        """
+        blocks = in_blocks(self.root_positions), in_blocks(self.rotations)
         return dataclasses.replace(
             self,
-            root_positions=file_backed(
-                quaternion_rotate(yaw, roots) for (roots,) in in_blocks(self.root_positions)
-            ),
-            rotations=file_backed(rotated(rotations) for (rotations,) in in_blocks(self.rotations)),
+            root_positions=file_backed(quaternion_rotate(turn, roots) for (roots,) in blocks[0]),
+            rotations=file_backed(quaternion_multiply(turn, rows) for (rows,) in blocks[1]),
         )
 
     def shifted(self, by_m: ArrayLike) -> Motion:

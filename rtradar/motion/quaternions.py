@@ -42,15 +42,17 @@ def quaternion_rotate(quaternions: Array, vectors: Array) -> Array:
 
 def quaternion_multiply(left: Array, right: Array) -> Array:
     """Multiply quaternions (..., 4): the rotation by ``right``, followed by that by ``left``."""
-    vector = (
-        left[..., 3:] * right[..., :3]
-        + right[..., 3:] * left[..., :3]
-        + np.cross(left[..., :3], right[..., :3])
+    x, y, z, w = (left[..., k] for k in range(4))
+    a, b, c, d = (right[..., k] for k in range(4))
+    return np.stack(
+        [
+            w * a + d * x + (y * c - z * b),
+            w * b + d * y + (z * a - x * c),
+            w * c + d * z + (x * b - y * a),
+            w * d - (x * a + y * b + z * c),
+        ],
+        axis=-1,
     )
-    scalar = left[..., 3:] * right[..., 3:] - np.sum(
-        left[..., :3] * right[..., :3], axis=-1, keepdims=True
-    )
-    return np.concatenate([vector, scalar], axis=-1)
 
 
 def smallest_rotation(before: Array, after: Array) -> Array:

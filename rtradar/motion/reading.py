@@ -22,10 +22,9 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import quaternion_multiply
 from rtradar.motion.skeleton import NODES, middle, of_node, to_nodes
 from rtradar.recordings import UNITS_M, UPWARD, Finding, rate_of, tall
-from rtradar.system.row_files import file_backed, in_blocks
+from rtradar.system.row_files import in_blocks
 
 Array = NDArray[np.float64]
 
@@ -420,15 +419,7 @@ def _turned_up(motion: Motion, to_world: Array) -> Motion:
     turn = to_world @ to_world_from("y").T
     if (turn == np.eye(3)).all():
         return motion
-    half = Rotation.from_matrix(turn).as_quat()
-    return replace(
-        motion,
-        root_positions=file_backed(roots @ turn.T for (roots,) in in_blocks(motion.root_positions)),
-        rotations=file_backed(
-            quaternion_multiply(np.broadcast_to(half, rows.shape), rows)
-            for (rows,) in in_blocks(motion.rotations)
-        ),
-    )
+    return motion.rotated(Rotation.from_matrix(turn).as_quat())
 
 
 def _of_frames(motion: Motion, take: Callable[[Array], Array]) -> Motion:

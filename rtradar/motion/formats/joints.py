@@ -34,7 +34,7 @@ from rtradar.motion.formats.joint_files import (
     read_csv,
     read_npz,
 )
-from rtradar.motion.formats.markers import level_axes, rigid_motion, runs
+from rtradar.motion.formats.markers import level_axes, rigid_motion, runs, unit
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
@@ -119,7 +119,7 @@ def motion_of(
     nodes, rate_hz = _resampled(nodes, times, convention)
     pelvis, thorax = (_axes(where, nodes, sides) for sides in ("hip", "shoulder"))
     _complete(nodes, pelvis, convention)
-    _keep_directions(where, nodes)
+    _keepunit(where, nodes)
     size = stature_of(nodes) / _NOMINAL_STATURE_M
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
     nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
@@ -132,8 +132,9 @@ def motion_of(
     return dataclasses.replace(motion, girth=size, findings=tuple(found))
 
 
-def _length(nodes: Array, first: str, last: str) -> Array:
-    return np.asarray(np.linalg.norm(of_node(nodes, first) - of_node(nodes, last), axis=1))
+def _length(nodes: Array, first: str, last: str) -> float:
+    bone = of_node(nodes, first) - of_node(nodes, last)
+    return float(np.median(np.linalg.norm(bone, axis=1)))
 
 
 def _drop_lost(nodes: Array, times: Array) -> None:
@@ -218,26 +219,24 @@ def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
     the joint that cameras find is at the instep. A hand or a head that is foreshortened, whose
     direction is uncertain then, points more and more as the forearm or the trunk does.
     """
-    thigh = float(np.median(_length(nodes, "l_knee", "l_hip")))
-    head, upward = (
-        of_node(nodes, "head") - of_node(nodes, "neck"),
-        _directions(middle(nodes, "shoulder") - middle(nodes, "hip")),
-    )
-    head = _lengthened(head, upward, 0.5 * float(np.median(np.linalg.norm(head, axis=1))))
+    thigh = _length(nodes, "l_knee", "l_hip")
+    head = of_node(nodes, "head") - of_node(nodes, "neck")
+    upward = unit(middle(nodes, "shoulder") - middle(nodes, "hip"))
+    head = _lengthened(head, upward, 0.5 * _length(nodes, "head", "neck"))
     if not convention.head_is_top:
-        head = HEAD_OF_THIGH * thigh * _directions(head)
+        head = HEAD_OF_THIGH * thigh * unit(head)
     nodes[:, NODES.index("head")] = of_node(nodes, "neck") + head
     for side in ("l", "r"):
         knee, ankle, toe = (of_node(nodes, f"{side}_{at}") for at in ("knee", "ankle", "toe"))
-        shank = _directions(knee - ankle)
-        length = _FOOT_OF_SHANK * float(np.median(_length(nodes, f"{side}_knee", f"{side}_ankle")))
+        shank = unit(knee - ankle)
+        length = _FOOT_OF_SHANK * _length(nodes, f"{side}_knee", f"{side}_ankle")
         along = np.sum((toe - ankle) * shank, axis=1, keepdims=True) * shank
         reach = np.sqrt(np.maximum(length**2 - np.sum(along**2, axis=1, keepdims=True), 0))
         ahead = _lengthened(toe - ankle - along, np.cross(pelvis[..., 1], shank), reach)
         nodes[:, NODES.index(f"{side}_toe")] = ankle + along + ahead
         elbow, wrist, end = (of_node(nodes, f"{side}_{at}") for at in ("elbow", "wrist", "hand"))
-        half = 0.5 * float(np.median(_length(nodes, f"{side}_hand", f"{side}_wrist")))
-        hand = _lengthened(end - wrist, _directions(wrist - elbow), half)
+        half = 0.5 * _length(nodes, f"{side}_hand", f"{side}_wrist")
+        hand = _lengthened(end - wrist, unit(wrist - elbow), half)
         nodes[:, NODES.index(f"{side}_hand")] = wrist + hand
 
 
@@ -252,7 +251,7 @@ def _axes(where: str, nodes: Array, sides: str) -> Array:
     return level_axes(left[kept], forward[kept])
 
 
-def _keep_directions(where: str, nodes: Array) -> None:
+def _keepunit(where: str, nodes: Array) -> None:
     """Give bones that vanish for a moment, in place, the direction that they had before."""
     for node in range(1, len(NODES)):
         start = nodes[:, NODE_PARENTS[node]]
@@ -271,10 +270,6 @@ def _last(good: NDArray[np.bool_]) -> NDArray[np.int64] | None:
     if good.mean() < 0.5:
         return None
     return np.maximum.accumulate(np.where(good, np.arange(len(good)), int(np.argmax(good))))
-
-
-def _directions(bone: Array) -> Array:
-    return bone / np.maximum(np.linalg.norm(bone, axis=1, keepdims=True), 1e-12)
 
 
 def _lengthened(bone: Array, along: Array, wanted: Array | float) -> Array:

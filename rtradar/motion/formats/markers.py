@@ -131,11 +131,11 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
 
 def _bend(shoulder: Array, elbow: Array, wrist: Array, thorax: Array, sign: float) -> Array:
     """Direction (frame, 3) in which the forearm leaves the upper arm's line, or would leave it."""
-    arm, fore = _unit(elbow - shoulder), _unit(wrist - elbow)
+    arm, fore = unit(elbow - shoulder), unit(wrist - elbow)
     bent = fore - np.sum(fore * arm, axis=1, keepdims=True) * arm
     # An arm that hangs down, out and forward bends forward and up; the smallest rotation takes it
     # to where this arm points.
-    rest, ahead = _unit(np.array([0.5, 0.5 * sign, -0.7])), _unit(np.array([0.7, 0.0, 0.5]))
+    rest, ahead = unit(np.array([0.5, 0.5 * sign, -0.7])), unit(np.array([0.7, 0.0, 0.5]))
     local = np.einsum("tji,tj->ti", thorax, arm)
     half = rest + local
     # Two reflections, along rest and along rest + local, are that rotation. Opposite to rest there
@@ -151,21 +151,22 @@ def _middle(markers: Mapping[str, Array], *names: str) -> Array:
     return np.asarray(np.mean([markers[name] for name in names], axis=0))
 
 
-def _unit(vectors: Array) -> Array:
+def unit(vectors: Array) -> Array:
+    """Unit vectors along some."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
 def _axes(*, up: Array, forward: Array) -> Array:
     """Axes with this up, and forward as near to ``forward`` as that allows."""
-    z = _unit(up)
-    y = _unit(np.cross(z, forward))
+    z = unit(up)
+    y = unit(np.cross(z, forward))
     return np.stack([np.cross(y, z), y, z], axis=2)
 
 
 def level_axes(left: Array, forward: Array) -> Array:
     """Axes with this left, and forward as near to ``forward`` as that allows."""
-    y = _unit(left)
-    z = _unit(np.cross(forward, y))
+    y = unit(left)
+    z = unit(np.cross(forward, y))
     return np.stack([np.cross(y, z), y, z], axis=2)
 
 
