@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -22,33 +24,15 @@ _Array = NDArray[np.float64]
 _SAME = 1e-4
 """Distance of two parts, relative to the least semi-axis, at which rays find the same surface."""
 
-_SIDED = {
-    "hip": ("hip", 0.07),
-    "knee": ("thigh", 0.07),
-    "ankle": ("shank", 0.06),
-    "toe": ("foot", 0.04),
-    "shoulder": ("clavicle", 0.05),
-    "elbow": ("upper arm", 0.05),
-    "wrist": ("forearm", 0.04),
-    "hand": ("hand", 0.04),
-}
-_PARTS: Mapping[str, tuple[str, float]] = {
-    "lowerback": ("lower torso", 0.10),
-    "upperback": ("middle torso", 0.10),
-    "thorax": ("upper torso", 0.10),
-    "neck": ("neck", 0.04),
-    "head": ("head", 0.06),
-    **{f"l_{node}": (f"left {name}", radius) for node, (name, radius) in _SIDED.items()},
-    **{f"r_{node}": (f"right {name}", radius) for node, (name, radius) in _SIDED.items()},
-}
-"""Name and thickness [m] of the part that ends in each node."""
+_PARTS: Mapping[str, tuple[str, float]] = tomllib.loads(
+    Path(__file__).with_name("parts.toml").read_text(encoding="utf-8")
+)
 
 PART_NAMES: tuple[str, ...] = tuple(_PARTS[node][0] for node in NODES[1:])
 """The 21 parts, in the order of the nodes that they end in."""
 
 PART_RADII_M: tuple[float, ...] = tuple(_PARTS[node][1] for node in NODES[1:])
 """Semi-axes a = b of each part of a body of girth 1."""
-
 
 _CHEST = [PART_NAMES.index(f"{place} torso") for place in ("middle", "upper")]
 """Parts that breath moves."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,50 +21,17 @@ Array = NDArray[np.float64]
 KEYPOINT_NODES = [NODES.index(name) for name in KEYPOINTS]
 """Nodes that are means of vertices of the mesh."""
 
-_LIMB_ENDS = {"toe": "toe2-3.{}.tail", "hand": "finger3-3.{}.tail"}
-"""Ends of bones of the mesh at which limbs end."""
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TRUNK: list[str] = _TABLE["trunk"]
 
 _REACH = 0.11
 """Over the height, how far around a keypoint the skin moves with it: half a limb, and wide enough
 that a move of some centimetres leaves no crease."""
 
-_SPINE = ("spine05", "spine04", "spine03", "spine02", "spine01", "neck01", "neck02", "head")
-"""Bones of the spine, upward; nodes of the trunk lie along them."""
-
-_TRUNK = ("root", "lowerback", "upperback", "thorax", "neck", "head")
-
-_SIDED = {
-    "pelvis": "hip",
-    "upperleg01": "knee",
-    "lowerleg01": "ankle",
-    "foot": "toe",
-    "clavicle": "shoulder",
-    "upperarm01": "elbow",
-    "lowerarm01": "wrist",
-    "wrist": "hand",
-}
-_MIDDLE = {
-    "root": "l_hip",
-    "spine05": "l_hip",
-    "spine04": "lowerback",
-    "spine02": "upperback",
-    "spine01": "thorax",
-    "neck01": "neck",
-    "neck02": "head",
-}
-_NODE_OF_BONE = _MIDDLE | {
-    f"{bone}.{side}": f"{side.lower()}_{node}" for bone, node in _SIDED.items() for side in "LR"
-}
-"""Node that ends the part to which a bone of the mesh belongs; others are as their parents."""
-
-_ENDS = ("head", "l_toe", "r_toe", "l_hand", "r_hand")
-"""Parts that end in no joint: skeletons differ in where that is, so the shape decides."""
-
 _END_STRETCH = (0.9, 1.1)
 _PELVIS_STRETCH = (0.75, 1.3)
 """Least and largest stretch over that of the whole person."""
 
-_LIMBS = ("knee", "ankle", "elbow", "wrist")
 _CANDIDATES = 200
 NOMINAL_STATURE_M = 1.75
 """Stature of a person of girth 1."""
@@ -161,10 +130,12 @@ def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
     joints = np.zeros((len(NODES), 3))
     joints[KEYPOINT_NODES] = shapes.keypoints @ shapes.vertices[age]
     for side in "LR":
-        for node, end in _LIMB_ENDS.items():
-            joints[NODES.index(f"{side.lower()}_{node}")] = shapes.joints[end.format(side)][age]
+        for node, end in _TABLE["limb_ends"].items():
+            joints[NODES.index(f"{side.lower()}_{node}")] = shapes.joints[end.replace("@", side)][
+                age
+            ]
     hips, shoulders = (middle(joints, node)[2] for node in ("hip", "shoulder"))
-    spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _SPINE])
+    spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _TABLE["spine"]])
     for node in _TRUNK:
         z = hips + heights[node] * (shoulders - hips)
         joints[NODES.index(node)] = 0.0, np.interp(z, spine[:, 2], spine[:, 1]), z
@@ -188,7 +159,7 @@ def _trunk_heights(motion: Motion, pose: Array | None) -> dict[str, float]:
 
 def _size(joints: Array) -> float:
     """Sum of the lengths of both legs and arms, and twice that from hips to shoulders [m]."""
-    limbs = [NODES.index(f"{side}_{node}") for side in "lr" for node in _LIMBS]
+    limbs = [NODES.index(f"{side}_{node}") for side in "lr" for node in _TABLE["limbs"]]
     bones = joints[limbs] - joints[[NODE_PARENTS[limb] for limb in limbs]]
     trunk = 2 * float(np.linalg.norm(middle(joints, "shoulder") - middle(joints, "hip")))
     return trunk + float(np.linalg.norm(bones, axis=1).sum())
@@ -273,7 +244,7 @@ def _stretches(
     for part, (node, way) in enumerate(zip(NODES[1:], ways, strict=True)):
         along = lengths[part + 1] / own[part]
         across = scale * build
-        if node in _ENDS:
+        if node in _TABLE["ends"]:
             along = scale * np.clip(along / scale, *_END_STRETCH)
             across = scale
         stretch[part] = across * np.eye(3) + (along - across) * np.outer(way, way)
@@ -299,11 +270,12 @@ def _pelvis_stretch(joints: Array, pose: Array, scale: float, build: float) -> A
 def _part_weights(shapes: RestShapes, vertices: Array) -> Array:
     """Weights (vertex, part), by the part to which each bone of the mesh belongs."""
     weights = np.zeros((len(vertices), len(NODES) - 1))
+    node_of = _TABLE["node_of_bone"]
     for number in range(len(shapes.bones)):
         bone = number
-        while shapes.bones[bone] not in _NODE_OF_BONE:
+        while shapes.bones[bone] not in node_of:
             bone = shapes.parents[bone]
-        weights[:, NODES.index(_NODE_OF_BONE[shapes.bones[bone]]) - 1] += shapes.weights[:, number]
+        weights[:, NODES.index(node_of[shapes.bones[bone]]) - 1] += shapes.weights[:, number]
     left, right = (NODES.index(f"{side}_hip") - 1 for side in "lr")
     pelvis = weights[:, left] + weights[:, right]
     weights[:, left] = np.where(vertices[:, 0] > 0, pelvis, 0)
