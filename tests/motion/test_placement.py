@@ -12,15 +12,7 @@ from rtradar.motion import Motion, cut, place, synthetic_motion
 from rtradar.motion.placement import MARGIN_FRAMES, hip_headings, median_heading, walk_direction
 from rtradar.motion.skeleton import NODES
 
-
-@pytest.fixture(scope="module")
-def walk() -> Motion:
-    return synthetic_motion("walk")
-
-
-@pytest.fixture(scope="module")
-def kick() -> Motion:
-    return synthetic_motion("kick")
+WALK, KICK = synthetic_motion("walk"), synthetic_motion("kick")
 
 
 def inside(motion: Motion) -> Motion:
@@ -32,24 +24,23 @@ def inside(motion: Motion) -> Motion:
 @example(0.125, 0.0, 0.0)  # at which a median of each component was 1.7e-4 m off
 @given(st.floats(-math.pi, math.pi), st.floats(-5, 5), st.floats(-5, 5))
 def test_placement_undoes_any_yaw_and_shift(yaw: float, x: float, y: float) -> None:
-    for activity in ("walk", "kick"):
-        motion = synthetic_motion(activity)
+    for motion in (WALK, KICK):
         expected = place(motion).positions
         np.testing.assert_allclose(
             place(motion.turned(yaw).shifted([x, y, 0])).positions, expected, atol=1e-9
         )
 
 
-def test_a_part_of_a_recording_is_placed_like_the_whole(walk: Motion) -> None:
-    part = cut(walk, 1.0, 0.5)
-    assert len(part.root_positions) < len(walk.root_positions) / 2
-    whole, placed = place(walk, 1.0, 0.5), place(part, 0.0, 0.5)
+def test_a_part_of_a_recording_is_placed_like_the_whole() -> None:
+    part = cut(WALK, 1.0, 0.5)
+    assert len(part.root_positions) < len(WALK.root_positions) / 2
+    whole, placed = place(WALK, 1.0, 0.5), place(part, 0.0, 0.5)
     np.testing.assert_array_equal(placed.positions, whole.positions)
     assert (placed.duration_s, placed.first_frame_s) == (whole.duration_s, whole.first_frame_s)
 
 
-def test_walk_moves_toward_the_radar(walk: Motion) -> None:
-    root = inside(place(walk.turned(1.0)))[:, 0]  # type: ignore[index]
+def test_walk_moves_toward_the_radar() -> None:
+    root = inside(place(WALK.turned(1.0)))[:, 0]  # type: ignore[index]
     np.testing.assert_allclose(root[:, :2].mean(axis=0), 0, atol=1e-12)
     assert root[-1, 0] - root[0, 0] < -3
     assert abs(root[-1, 1] - root[0, 1]) < 0.1
@@ -62,8 +53,8 @@ def test_walk_there_and_back_goes_toward_the_radar_first() -> None:
     assert np.ptp(root[:, 1]) < 0.4
 
 
-def test_others_face_the_radar(kick: Motion) -> None:
-    placed = place(kick.turned(-2.0))
+def test_others_face_the_radar() -> None:
+    placed = place(KICK.turned(-2.0))
     heading = median_heading(hip_headings(placed))
     assert (
         math.atan2(heading[1], heading[0]) == pytest.approx(math.pi, abs=0.02) or heading[0] < -0.99
@@ -75,28 +66,28 @@ def test_others_face_the_radar(kick: Motion) -> None:
     assert feet[:, 0, 0].min() < -0.7
 
 
-def test_heading_is_added_anticlockwise(kick: Motion) -> None:
-    straight, turned = place(kick).positions, place(kick, heading_deg=90).positions
+def test_heading_is_added_anticlockwise() -> None:
+    straight, turned = place(KICK).positions, place(KICK, heading_deg=90).positions
     np.testing.assert_allclose(turned[..., 0], -straight[..., 1], atol=1e-12)
     np.testing.assert_allclose(turned[..., 1], straight[..., 0], atol=1e-12)
 
 
-def test_interval_and_margin(walk: Motion) -> None:
-    cut = place(walk, 1.003, 0.5)
+def test_interval_and_margin() -> None:
+    cut = place(WALK, 1.003, 0.5)
     assert cut.duration_s == 0.5
     assert cut.first_frame_s == pytest.approx(
         math.floor(1.003 * 120) / 120 - MARGIN_FRAMES / 120 - 1.003
     )
     # The same poses as in the whole, up to the place: the ends see the frames beyond.
     times = np.array([0.0, 0.1, 0.5])
-    whole, part = walk.at(times + 1.003)[0], cut.at(times)[0]
+    whole, part = WALK.at(times + 1.003)[0], cut.at(times)[0]
     for a, b in zip(whole, part, strict=True):
         distances = (np.linalg.norm(p[:, None] - p[None], axis=2) for p in (a, b))
         np.testing.assert_allclose(*distances, atol=1e-7)
 
 
-def test_straight_cut_of_a_walk_faces_the_same_way(walk: Motion) -> None:
-    cut = place(walk.turned(0.7), 1.0, 0.4)
+def test_straight_cut_of_a_walk_faces_the_same_way() -> None:
+    cut = place(WALK.turned(0.7), 1.0, 0.4)
     root = cut.at([0.0, 0.4])[0][:, 0]
     assert root[1, 0] - root[0, 0] < -0.4
     assert abs(root[1, 1] - root[0, 1]) < 0.1
@@ -114,9 +105,9 @@ def test_straight_cut_of_a_walk_faces_the_same_way(walk: Motion) -> None:
         ({"heading_deg": math.nan}, "heading_deg = nan"),
     ],
 )
-def test_interval_outside_is_refused(walk: Motion, arguments: dict[str, float], words: str) -> None:
+def test_interval_outside_is_refused(arguments: dict[str, float], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        place(walk, **arguments)  # type: ignore[arg-type]
+        place(WALK, **arguments)  # type: ignore[arg-type]
 
 
 def test_sideways_steps_are_no_walk() -> None:

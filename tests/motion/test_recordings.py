@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ FILES = {
 }
 
 
+@cache
 def load(folder: Path, key: str) -> Motion:
     file, skeleton, _ = FILES[key]
     return load_motion(folder / file, folder / skeleton if skeleton else None)
@@ -108,11 +110,16 @@ def test_walks_move_toward_the_radar(mocap: Path, key: str) -> None:
     assert (ends[:, NODES.index("l_hip"), 1] < ends[:, NODES.index("r_hip"), 1]).all()
 
 
-def test_spikes_of_135_02_stay_rigid(mocap: Path) -> None:
-    motion = load_motion(mocap / "cmu/135_02.amc", mocap / "cmu/135.asf")
-    assert len(motion.root_positions) == 5202
-    nodes = to_nodes(motion)
-    times = np.arange(0, 43.0, 1 / 997)
+@pytest.fixture(scope="module")
+def spikes(mocap: Path) -> Motion:
+    """The nodes of 135_02, in which hands jump."""
+    return to_nodes(load_motion(mocap / "cmu/135_02.amc", mocap / "cmu/135.asf"))
+
+
+def test_spikes_of_135_02_stay_rigid(spikes: Motion) -> None:
+    nodes = spikes
+    assert len(nodes.root_positions) == 5202
+    times = np.arange(0, 43.0, 1 / 397)
     positions, _ = nodes.at(times)
     lengths = np.linalg.norm(positions[:, 1:] - positions[:, list(nodes.parents[1:])], axis=2)
     np.testing.assert_allclose(
@@ -124,9 +131,8 @@ def test_spikes_of_135_02_stay_rigid(mocap: Path) -> None:
     assert (positions.min(axis=(0, 1)) > frames.min(axis=(0, 1)) - 0.05).all()
 
 
-def test_c3d_and_amc_of_one_take_agree(mocap: Path) -> None:
-    c3d = load_motion(mocap / "cmu/135_02.c3d")
-    amc = to_nodes(load_motion(mocap / "cmu/135_02.amc", mocap / "cmu/135.asf"))
+def test_c3d_and_amc_of_one_take_agree(mocap: Path, spikes: Motion) -> None:
+    c3d, amc = load_motion(mocap / "cmu/135_02.c3d"), spikes
     assert c3d.rate_hz == amc.rate_hz
     # The offsets of the markers were set by the other half of the take
     # (validation/measurements/c3d_take.py).
