@@ -103,7 +103,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
     with TextFile(path, "table of joint positions") as text:
         header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
         columns, joints = _columns(text, header)
-        rows, up = list[list[float]](), ""
+        rows, ups = list[list[float]](), set[str]()
         for line in text:
             cells = [cell.strip(" \"'\t\r\n") for cell in line.split(",")]
             if cells == [""]:
@@ -111,25 +111,19 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
             if len(cells) != len(header):
                 raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
             if "up" in columns:
-                own = cells[columns["up"]]
-                if rows and own != up:
-                    raise text.fail(f"up is {brief(own)}, and was {brief(up)}; it must not change")
-                up, cells[columns["up"]] = own, ""
-            row = text.cells(cells)
-            rate = columns.get("rate_hz", -1)
-            if rate >= 0 and rows and row[rate] != rows[0][rate]:
-                raise text.fail(f"rate_hz is {row[rate]:g}, and was {rows[0][rate]:g}; give time_s")
-            rows.append(row)
+                ups.add(cells[columns["up"]])
+                cells[columns["up"]] = ""
+            rows.append(text.cells(cells))
             text.check_size(len(joints), len(rows))
     values = np.array(rows).reshape(len(rows), len(header))
     named = list(joints.values())
     arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
     if "up" in columns:
-        arrays["up"] = np.array(up)
+        arrays["up"] = np.array(" and ".join(sorted(ups)))
     if "time_s" in columns:
         arrays["time_s"] = values[:, columns["time_s"]]
-    if "rate_hz" in columns and len(rows):
-        arrays["rate_hz"] = values[0, columns["rate_hz"]]
+    if "rate_hz" in columns:
+        arrays["rate_hz"] = np.unique(values[:, columns["rate_hz"]])
     return checked(path, arrays, rate_hz)
 
 
@@ -195,11 +189,10 @@ def check_array(
     path: Path, name: str, array: NDArray[Any], shape: tuple[int | str, ...], kinds: str = "fiu"
 ) -> None:
     """Refuse an array of another shape or kind than a file must have; a name is any length."""
-    alike = len(shape) == array.ndim and all(
-        isinstance(wanted, str) or wanted == size
-        for wanted, size in zip(shape, array.shape, strict=True)
-    )
-    if not alike or array.dtype.kind not in kinds:
+    wrong = [
+        own for own, size in zip(shape, array.shape, strict=False) if own not in (size, str(own))
+    ]
+    if wrong or len(shape) != array.ndim or array.dtype.kind not in kinds:
         raise InputError(
             f"{path}: {name} is {array.dtype} of shape {array.shape}; it must be "
             f"{'names' if kinds == 'U' else 'real numbers'} of shape ({', '.join(map(str, shape))})"
@@ -234,10 +227,8 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
     times = arrays["time_s"]
     check_array(path, "time_s", times, (frames,))
     times = times.astype(np.float64)
-    for frame in np.flatnonzero(~np.isfinite(times)):
-        raise InputError(f"{path}: time_s is {times[frame]} in frame {frame + 1}; mend it")
     steps = np.diff(times)
-    for frame in np.flatnonzero(steps < _LEAST_STEP_S):
+    for frame in np.flatnonzero(~(np.isfinite(steps) & (steps >= _LEAST_STEP_S))):
         raise InputError(
             f"{path}: time_s is {times[frame + 1]:g} in frame {frame + 2}, after "
             f"{times[frame]:g}; times must ascend, by a microsecond at least"
