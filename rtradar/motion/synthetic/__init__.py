@@ -19,7 +19,6 @@ from rtradar.motion.synthetic.figure import (
     STYLES,
     PosesAt,
     Subject,
-    draw_subject,
     lowering,
     offsets,
     rotations,
@@ -194,16 +193,20 @@ def _parsed(value: str) -> float | str:
 
 
 def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:
+    """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
     own = check_seed("", seed), list(ACTIVITIES).index(activity)
-    subject = draw_subject(
-        np.random.default_rng(stream(*own)),
+    rng = np.random.default_rng(stream(*own))
+    spread = (1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)).tolist()
+    phase, manner = float(rng.uniform()), int(rng.integers(2**32))
+    if chosen["take"]:
+        phase = float(np.random.default_rng(stream(*own, int(chosen["take"]))).uniform())
+    return Subject(
         height_m=chosen["height_m"],
         side=chosen["side"][0],
-        tempo=chosen["tempo"],
-        amplitude=chosen["amplitude"],
+        tempo=chosen["tempo"] * spread[0],
+        amplitude=chosen["amplitude"] * spread[1],
+        phase=phase,
+        uneven={"l": spread[2], "r": spread[3]},
         style=chosen["style"],
+        manner=manner,
     )
-    if not chosen["take"]:
-        return subject
-    phase = float(np.random.default_rng(stream(*own, int(chosen["take"]))).uniform())
-    return dataclasses.replace(subject, phase=phase)

@@ -125,14 +125,18 @@ class _Foot:
 class Fighter:
     """Plans of a fighter, who begins in a stance, facing +x.
 
-    The ``bearing`` is a stance of ``traits.toml``; its ``lead`` is the side of the foot in front.
+    The ``bearing`` is a stance of ``traits.toml``, whose ``lead`` is the side of the foot in front,
+    and ``habits`` are how the subject strikes. What differs from strike to strike is drawn as the
+    plan goes on.
     """
 
-    def __init__(self, subject: Subject, bearing: SimpleNamespace) -> None:
+    def __init__(self, subject: Subject, bearing: SimpleNamespace, habits: SimpleNamespace) -> None:
         bearing.heel = max(bearing.heel, 0.0)
         for angle in ("bladed", "lean", "heel", "elbow"):
             setattr(bearing, angle, math.radians(getattr(bearing, angle)))
         self.subject, self.bearing, self.lead = subject, bearing, bearing.lead
+        self.habits = habits
+        self.rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
         self.facing = 0.0
         """Yaw of the opponent [rad], a multiple of full turns."""
         self.feet = {}
@@ -152,6 +156,10 @@ class Fighter:
         """When the last step ended, or a leg came down."""
         phases = np.random.default_rng(subject.manner).uniform(0, 2 * math.pi, 12)
         self._phases = phases + 2 * math.pi * subject.phase
+
+    def between(self, low: float, high: float) -> float:
+        """Draw a number, uniform from ``low`` to ``high``."""
+        return float(self.rng.uniform(low, high))
 
     # -- where things are in the stance ------------------------------------------------------------
 

@@ -110,29 +110,6 @@ class Subject:
         return OTHER[self.side]
 
 
-def draw_subject(
-    rng: np.random.Generator,
-    *,
-    height_m: float,
-    side: str,
-    tempo: float,
-    amplitude: float,
-    style: str = "",
-) -> Subject:
-    """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
-    spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
-    return Subject(
-        height_m=height_m,
-        side=side,
-        tempo=tempo * float(spread[0]),
-        amplitude=amplitude * float(spread[1]),
-        phase=float(rng.uniform()),
-        uneven={"l": float(spread[2]), "r": float(spread[3])},
-        style=style,
-        manner=int(rng.integers(2**32)),
-    )
-
-
 class Arm(NamedTuple):
     """World rotations of one arm's bones; at rest it hangs."""
 

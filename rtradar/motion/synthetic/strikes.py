@@ -9,7 +9,8 @@ each subject (``traits.toml``), what differs between strikes of one person for e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -53,7 +54,6 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     stance.lead = subject.other if stance.behind < 0.7 else subject.side
     stance.stagger = 0.04 + 0.10 * stance.stagger + 0.12 * stance.depth**3
     stance.depth = 0.018 + 0.03 * stance.depth + 0.15 * stance.depth**3
-    fighter = Fighter(subject, stance)
     own.step *= min(subject.amplitude, 1.0)
     own.height += 30 * (subject.amplitude - 1)
     own.load = -0.01 + 0.12 * own.load + 0.12 * own.load**4
@@ -63,36 +63,29 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     shares = (
         _only(subject.style, KICKS) if subject.style else rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
     )
-    rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
+    fighter = Fighter(subject, stance, own)
     leg, t = subject.side, -1.6 * subject.phase
     while t < duration_s + 0.5:
-        kind = KICKS[STYLES["kick"][int(rng.choice(len(KICKS), p=shares))]]
-        t = _kick(fighter, own, kind, leg, t, rng)
-        t += float(rng.uniform(0.03, own.rest)) / subject.tempo
-        if rng.random() < own.alternating:
+        kind = KICKS[STYLES["kick"][int(fighter.rng.choice(len(KICKS), p=shares))]]
+        t = _kick(fighter, kind, leg, t)
+        t += fighter.between(0.03, own.rest) / subject.tempo
+        if fighter.rng.random() < own.alternating:
             leg = OTHER[leg]
     return fighter.poses
 
 
-def _kick(
-    fighter: Fighter,
-    habits: SimpleNamespace,
-    kind: SimpleNamespace,
-    leg: str,
-    t: float,
-    rng: np.random.Generator,
-) -> float:
+def _kick(fighter: Fighter, kind: SimpleNamespace, leg: str, t: float) -> float:
     """Plan one kick that begins at a time [s], and return when the kicker stands again."""
-    own, sign = fighter.bearing, SIDES[leg]
-    support = OTHER[leg]
-    pace = habits.pace * float(rng.uniform(0.92, 1.08))
+    own, habits, rng = fighter.bearing, fighter.habits, fighter.rng
+    sign, support, foot = SIDES[leg], OTHER[leg], fighter.feet[leg]
+    pace = habits.pace * fighter.between(0.92, 1.08)
 
     def at(seconds: float) -> float:
         return t + seconds / pace
 
     # The support foot steps in, and the weight comes over it.
     x, y = fighter.ankle(support)
-    step = habits.step * float(rng.uniform(0.3, 1.3)) * (1.0 if x < 0.25 else 0.3)
+    step = habits.step * fighter.between(0.3, 1.3) * (1.0 if x < 0.25 else 0.3)
     step = min(step, 0.52 - abs(x - fighter.ankle(leg)[0]))
     turned = fighter.facing - sign * math.radians(0.25 * kind.pivot)
     spinning = kind.turn < -120
@@ -108,21 +101,11 @@ def _kick(
     # Knee up, leg out, leg back.
     lift = max(begin + 0.20, (fighter.stepped - t) * pace + 0.03)
     chambered = lift + 0.26
-    out = chambered + kind.out_s * float(rng.uniform(0.85, 1.2))
-    back = out + float(rng.uniform(0.16, 0.30))
-    land = back + float(rng.uniform(0.26, 0.40))
+    out = chambered + kind.out_s * fighter.between(0.85, 1.2)
+    back = out + fighter.between(0.16, 0.30)
+    land = back + fighter.between(0.26, 0.40)
     raised = habits.height + float(rng.normal(0, 4))
-    foot = fighter.feet[leg]
-
-    def leg_to(
-        key: tuple[float, float, float], share: float, roll: float = 1.0
-    ) -> tuple[float, ...]:
-        azimuth, elevation, reach = key
-        # Beyond straight down, backward, it goes up as the elevation falls.
-        higher = share * raised * (1 if elevation > -90 else -1)
-        angles = np.radians([sign * azimuth, elevation + higher, roll * kind.roll, kind.flexion])
-        return fighter.facing + angles[0], angles[1], reach, angles[2], angles[3]
-
+    leg_to = partial(_leg, fighter, kind, leg, raised)
     low = (0.0, -105.0 if spinning else -75.0, 0.93)
     foot.leg.move(at(lift) - 0.1, at(lift), *leg_to(low, 0.0, 0.0))
     foot.leg.move(at(lift), at(chambered), *leg_to(kind.chamber, 0.35))
@@ -146,14 +129,14 @@ def _kick(
     fighter.thorax.move(at(lift - 0.02), at(out + 0.02), shoulders, -away, aside)
     foot.yaw.move(at(lift), at(chambered), fighter.facing + 0.7 * (turn - fighter.facing))
     fighter.depth.move(at(lift), at(out), 0.006 + 0.2 * own.depth)
-    _swing(fighter, habits, leg, (at(lift), at(out), at(back)), rng)
+    _swing(fighter, leg, at(lift), at(out))
 
     # The leg lands behind or in front, and the stance follows.
     if spinning:
         fighter.facing += sign * 2 * math.pi
     ahead = rng.random() < habits.forward and x < 0.3
     fighter.lead = leg if ahead else support
-    middle = float(rng.uniform(-0.04, 0.04)) - habits.recoil
+    middle = fighter.between(-0.04, 0.04) - habits.recoil
     middle += (x if ahead else x - step) * 0.8
     reach = 0.36 - own.stagger / 2
     middle = float(np.clip(middle, x - reach, x + reach))
@@ -172,20 +155,32 @@ def _kick(
     return fighter.into_stance(at(land + 0.02), at(land + 0.5), middle, 0.0, 0.035)
 
 
-def _swing(
+def _leg(
     fighter: Fighter,
-    habits: SimpleNamespace,
+    kind: SimpleNamespace,
     leg: str,
-    times: tuple[float, float, float],
-    rng: np.random.Generator,
-) -> None:
+    raised: float,
+    key: Sequence[float],
+    share: float,
+    roll: float = 1.0,
+) -> tuple[float, ...]:
+    """Where a leg is to go, by azimuth, elevation and reach, with a share of what it is raised."""
+    azimuth, elevation, reach = key
+    # Beyond straight down, backward, it goes up as the elevation falls.
+    higher = share * raised * (1 if elevation > -90 else -1)
+    side = SIDES[leg] * azimuth
+    angles = np.radians([side, elevation + higher, roll * kind.roll, kind.flexion])
+    return fighter.facing + angles[0], angles[1], reach, angles[2], angles[3]
+
+
+def _swing(fighter: Fighter, leg: str, begin: float, end: float) -> None:
     """Swing the arm of the kicking side down and back, and the other forward and aside."""
     for side, sign in SIDES.items():
         down = (-0.15, 0.35 * sign, -0.78) if side == leg else (0.42, 0.42 * sign, -0.05)
-        size = habits.swing * float(rng.uniform(0.6, 1.15))
+        size = fighter.habits.swing * fighter.between(0.6, 1.15)
         guard = np.array(fighter.guard(side))
         place = guard + min(size, 1.0) * (np.array(down) - guard)
-        fighter.wrists[side].move(times[0], times[1] + 0.02, *place.tolist())
+        fighter.wrists[side].move(begin, end + 0.02, *place.tolist())
 
 
 # -- punches ---------------------------------------------------------------------------------------
@@ -232,17 +227,17 @@ def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> Poses
     stance.stagger = 0.06 + 0.10 * stance.stagger + 0.06 * stance.low**2
     stance.depth = 0.015 + 0.05 * stance.low
     stance.lean = 2 + 36 * stance.upright**2
-    fighter = Fighter(subject, stance)
-    rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
+    fighter = Fighter(subject, stance, own)
+    rng = fighter.rng
     t = -1.2 * subject.phase
     while t < duration_s + 0.5:
         x, _ = fighter.middle()
         middle_x, middle_y = 0.4 * x, 0.0
         if rng.random() < own.stepping:
-            ahead = float(rng.uniform(0.3, 1.0)) * own.step * (1 if rng.random() < 0.75 else -1)
+            ahead = fighter.between(0.3, 1.0) * own.step * (1 if rng.random() < 0.75 else -1)
             middle_x += ahead
-            middle_y = 0.4 * own.step * float(rng.uniform(-1, 1))
-            t = max(t, _step_in(fighter, own, t, middle_x, middle_y))
+            middle_y = 0.4 * own.step * fighter.between(-1, 1)
+            t = max(t, _step_in(fighter, t, middle_x, middle_y))
         hand = subject.side if rng.random() < 0.55 else subject.other
         for _ in range(int(rng.integers(1, own.most + 1))):
             kind = PUNCHES[STYLES["punch"][int(rng.choice(len(PUNCHES), p=own.shares))]]
@@ -250,48 +245,42 @@ def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> Poses
                 kind = PUNCHES["jab" if hand == fighter.lead else "cross"]
             elif kind.hand != "either":
                 hand = fighter.lead if kind.hand == "front" else fighter.rear
-            t = _punch(fighter, own, kind, hand, t, rng)
+            t = _punch(fighter, kind, hand, t)
             hand = OTHER[hand]
         if rng.random() < own.weaving:
-            t = _weave(fighter, t, rng)
-        length = float(rng.uniform(0.34, 0.6)) / max(own.pace, 0.6)
+            t = _weave(fighter, t)
+        length = fighter.between(0.34, 0.6) / max(own.pace, 0.6)
         t = fighter.into_stance(t, t + length, 0.5 * middle_x, 0.5 * middle_y, 0.03)
-        t += float(rng.uniform(0.03, own.rest)) / subject.tempo
+        t += fighter.between(0.03, own.rest) / subject.tempo
     return fighter.poses
 
 
-def _step_in(fighter: Fighter, habits: SimpleNamespace, t: float, x: float, y: float) -> float:
+def _step_in(fighter: Fighter, t: float, x: float, y: float) -> float:
     """Step toward (x, y) with one foot, in front or behind; return when to strike."""
     forward = x > fighter.middle()[0]
     side = fighter.lead if forward else fighter.rear
     to = fighter.place(side, x, y)
     gap = to[0] - fighter.feet[OTHER[side]].toe.last[0]
     to = float(to[0] + np.clip(gap, -0.34, 0.34) - gap), to[1], to[2]
-    end = fighter.step(side, t, t + 0.26 / max(habits.pace, 0.7), to, 0.03)
+    end = fighter.step(side, t, t + 0.26 / max(fighter.habits.pace, 0.7), to, 0.03)
     fighter.root.move(end - 0.3, end + 0.2, *fighter.middle())
     return end - 0.06
 
 
-def _punch(
-    fighter: Fighter,
-    habits: SimpleNamespace,
-    kind: SimpleNamespace,
-    hand: str,
-    t: float,
-    rng: np.random.Generator,
-) -> float:
+def _punch(fighter: Fighter, kind: SimpleNamespace, hand: str, t: float) -> float:
     """Plan one punch that begins at a time [s], and return when the next may begin."""
-    own, sign, other = fighter.bearing, SIDES[hand], OTHER[hand]
-    pace = habits.pace * float(rng.uniform(0.85, 1.15))
+    own, habits, rng = fighter.bearing, fighter.habits, fighter.rng
+    sign, other = SIDES[hand], OTHER[hand]
+    pace = habits.pace * fighter.between(0.85, 1.15)
     wrist = fighter.wrists[hand]
     t = max(t, wrist.end - 0.02)
     out = t + kind.out_s / pace
-    back = out + float(rng.uniform(0.18, 0.30)) / pace
-    vary = float(rng.uniform(0.85, 1.15))
+    back = out + fighter.between(0.18, 0.30) / pace
+    vary = fighter.between(0.85, 1.15)
 
     turn = math.radians(kind.turn) * habits.turn * vary
     turn = -sign * (turn + 0.5 * own.bladed * (hand == fighter.lead))
-    lean = own.lean + math.radians(kind.lean) * habits.lean + habits.bow * float(rng.uniform(0, 1))
+    lean = own.lean + math.radians(kind.lean) * habits.lean + habits.bow * fighter.between(0, 1)
     aside = sign * math.radians(kind.aside) * habits.lean * vary
     fighter.pelvis.move(t, out - 0.02, 0.75 * turn, 0.6 * lean, 0.5 * aside)
     fighter.thorax.move(t + 0.02, out, turn, lean, aside)
@@ -330,18 +319,16 @@ def _punch(
     helper = fighter.wrists[other]
     if helper.end < out - 0.12:
         helper.move(max(helper.end, t), out + 0.03, *(cover + 0.05 * rng.normal(size=3)).tolist())
-    return out + float(rng.uniform(0.02, 0.10)) / pace
+    return out + fighter.between(0.02, 0.10) / pace
 
 
-def _weave(fighter: Fighter, t: float, rng: np.random.Generator) -> float:
+def _weave(fighter: Fighter, t: float) -> float:
     """Plan a lean aside and forward, low, as if under a punch; return when it is over."""
-    own, aside = (
-        fighter.bearing,
-        math.radians(float(rng.uniform(8, 24))) * float(rng.choice([-1.0, 1.0])),
-    )
-    end = t + float(rng.uniform(0.28, 0.45)) / fighter.subject.tempo
-    lean, turned = own.lean + math.radians(float(rng.uniform(4, 22))), fighter.thorax.last[0]
+    own = fighter.bearing
+    aside = math.radians(fighter.between(8, 24)) * float(fighter.rng.choice([-1.0, 1.0]))
+    end = t + fighter.between(0.28, 0.45) / fighter.subject.tempo
+    lean, turned = own.lean + math.radians(fighter.between(4, 22)), fighter.thorax.last[0]
     fighter.pelvis.move(t, end, fighter.pelvis.last[0], 0.6 * lean, 0.5 * aside)
     fighter.thorax.move(t, end, turned, lean, aside)
-    fighter.depth.move(t, end, own.depth + float(rng.uniform(0.01, 0.06)))
+    fighter.depth.move(t, end, own.depth + fighter.between(0.01, 0.06))
     return end + 0.03
