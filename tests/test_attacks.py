@@ -101,7 +101,7 @@ HEADER = ",".join(f"{node}_{axis}" for node in NODES for axis in "xyz")
     ("column", "values", "says"),
     [
         ("up", ("z", "y"), "line 3: up is 'y', and was 'z'"),
-        ("rate_hz", ("30", "60"), "line 3: rate_hz is 60, and was 30"),
+        ("rate_hz", ("30", "60"), "line 3: rate_hz is '60', and was '30'"),
     ],
 )
 def test_what_holds_for_a_table_does_not_change_in_it(
@@ -117,7 +117,7 @@ def test_a_recording_of_too_many_places_is_refused_before_it_takes_memory(tmp_pa
     joints = np.array([f"j{k}" for k in range(100)])
     places = np.broadcast_to(np.float32(1), (50_001, 100, 3))
     np.savez(tmp_path / "a.npz", positions=places, joints=joints, rate_hz=30.0)
-    with pytest.raises(InputError, match="50001 frames of 100 joints; at most 5000000"):
+    with pytest.raises(InputError, match=r"50001 frames of 100 joints; .* 5000000"):
         rt.load_motion(tmp_path / "a.npz")
 
 

@@ -103,15 +103,19 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
     with TextFile(path, "table of joint positions") as text:
         header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
         columns, joints = _columns(text, header)
-        rows, ups = list[list[float]](), set[str]()
+        held = [key for key in ("up", "rate_hz") if key in columns]
+        rows, first = list[list[float]](), dict[str, str]()
         for line in text:
             cells = [cell.strip(" \"'\t\r\n") for cell in line.split(",")]
             if cells == [""]:
                 continue
             if len(cells) != len(header):
                 raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
+            for key in held:
+                if first.setdefault(key, own := cells[columns[key]]) != own:
+                    was = f"{brief(own)}, and was {brief(first[key])}"
+                    raise text.fail(f"{key} is {was}; it must not change, give time_s")
             if "up" in columns:
-                ups.add(cells[columns["up"]])
                 cells[columns["up"]] = ""
             rows.append(text.cells(cells))
             text.check_size(len(joints), len(rows))
@@ -119,11 +123,11 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
     named = list(joints.values())
     arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
     if "up" in columns:
-        arrays["up"] = np.array(" and ".join(sorted(ups)))
+        arrays["up"] = np.array(first.get("up", ""))
     if "time_s" in columns:
         arrays["time_s"] = values[:, columns["time_s"]]
     if "rate_hz" in columns:
-        arrays["rate_hz"] = np.unique(values[:, columns["rate_hz"]])
+        arrays["rate_hz"] = values[:1, columns["rate_hz"]]
     return checked(path, arrays, rate_hz)
 
 
