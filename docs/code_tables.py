@@ -39,7 +39,7 @@ from rtradar.scene import (
 from rtradar.scene.materials import PowerLaw
 from rtradar.scene.scene import KEYS
 from rtradar.settings import RunSettings
-from rtradar.system.fields import Limits, annotations_of, found_in
+from rtradar.system.fields import Limits, annotations_of, found_in, rules_of
 
 SCENES = Path(__file__).parents[1] / "scenes"
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -228,11 +228,20 @@ def keys(thing: type) -> str:
             [
                 ", ".join(f"`{name}`" for name in names),
                 kind.removesuffix(", optional").replace("|", r"\|"),
+                "; ".join(dict.fromkeys(allowed(thing, name) for name in names)),
                 meaning,
                 values[0] if len(set(values)) == 1 else ", ".join(values),
             ]
         )
-    return pipe_table(["key", "type", "meaning", "default"], rows)
+    return pipe_table(["key", "type", "allowed", "meaning", "default"], rows)
+
+
+def allowed(thing: type, name: str) -> str:
+    """What a field may be beyond its type, in the words of the message about another value."""
+    if found_in(annotations_of(thing)[name], Limits) is None:
+        return ""
+    wanted = rules_of(thing)[name].wanted
+    return re.sub(r"^(it must be |allowed: )(an? |one )?", "", wanted)
 
 
 def toml(value: object) -> str:

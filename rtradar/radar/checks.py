@@ -70,7 +70,7 @@ def _rules(r: Powers) -> Iterator[tuple[Any, str]]:
     yield from _receiver_rules(r)
     chirps = r.cycles_per_frame * r.n_tx
     yield (
-        isinstance(r.chirps_per_frame, FollowingCount | None) or r.chirps_per_frame == chirps,
+        isinstance(r.chirps_per_frame, FollowingCount) or r.chirps_per_frame == chirps,
         f"chirps_per_frame = {r.chirps_per_frame}; it must be a multiple of "
         f"{r.n_tx * r.n_doppler_bands}, the Tx{' times doppler_bands' * (r.n_doppler_bands > 1)}",
     )

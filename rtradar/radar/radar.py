@@ -144,11 +144,14 @@ class Radar(Powers):
     """
 
     def __post_init__(self) -> None:
+        given: object = self.chirps_per_frame
+        if given is None:
+            object.__setattr__(self, "chirps_per_frame", FollowingCount(1))
         check_fields(self, f"radar {brief(self.name)}: ")
         check_rules(self)
         following: dict[str, float] = {}
         whole = self.cycles_per_frame * self.n_tx
-        if isinstance(self.chirps_per_frame, FollowingCount | None):
+        if isinstance(self.chirps_per_frame, FollowingCount):
             following["chirps_per_frame"] = FollowingCount(whole)
         elif self.cycles_in_frame_duration * self.n_tx != whole:
             following["frame_duration_s"] = whole * self.chirp_interval_s

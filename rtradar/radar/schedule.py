@@ -33,7 +33,7 @@ class Schedule(Array):
     frame_duration_s: Annotated[float, positive()] = 0.1
     frame_hop_s: Annotated[float, positive()] = 0.025
     frame_period_s: Annotated[float | None, positive()] = None
-    chirps_per_frame: Annotated[int | None, Limits(1, MOST_CHIRPS)] = None
+    chirps_per_frame: Annotated[int, Limits(1, MOST_CHIRPS)] = None  # type: ignore[assignment]
     multiplexing: Literal["tdm", "fdm", "ddm", "bpm"] = "tdm"
     carrier_step_hz: Annotated[float | None, positive()] = None
     doppler_bands: Annotated[int | None, Limits(1, MOST)] = None
@@ -110,9 +110,9 @@ class Schedule(Array):
     def cycles_per_frame(self) -> int:
         """Number of whole cycles in one frame; a multiple of `n_doppler_bands` under DDM."""
         given = self.chirps_per_frame
-        if given is not None and not isinstance(given, FollowingCount):
-            return given // self.n_tx
-        return self.cycles_in_frame_duration
+        if isinstance(given, FollowingCount):
+            return self.cycles_in_frame_duration
+        return given // self.n_tx
 
     @property
     def cycles_in_frame_duration(self) -> int:
@@ -238,7 +238,7 @@ class Schedule(Array):
         """The radar without gaps between its frames, whose chirp n is at place n of `slots_of`."""
         if not self.in_frames:
             return self
-        return dataclasses.replace(self, frame_period_s=None)  # type: ignore[type-var]
+        return dataclasses.replace(self, frame_period_s=None)
 
     def _in_frame(
         self, numbers: NDArray[np.int64], *, cycles: bool = False

@@ -58,7 +58,31 @@ _SQUARE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wall:
+class Surface:
+    """Material and thickness of one side of a room.
+
+    Parameters
+    ----------
+    material : Material
+        Material of the whole slab.
+    thickness_m : float
+        Thickness [m].
+    roughness_m : float
+        Root mean square of the height of the faces about their planes [m].
+    openings : tuple of tuple of float
+        Doorways and other openings, each as (u, v, width, height) [m]: where it begins along both
+        edges, from the lower left corner seen from inside, those of the floor and the ceiling along
+        x and y, and its size along them.
+    """
+
+    material: _Material
+    thickness_m: _Thickness
+    roughness_m: _Roughness = 0.0
+    openings: _Openings = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wall(Surface):
     """A rectangular slab, given by its front face and its thickness.
 
     The front is the side to which ``edge_u_m x edge_v_m`` points: in a room the inside. The slab
@@ -93,10 +117,6 @@ class Wall:
     corner_m: Point
     edge_u_m: Point
     edge_v_m: Point
-    material: _Material
-    thickness_m: _Thickness
-    roughness_m: _Roughness = 0.0
-    openings: _Openings = ()
 
     def __post_init__(self) -> None:
         where = f"wall {brief(self.name)}"
@@ -215,29 +235,6 @@ class Wall:
         """
         depth = self.depth_m(points)
         return np.asarray((depth >= 0) & (depth <= self.thickness_m))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Surface:
-    """Material and thickness of one side of a room.
-
-    Parameters
-    ----------
-    material : Material
-        Material of the whole slab.
-    thickness_m : float
-        Thickness [m].
-    roughness_m : float
-        Root mean square of the height of the faces about their planes [m].
-    openings : tuple of tuple of float
-        Openings, as those of a `Wall`: from the lower left corner, seen from inside; those of the
-        floor and the ceiling along x and y.
-    """
-
-    material: _Material
-    thickness_m: _Thickness
-    roughness_m: _Roughness = 0.0
-    openings: _Openings = ()
 
 
 def room_walls(

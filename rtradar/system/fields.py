@@ -105,7 +105,7 @@ def annotations_of(kind: type) -> dict[str, Any]:
         try:
             return hints_of(kind, localns=unknown, include_extras=True)
         except NameError as error:  # a class that is imported for checkers of types alone
-            unknown[error.name] = Any
+            unknown[str(error.name)] = Any
 
 
 def check_fields(thing: Any, where: str = "") -> None:
@@ -113,7 +113,8 @@ def check_fields(thing: Any, where: str = "") -> None:
 
     ``where`` begins the message of an `InputError`, which names the field and what is allowed.
     """
-    for key, rule in rules_of(type(thing)).items():
+    kind: type = type(thing)
+    for key, rule in rules_of(kind).items():
         object.__setattr__(thing, key, rule.check(where, key, getattr(thing, key)))
 
 
@@ -198,7 +199,7 @@ def _rule(hint: Any, limits: Limits | None = None) -> Rule:
             ),
             "it must be a string of one line, not empty",
         )
-    elif dataclasses.is_dataclass(own):
+    elif isinstance(own, type) and dataclasses.is_dataclass(own):
         found = _table_of(own)
     else:
         found = _where(
