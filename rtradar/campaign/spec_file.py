@@ -214,7 +214,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         or (0.0, 0.0)
         for key, (usual, least, most) in DRAWN.items()
     }
-    switches = {
+    switches: dict[str, Any] = {
         key: bool(wrong.of(read_value, bool, "", key, table.get(key, usual)))
         for key, usual in _YES_OR_NO.items()
     }
@@ -282,7 +282,7 @@ def _augmented(table: Table) -> Augmented | None:
 
 def _run_settings(table: Table) -> RunSettings:
     wrong, hints = Complaints(), annotations_of(RunSettings)
-    given = {}
+    given: dict[str, Any] = {}
     for key in ("seed", *RUN_KEYS):
         if key in table:
             hint = _PFA if key == "pfa" else hints[key]

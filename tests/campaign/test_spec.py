@@ -393,7 +393,7 @@ def test_the_whole_is_understood(tmp_path: Path) -> None:
     assert len(_spec(WHOLE, tmp_path).actors) == 2
 
 
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(way=st.sampled_from(places(WHOLE)), value=junk)
 def test_whatever_stands_where_a_value_should_gets_one_line_or_is_one(
     tmp_path: Path, way: tuple[Any, ...], value: object

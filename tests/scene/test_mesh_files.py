@@ -334,7 +334,7 @@ def test_a_glb_with_a_broken_header(tmp_path: Path, accessors: Any) -> None:
 
 
 @settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None
 )
 @given(data=st.data())
 def test_damaged_files_give_a_mesh_or_one_line(tmp_path: Path, data: st.DataObject) -> None:

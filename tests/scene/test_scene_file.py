@@ -311,7 +311,7 @@ def _only_input_errors(folder: Path, content: bytes) -> None:
 
 
 @settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150
+    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=80
 )
 @given(table=_SCENES)
 def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, table: dict[str, Any]) -> None:
@@ -320,7 +320,7 @@ def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, table: dict[str, An
 
 
 @settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=100
+    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=50
 )
 @given(data=st.data())
 def test_any_damage_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
