@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -283,16 +282,11 @@ class Object(Furniture):
     ] = None
 
     _kind: ClassVar[str] = "object"
+    _meshes: ClassVar[str] = "a name, a file, or a trimesh.Trimesh"
 
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
             object.__setattr__(self, "material", material(self.material))
-        lengths = isinstance(self.mesh, list | tuple) and len(self.mesh) == 3
-        if not (self._is_mesh or lengths or isinstance(self.mesh, str | Path)):
-            raise InputError(
-                f"object {brief(self.name)}: mesh = {brief(self.mesh)}; it must be a name, a file, "
-                "or a trimesh.Trimesh"
-            )
         super().__post_init__()
 
     @property

@@ -320,6 +320,7 @@ class Furniture:
     sheet: bool = False
 
     _kind: ClassVar[str] = "furniture"
+    _meshes: ClassVar[str] = "a name or a file"
 
     def __post_init__(self) -> None:
         where = self._where
@@ -328,7 +329,7 @@ class Furniture:
             lengths = read_value(BOX, f"{where}: ", "box", self.mesh)
             object.__setattr__(self, "mesh", lengths)
         if not self._settled and not isinstance(self.mesh, str | Path):
-            raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be a name or a file")
+            raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be {self._meshes}")
         if self._built_in and self.mesh not in mesh_names():
             raise InputError(
                 f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "

@@ -67,7 +67,7 @@ def test_a_mesh_in_memory_is_a_closed_body_or_a_sheet_by_itself() -> None:
     [
         (lambda: rt.Turning(axis=(0, 0, 0)), "it must have a direction"),
         (lambda: rt.Turning(axis=(1e-300, 0, 0)), "it must have a direction"),
-        (lambda: rt.Object("a", [1], "metal"), r"mesh = \[1\]; .* or a trimesh.Trimesh"),
+        (lambda: rt.Object("a", 1, "metal"), "mesh = 1; .* or a trimesh.Trimesh"),
         (lambda: rt.Swinging(period_s=0), "period_s"),
         (lambda: rt.FollowingPath(), "give velocity_mps, or points_m"),
         (
