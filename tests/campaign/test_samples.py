@@ -250,7 +250,7 @@ def test_settings_of_a_run_reach_the_sample_and_change_ids_where_they_are_not_th
     )
     assert plain.identity == same.identity != changed.identity
     settings = changed.run_settings()
-    assert (settings.range_window, settings.doppler_window) == (["chebwin", 80.0], usual)
+    assert (settings.range_window, settings.doppler_window) == (("chebwin", 80.0), usual)
     assert (settings.detector, settings.keep_all, settings.variant) == ("ca-cfar", True, "cpu")
     assert settings.snr_db == changed.parameters["snr_db"]
     assert settings.seed == changed.parameters["seed"]
