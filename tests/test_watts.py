@@ -136,7 +136,7 @@ def test_a_run_by_watts(tmp_path: Path) -> None:
         ({"transmit_power_dbm": None}, {}, "does not state transmit_power_dbm"),
         ({"noise_figure_db": None}, {}, "does not state noise_figure_db"),
         ({}, {"spreading": False}, "needs the loss with distance"),
-        ({}, {"snr_db": "best"}, "a number of decibels, inf, or physical"),
+        ({}, {"snr_db": "best"}, "a number of decibels .* inf or physical"),
     ],
 )
 def test_what_is_missing_is_said_before_the_work(
@@ -154,14 +154,8 @@ def test_what_is_missing_is_said_before_the_work(
 
 
 @pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("transmit_power_dbm", 1e3),
-        ("noise_figure_db", -1.0),
-        ("noise_temperature_k", None),
-        ("noise_figure_db", "a"),
-    ],
+    ("field", "value"), [("transmit_power_dbm", 1e3), ("noise_temperature_k", None)]
 )
 def test_powers_without_meaning(field: str, value: object) -> None:
-    with pytest.raises(rt.InputError, match=f"{field} = .*must lie between"):
+    with pytest.raises(rt.InputError, match=f"{field} = .*it must be a number from"):
         rt.Radar(**{field: value})

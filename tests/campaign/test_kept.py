@@ -199,7 +199,7 @@ def test_without_clouds_what_is_kept_is_the_same(here: None, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("angles = 1\n" + SPEC, "angles = 1; allowed: true, false"),
+        ("angles = 1\n" + SPEC, "angles = 1; it must be true or false"),
         ("angles = false\n" + KEEP + SPEC, "angles = false, and keep has range_azimuth; leave one"),
         (
             'keep = ["pictures"]\n' + SPEC,
