@@ -25,7 +25,7 @@ from rtradar.classify.recipes import RECIPES
 from rtradar.cli.parser import parser as whole_parser
 from rtradar.errors import InputError
 from rtradar.scene import MATERIALS
-from rtradar.scene.scene import KEYS
+from rtradar.scene.tables import KEYS
 from rtradar.settings import RunSettings
 from rtradar.system.registries import ACTIVITY_NAMES, DETECTORS, MODELS, RADARS, scene_files
 from rtradar.validate.claims import claims

@@ -37,7 +37,7 @@ from rtradar.scene import (
     room_walls,
 )
 from rtradar.scene.materials import PowerLaw
-from rtradar.scene.scene import KEYS
+from rtradar.scene.tables import KEYS
 from rtradar.settings import RunSettings
 from rtradar.system.fields import Limits, annotations_of, found_in, rules_of
 

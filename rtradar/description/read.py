@@ -12,8 +12,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene import Scene
-from rtradar.scene.people import people_of
-from rtradar.scene.scene import files_of, rooted
+from rtradar.scene.tables import files_of, people_of, rooted
 from rtradar.settings import RunSettings
 from rtradar.system.checks import Table, brief, check_keys, printable, table_at, tables_at
 from rtradar.system.fields import read_table

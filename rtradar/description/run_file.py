@@ -16,7 +16,7 @@ from rtradar.motion import Motion
 from rtradar.motion.formats.saved import load_saved, save_motion
 from rtradar.motion.synthetic import ACTORS
 from rtradar.recordings import SYNTHETIC
-from rtradar.scene.scene import files_of
+from rtradar.scene.tables import files_of
 from rtradar.system.checks import Table, brief, check_keys, read_toml, tables_at
 from rtradar.system.fields import read_value
 from rtradar.system.files import digest_of

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import copy
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
@@ -17,69 +16,20 @@ from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
 from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar import Radar
 from rtradar.radar.array import UsualPlace
-from rtradar.recordings import SYNTHETIC
-from rtradar.scene import display, people
-from rtradar.scene.materials import MATERIALS, Material, own_material
-from rtradar.scene.moving import Object, motion_of
-from rtradar.scene.objects import BOX, ROOM_SIDES, Furniture, Surface, Wall, room_walls
-from rtradar.scene.random_rooms import (
-    FURNITURE,
-    HEIGHT_M,
-    LENGTH_M,
-    RANDOM,
-    WIDTH_M,
-    random_room,
-)
-from rtradar.system.checks import (
-    Table,
-    Vector,
-    brief,
-    check_keys,
-    inside,
-    printable,
-    table_at,
-    tables_at,
-)
-from rtradar.system.fields import (
-    Angle,
-    Limits,
-    MaybeEmpty,
-    Point,
-    check_fields,
-    keys_of,
-    read_value,
-)
+from rtradar.scene import display
+from rtradar.scene.materials import Material
+from rtradar.scene.moving import Object
+from rtradar.scene.objects import ROOM_SIDES, Furniture, Wall
+from rtradar.scene.random_rooms import FURNITURE, HEIGHT_M, LENGTH_M, WIDTH_M
+from rtradar.scene.tables import ANGLES, drawn, fields_of, rooted
+from rtradar.system.checks import Table, Vector, brief, printable
+from rtradar.system.fields import Angle, Limits, MaybeEmpty, Point, check_fields
 from rtradar.system.registries import RANDOM_SCENE, scene_table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rtradar.body import Person
-
-Piece = TypeVar("Piece", Wall, Furniture, Object)
-
-_ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
-
-
-def _of_mesh(kind: type, *needed: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    own, others = keys_of(kind, without=("mesh", *needed))
-    return (*own, *needed), ("mesh", "box", *others)
-
-
-KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "top": ((), ("name", "description")),
-    "[random]": (("seed",), tuple(RANDOM)),
-    "[radar]": ((), ("position_m", *_ANGLES)),
-    "[person]": ((), ("position_m", "heading_deg")),
-    "[room]": (("size_m", "corner_m"), ()),
-    "a side of a room": keys_of(Surface),
-    "[[walls]]": keys_of(Wall),
-    "[[furniture]]": _of_mesh(Furniture),
-    "[[objects]]": _of_mesh(Object, "motion"),
-    "[[people]]": (("motion",), tuple(people.KEYS.split())),
-    "[materials.NAME]": (("source", "low_hz", "high_hz", "a"), ("b", "c", "d")),
-}
-"""Keys of each table of a scene file: those that must be given, and the others."""
 
 
 def _tuple_of(kind: str) -> Limits:
@@ -234,8 +184,8 @@ class Scene:
         InputError
             Where anything in it has no meaning.
         """
-        table = _drawn(table)
-        scene = cls(**_fields(table))
+        table = drawn(table)
+        scene = cls(**fields_of(table))
         for piece in (*scene.furniture, *scene.objects):
             piece.triangles()  # refuses a mesh that cannot be used
         object.__setattr__(scene, "source", table)
@@ -282,9 +232,9 @@ class Scene:
         >>> room.name, len(room.furniture)
         ('random:7', 3)
         """
-        drawn = {"seed": seed, "furniture": furniture, "length_m": length_m, "width_m": width_m}
-        drawn["height_m"] = height_m
-        return cls.of_table({"name": f"{RANDOM_SCENE}{seed}", "random": drawn})
+        asked = {"seed": seed, "furniture": furniture, "length_m": length_m, "width_m": width_m}
+        asked["height_m"] = height_m
+        return cls.of_table({"name": f"{RANDOM_SCENE}{seed}", "random": asked})
 
     def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the plan: walls with their materials, furniture, reflectors, radar and person.
@@ -410,7 +360,7 @@ class Scene:
         -------
         Radar
         """
-        given = {key: getattr(self, f"radar_{key}") for key in _ANGLES}
+        given = {key: getattr(self, f"radar_{key}") for key in ANGLES}
         given = {
             key: value
             for key, value in given.items()
@@ -436,135 +386,3 @@ class Scene:
         corners = np.concatenate(sides)
         low, high = corners.min(axis=0), corners.max(axis=0)
         return bool((np.asarray(place) < low).any() or (np.asarray(place) > high).any())
-
-
-def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Yield where a table of a scene names files, under which key, and the table of that key."""
-    for list_, keys in (("furniture", ("mesh",)), ("objects", ("mesh",)), ("people", _FILES)):
-        for where, entry in tables_at(list_, table):
-            for key in keys:
-                text = entry.get(key)
-                named = isinstance(text, str) and (key != "mesh" or Path(text).suffix)
-                if named and not str(text).startswith(SYNTHETIC) and isinstance(entry, dict):
-                    yield where, key, entry
-
-
-def rooted(table: Table, folder: Path) -> Table:
-    """Return the table of a scene file with absolute paths of files, which must be in its folder.
-
-    Or below: a scene may come from a stranger, and must not open files anywhere else.
-    """
-    table = copy.deepcopy(_drawn(table))
-    for where, key, entry in files_of(table):
-        if inside(folder, entry[key]) is None:
-            raise InputError(
-                f"{where}{key} = {brief(entry[key])} leaves the folder of the scene file; put the "
-                f"{'mesh' if key == 'mesh' else 'recording'} beside it or below"
-            )
-        entry[key] = str((folder / entry[key]).absolute())
-    return table
-
-
-def _drawn(table: Table) -> Table:
-    """Return a table with the room that its key ``random`` asks for; other keys replace its own."""
-    if "random" not in table:
-        return table
-    rest = {key: value for key, value in table.items() if key != "random"}
-    return {**random_room(table_at("random", table)), **rest}
-
-
-_FILES = ("motion", "skeleton")
-
-
-def _fields(table: Table) -> dict[str, Any]:
-    """Turn the table of a file into the fields of a `Scene`."""
-    texts = KEYS["top"][1]
-    tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects", "people")
-    check_keys("", table, (), (*texts, *tables))
-    materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
-    room = _room(table["room"], materials) if "room" in table else ()
-    fields: dict[str, Any] = {
-        **{key: table[key] for key in texts if key in table},
-        "walls": (*room, *_pieces("walls", Wall, table, materials)),
-        "furniture": _pieces("furniture", Furniture, table, materials),
-        "objects": _pieces("objects", Object, table, materials),
-        "people": people.people_of(table),
-    }
-    if "radar" in table:
-        radar = table_at("radar", table)
-        if not radar.keys() & {*_ANGLES}:
-            check_keys("[radar] ", radar, ("position_m",), _ANGLES)
-        check_keys("[radar] ", radar, *KEYS["[radar]"])
-        fields |= {f"radar_{key}": value for key, value in radar.items()}
-    if "person" in table:
-        person = table_at("person", table)
-        check_keys("[person] ", person, *KEYS["[person]"])
-        for key, value in person.items():
-            fields["person_position_m" if key == "position_m" else key] = value
-    return fields
-
-
-def _own_materials(table: Table) -> dict[str, Material]:
-    found = {}
-    for name in table:
-        read_value(str, "[materials] ", "a name", name)
-        constants = table_at(name, table, "materials.")
-        check_keys(f"[materials.{name}] ", constants, *KEYS["[materials.NAME]"])
-        found[name] = own_material(name, **constants)
-    return found
-
-
-def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
-    if not isinstance(table, dict):
-        raise InputError(f"room = {brief(table)}; it must be a table: [room]")
-    check_keys("[room] ", table, KEYS["[room]"][0], ("walls", *ROOM_SIDES))
-    surfaces = {}
-    for side in ROOM_SIDES:
-        key = side if side in table or side in ("floor", "ceiling") else "walls"
-        if key not in table:
-            wanted = (
-                f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
-            )
-            raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
-        surface = table_at(key, table, "room.")
-        check_keys(f"[room.{key}] ", surface, *KEYS["a side of a room"])
-        chosen = _material(f"[room.{key}] ", surface["material"], materials)
-        surfaces[side] = Surface(**{**surface, "material": chosen})
-    return room_walls(table["size_m"], table["corner_m"], surfaces)
-
-
-def _pieces(
-    key: str, kind: type[Piece], table: Table, materials: Mapping[str, Material]
-) -> tuple[Piece, ...]:
-    found = []
-    for where, entry in tables_at(key, table):
-        check_keys(where, entry, *KEYS[f"[[{key}]]"])
-        own: dict[str, Any] = {}
-        if kind is not Wall:
-            own["mesh"] = _shape(where, entry)
-            entry = {name: value for name, value in entry.items() if name != "box"}
-        chosen = _material(where, entry["material"], materials)
-        with prefixed(where):
-            if "motion" in entry:
-                own["motion"] = motion_of(entry["motion"])
-            found.append(kind(**{**entry, **own, "material": chosen}))
-    return tuple(found)
-
-
-def _shape(where: str, entry: Table) -> Any:
-    """Return the mesh of an entry, or the lengths of its box."""
-    if ("mesh" in entry) == ("box" in entry):
-        raise InputError(f"{where}give a mesh, or box = [x, y, z] in metres, one of them")
-    if "mesh" in entry:
-        return read_value(str, where, "mesh", entry["mesh"])
-    return read_value(BOX, where, "box", entry["box"])
-
-
-def _material(where: str, value: object, materials: Mapping[str, Material]) -> Material:
-    if not isinstance(value, str) or value not in materials:
-        allowed = ", ".join(sorted(materials))
-        raise InputError(
-            f"{where}material = {brief(value)} is unknown; allowed: {allowed}, or a table "
-            "[materials.NAME] of your own"
-        )
-    return materials[value]
