@@ -15,8 +15,8 @@ import pytest
 import rtradar as rt
 from rtradar.classify.recipes import RECIPES
 from rtradar.classify.splits import SCHEMES
-from rtradar.cli.listing import KINDS as LISTED
 from rtradar.cli.parser import parser
+from rtradar.cli.showing import KINDS as LISTED
 from rtradar.clouds.arrays import KINDS
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import models_that
