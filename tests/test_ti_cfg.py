@@ -92,16 +92,16 @@ def test_what_is_off_is_left_out(tmp_path: Path) -> None:
     assert radar.tx_positions_m == (board.tx_positions_m[0], board.tx_positions_m[2])
     assert (radar.tx_order, radar.chirps_per_frame) == ((0, 1), 32)
     assert radar.transmit_power_dbm == board.transmit_power_dbm - 3
-    assert read_ti_cfg(file, preset=Radar.preset).rx_mask == 10
+    assert read_ti_cfg(file).rx_mask == 10
 
 
 def test_real_samples_are_half_as_many_complex_ones(tmp_path: Path) -> None:
     file = write(tmp_path, ("adcCfg 2 1", "adcCfg 2 0"))
-    said = read_ti_cfg(file, preset=Radar.preset)
+    said = read_ti_cfg(file)
     assert said.real
     assert not said.q_first
     assert (said.radar.samples_per_chirp, said.radar.sample_rate_hz) == (120, 2.442e6)
-    assert read_ti_cfg(write(tmp_path), preset=Radar.preset).q_first
+    assert read_ti_cfg(write(tmp_path)).q_first
 
 
 def test_the_file_of_an_awr2944_has_the_samples_before_the_period(tmp_path: Path) -> None:

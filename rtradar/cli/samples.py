@@ -53,7 +53,7 @@ def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca100
     if options.radar is None or not options.radar.endswith(".cfg"):
         radar = None if options.radar is None else Radar.load(options.radar, board=options.board)
         return radar, layout
-    said = read_ti_cfg(options.radar, getattr(options, "board", None), preset=Radar.preset)
+    said = read_ti_cfg(options.radar, getattr(options, "board", None))
     if layout is None and not options.samples.with_suffix(".json").exists():
         layout = Dca1000Layout(real=said.real, q_first=said.q_first, rx_mask=said.rx_mask)
     return said.radar, layout

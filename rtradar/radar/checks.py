@@ -13,14 +13,14 @@ from rtradar.radar.schedule import FollowingCount
 from rtradar.system.checks import brief
 
 if TYPE_CHECKING:
-    from rtradar.radar.powers import Powers
+    from rtradar.radar.radar import Radar
 
 _MOST_SAMPLES = 16384  # of a chirp: four times as many as the chips of the boards take
 _MOST_BEAM_TERMS = 8e6  # four times those of an imaging radar of 12 Tx and 16 Rx
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
 
 
-def _rules(r: Powers) -> Iterator[tuple[Any, str]]:
+def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     """Yield whether fields fit each other, and the complaint where they do not, one by one."""
     yield (
         r.n_tx and (r.rx_positions_m or r.rx_y + r.rx_z),
@@ -89,7 +89,7 @@ def _rules(r: Powers) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _beam_terms(r: Powers) -> float:
+def _beam_terms(r: Radar) -> float:
     """Beams of a grid four times as fine as the array resolves, times its elements."""
     if r.tx_positions_m is None or r.rx_positions_m is None:
         return 0.0
@@ -99,7 +99,7 @@ def _beam_terms(r: Powers) -> float:
     return float(np.prod(np.where(size > 0, 8 * size + 3, 1)) * len(places[0]) * len(places[1]))
 
 
-def _path_rules(r: Powers) -> Iterator[tuple[Any, str]]:
+def _path_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     """Yield the rules of a radar that moves, as `_rules` does."""
     path = tuple(own for own in (r.path_m, r.path_angles_deg) if own is not None)
     yield (
@@ -117,7 +117,7 @@ def _path_rules(r: Powers) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _multiplexing_rules(r: Powers) -> Iterator[tuple[Any, str]]:
+def _multiplexing_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     """Yield the rules that fit the Tx to how they are told apart, as `_rules` does."""
     yield (
         r.carrier_step_hz is None or r.multiplexing == "fdm",
@@ -154,7 +154,7 @@ def _multiplexing_rules(r: Powers) -> Iterator[tuple[Any, str]]:
     )
 
 
-def _receiver_rules(r: Powers) -> Iterator[tuple[Any, str]]:
+def _receiver_rules(r: Radar) -> Iterator[tuple[Any, str]]:
     """Yield the rules that fit a receiver to its radar, as `_rules` does."""
     if r.receiver is None:
         return
@@ -181,7 +181,7 @@ def _receiver_rules(r: Powers) -> Iterator[tuple[Any, str]]:
         )
 
 
-def check_rules(radar: Powers) -> None:
+def check_rules(radar: Radar) -> None:
     """Refuse a radar whose fields do not fit each other, by the first rule that fails."""
     for holds, complaint in _rules(radar):
         if not holds:

@@ -9,10 +9,10 @@ from rtradar.antenna import Antenna
 from rtradar.cards import quantity
 
 if TYPE_CHECKING:
-    from rtradar.radar.powers import Powers
+    from rtradar.radar.radar import Radar
 
 
-def brief_rows(radar: Powers) -> dict[str, str]:
+def brief_rows(radar: Radar) -> dict[str, str]:
     """Return the rows of a radar's ``repr``."""
     settings, limits = settings_rows(radar), limit_rows(radar)
     rows = {label.lower(): settings[label] for label in ("Sweep", "Chirp", "Channels", "Frame")}
@@ -27,7 +27,7 @@ def brief_rows(radar: Powers) -> dict[str, str]:
     return rows
 
 
-def settings_rows(radar: Powers) -> dict[str, str]:
+def settings_rows(radar: Radar) -> dict[str, str]:
     """Return what was set, as texts with units by their labels."""
     stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
     stated = {
@@ -68,7 +68,7 @@ def settings_rows(radar: Powers) -> dict[str, str]:
     }
 
 
-def limit_rows(radar: Powers) -> dict[str, str]:
+def limit_rows(radar: Radar) -> dict[str, str]:
     """Return the limits that follow from the settings, as texts with units by their labels."""
     axes = " and ".join(measured_angles(radar))
     beam, most = f"{radar.angle_resolution_deg:.3g}°", f"±{radar.max_angle_deg:.3g}° in {axes}"
@@ -96,14 +96,14 @@ def limit_rows(radar: Powers) -> dict[str, str]:
     }
 
 
-def _turn(radar: Powers) -> str:
+def _turn(radar: Radar) -> str:
     """Say where the radar looks, and that it moves."""
     turns = {"yaw": radar.yaw_deg, "pitch": radar.pitch_deg, "roll": radar.roll_deg}
     said = ", ".join(f"{name} {angle:g}°" for name, angle in turns.items() if angle)
     return (said or "boresight +x") + (", moving" if radar.is_moving else "")
 
 
-def _grating_lobes(radar: Powers) -> str:
+def _grating_lobes(radar: Radar) -> str:
     """Say how far from an echo, in sines, its first grating lobe is, and how high."""
     names = zip(("azimuth", "elevation"), radar.patterns, strict=True)
     return ", ".join(
@@ -113,7 +113,7 @@ def _grating_lobes(radar: Powers) -> str:
     )
 
 
-def measured_angles(radar: Powers) -> tuple[str, ...]:
+def measured_angles(radar: Radar) -> tuple[str, ...]:
     """Which of ``azimuth`` and ``elevation`` the radar measures, by two channels on a line.
 
     Without a line along z, azimuth is the cone angle asin(y / r).
@@ -131,7 +131,7 @@ def measured_angles(radar: Powers) -> tuple[str, ...]:
     return tuple(name for name, measured in names if measured)
 
 
-def _line(radar: Powers, n_y: int, n_z: int, spacing_wavelengths: float) -> str:
+def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:
     lines = [f"{count} along {axis}" for axis, count in (("y", n_y), ("z", n_z)) if count]
     apart = quantity(spacing_wavelengths * radar.start_wavelength_m, "m")
     return f"{' and '.join(lines)}, {apart} apart" if max(n_y, n_z) > 1 else " and ".join(lines)

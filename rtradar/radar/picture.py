@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
 from rtradar.radar.display import limit_rows, measured_angles
-from rtradar.radar.powers import Powers
+from rtradar.radar.radar import Radar
 from rtradar.system.figure_style import (
     STYLE,
     axes_given,
@@ -20,7 +20,7 @@ from rtradar.system.figure_style import (
 )
 
 
-def plot_radar(radar: Powers, ax: Axes | None) -> Axes:
+def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
     """Draw the array of a radar, and beside it the limits, as `Radar.plot` does."""
     _, ax = axes_given(None, ax)
     if ax is not None:
@@ -34,7 +34,7 @@ def plot_radar(radar: Powers, ax: Axes | None) -> Axes:
     return array
 
 
-def _draw_array(radar: Powers, axes: Axes, title: str) -> None:
+def _draw_array(radar: Radar, axes: Axes, title: str) -> None:
     theme = theme_of(axes)
     tx, rx = (1e3 * places[:, 1:] for places in (radar.tx_m, radar.rx_m))
     kept = np.unique(radar.rx_of_tx)
@@ -59,7 +59,7 @@ def _draw_array(radar: Powers, axes: Axes, title: str) -> None:
     dress(axes, title=title)
 
 
-def _draw_limits(radar: Powers, axes: Axes) -> None:
+def _draw_limits(radar: Radar, axes: Axes) -> None:
     theme, rows = theme_of(axes), limit_rows(radar)
     fastest, farthest = radar.max_velocity_mps, radar.max_range_m
     colour = theme.cycle[0]

@@ -8,20 +8,23 @@ file with the fields of `Radar` as its keys needs no code.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
+from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError, prefixed
 from rtradar.radar import display
 from rtradar.radar.checks import check_rules
-from rtradar.radar.powers import Powers
-from rtradar.radar.schedule import FollowingCount
+from rtradar.radar.schedule import FollowingCount, Schedule
+from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, printable
-from rtradar.system.fields import check_fields
+from rtradar.system.fields import Limits, MaybeEmpty, check_fields
 from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table
 
 if TYPE_CHECKING:
@@ -34,7 +37,7 @@ register_radar = PRESETS.register
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Radar(Powers):
+class Radar(Schedule):
     r"""A MIMO FMCW radar with a cross of two linear arrays, or antennas anywhere.
 
     Antennas of a cross are numbered along the y-line first, then along the z-line; the index rises
@@ -142,6 +145,15 @@ class Radar(Powers):
     >>> rt.Radar(name="own", tx_z=0, rx_z=0, bandwidth_hz=1e9).n_channels
     48
     """
+
+    name: MaybeEmpty = "custom"
+    polarization: Literal["v", "h"] = "v"
+    transmit_power_dbm: Annotated[float | None, Limits(-200, 200)] = None
+    noise_figure_db: Annotated[float | None, Limits(0, 100)] = None
+    noise_temperature_k: Annotated[float, Limits(0, 1e6)] = 290.0
+    tx_antenna: Antenna | None = None
+    rx_antenna: Antenna | None = None
+    receiver: Receiver | None = None
 
     def __post_init__(self) -> None:
         given: object = self.chirps_per_frame
@@ -290,7 +302,7 @@ class Radar(Powers):
         """
         from rtradar.radar.ti_cfg import read_ti_cfg
 
-        return read_ti_cfg(path, board, preset=cls.preset).radar
+        return read_ti_cfg(path, board).radar
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the array, and beside it the ranges and velocities that it can measure.
@@ -317,6 +329,38 @@ class Radar(Powers):
         from rtradar.radar.picture import plot_radar
 
         return plot_radar(self, ax)
+
+    @property
+    def watts_per_m2(self) -> float:
+        r"""Received power [W] of an echo with \|amplitude\|^2 = 1 m^2.
+
+        P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest. An `InputError` is raised where
+        the radar does not state its transmit power.
+        """
+        power_dbm = self._stated("transmit_power_dbm", "powers in watts are not known")
+        antennas = (self.tx_antenna, self.rx_antenna)
+        gains = math.prod(antenna.peak_gain for antenna in antennas if antenna is not None)
+        power_w = 1e-3 * 10 ** (power_dbm / 10)
+        return float(power_w * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
+
+    @property
+    def noise_power_w(self) -> float:
+        """Noise power of one complex IF sample, K (T + 290 K (F - 1)) B [W].
+
+        T is the `noise_temperature_k` of what the antennas see, F the noise factor, which is
+        defined for a source at 290 K, and B the sample rate. An `InputError` is raised where the
+        radar does not state its noise figure.
+        """
+        figure_db = self._stated("noise_figure_db", "its noise is not known")
+        receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (figure_db / 10) - 1)
+        noise_k = self.noise_temperature_k + receiver_k
+        return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
+
+    def _stated(self, field: str, otherwise: str) -> float:
+        value: float | None = getattr(self, field)
+        if value is None:
+            raise InputError(f"radar '{self.name}' does not state {field}, so {otherwise}; give it")
+        return value
 
     def at(self, time_s: float) -> Radar:
         """Return the radar at rest where it is at some time, itself if it does not move.

@@ -12,17 +12,15 @@ import math
 import re
 import tomllib
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Literal, NamedTuple, NoReturn, TypeVar
+from typing import Any, Literal, NamedTuple, NoReturn
 
 from rtradar.errors import InputError, ValidityWarning, prefixed
-from rtradar.radar.powers import Powers
+from rtradar.radar.radar import Radar
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import read_bytes
-
-_Radar = TypeVar("_Radar")
 
 _MOST_BYTES, _MOST_CHIRPS = 1_000_000, 512
 
@@ -67,22 +65,20 @@ class _Line(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TiProfile(Generic[_Radar]):
+class TiProfile:
     """What a configuration file says: the radar, and how its samples leave the chip.
 
     ``real``, ``q_first`` and ``rx_mask`` are those of `rtradar.exchange.Dca1000Layout`.
     """
 
-    radar: _Radar
+    radar: Radar
     real: bool
     q_first: bool
     rx_mask: int
 
 
-def read_ti_cfg(
-    path: str | Path, board: str | None = None, *, preset: Callable[[str], _Radar]
-) -> TiProfile[_Radar]:
-    """Read a configuration file; see `Radar.from_ti_cfg`. A board is made by ``preset``."""
+def read_ti_cfg(path: str | Path, board: str | None = None) -> TiProfile:
+    """Read a configuration file; see `Radar.from_ti_cfg`."""
     path = Path(path)
     with prefixed(f"profile '{path}': "):
         commands, platform = _commands(path)
@@ -91,7 +87,7 @@ def read_ti_cfg(
             if command not in commands:
                 raise InputError(f"it has no {command}; it must say it")
         read = _read_low_power if low_power else _read
-        return read(path, commands, platform, board, preset)
+        return read(path, commands, platform, board)
 
 
 def _warn(path: Path, text: str) -> None:
@@ -103,8 +99,7 @@ def _read(
     commands: dict[str, list[_Line]],
     platform: str | None,
     board: str | None,
-    preset: Callable[[str], Any],
-) -> TiProfile[Any]:
+) -> TiProfile:
     """Read the commands of the mmWave SDK."""
     mode = commands.get("dfeDataOutputMode", [])
     if mode and mode[-1].values[0] != 1:
@@ -112,7 +107,7 @@ def _read(
     frame, channels, adc = (commands[one][-1] for one in ("frameCfg", "channelCfg", "adcCfg"))
     sequence = _sequence(path, commands, frame, channels)
     order, profile = sequence.order, sequence.profile
-    base = preset(board or _board(path, commands, platform, profile.values[1]))
+    base = Radar.preset(board or _board(path, commands, platform, profile.values[1]))
     most_tx, most_rx = base.n_tx, base.n_rx
     rx_mask = channels.whole(0, 1, 2**most_rx - 1, "the mask of Rx")
     if max(order) >= most_tx:
@@ -154,14 +149,13 @@ def _read_low_power(
     commands: dict[str, list[_Line]],
     platform: str | None,
     board: str | None,
-    preset: Callable[[str], Any],
-) -> TiProfile[Any]:
+) -> TiProfile:
     """Read the commands of the low-power chips (xWRL), whose samples are real."""
     common, timing, frame, channels = (commands[one][-1] for one in _NEEDED_LOW_POWER)
     name = (platform or "").lower()
     if len(frame.values) != 6:
         frame.refuse(f"frameCfg of a low-power chip has {len(frame.values)} values, not 6")
-    base = preset(board or _BOARDS.get(name, "iwrl6432"))
+    base = Radar.preset(board or _BOARDS.get(name, "iwrl6432"))
     large = "684" in name
     tx_places, rx_places = base.tx_positions_m, base.rx_positions_m
     if "antGeometryCfg" in commands:
@@ -247,7 +241,7 @@ def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places
     return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
 
 
-def _pose(commands: dict[str, list[_Line]], base: Powers) -> dict[str, Any]:
+def _pose(commands: dict[str, list[_Line]], base: Radar) -> dict[str, Any]:
     """Height and tilt of the sensor where a file says them; beneath a ceiling it is above x = 0."""
     if "sensorPosition" not in commands:
         return {}
@@ -436,7 +430,7 @@ def _board(
     return board
 
 
-def _power(board: Powers, profile: _Line, tx: Sequence[int]) -> float | None:
+def _power(board: Radar, profile: _Line, tx: Sequence[int]) -> float | None:
     """Transmit power less the back-off, which has a byte for each Tx [dBm]."""
     code = profile.whole(5, 0, 2**32 - 1, "the power back-off")
     backoff_db = {code >> 8 * one & 0xFF for one in tx}
