@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -11,12 +14,14 @@ from rtradar.campaign.augmentation import Augmented
 from rtradar.campaign.intervals import Intervals
 from rtradar.campaign.kept import sizes
 from rtradar.conventions import PERSON_LIMITS
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.process import measured_angles
 from rtradar.radar import Radar
+from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.system.fields import Limits, check_fields, within
+from rtradar.system.checks import Complaints, Table, brief, inside
+from rtradar.system.fields import Limits, check_fields, read_value, within
 from rtradar.system.registries import ACTIVITY_NAMES
 
 DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
@@ -30,6 +35,24 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "height_m": ((1.55, 1.95), 0.8, 2.5),
 }
 """Quantities drawn at random: default range, smallest and largest allowed value."""
+
+EACH: Mapping[str, list[Any]] = {
+    "radar": ["paper-12ghz"],
+    "scene": ["free-space"],
+    "fidelity": ["specular"],
+    "heading_deg": [None],
+    "snr_db": [None],
+    "person_position_m": [None],
+    "radar_position_m": [None],
+}
+"""Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
+
+_NUMBERS: Mapping[str, Any] = {
+    "heading_deg": Annotated[float, Limits(*DRAWN["heading_deg"][1:])],
+    "snr_db": Annotated[float, Limits(*DRAWN["snr_db"][1:])],
+    "person_position_m": Annotated[tuple[float, float], Limits(-100, 100)],
+    "radar_position_m": Annotated[tuple[float, float, float], Limits(-100, 100)],
+}
 
 MOST_SAMPLES = 1_000_000
 """Largest number of samples of a data set, all of whose plans are in memory."""
@@ -165,3 +188,82 @@ def check_equal_sizes(
                 f"keep = {list(keep)}: radar '{radar.name}' measures no azimuth; "
                 "leave range_azimuth out"
             )
+
+
+def lists_of(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]:
+    """Return the values under ``[each]``, checked; radars and scenes are loaded."""
+    readers: dict[str, Callable[[Any], Any]] = {
+        "radar": lambda value: _loaded("radar", value, folder, Radar.load),
+        "scene": lambda value: _loaded("scene", value, folder, Scene.load),
+        "fidelity": _fidelity,
+        **{key: partial(read_value, hint, "[each] ", key) for key, hint in _NUMBERS.items()},
+    }
+    lists = {key: wrong.of(_several, each, key, usual) or [] for key, usual in EACH.items()}
+    # A default of None stays: it is no value of the file.
+    return {
+        key: [
+            None if key not in each and value is None else wrong.of(readers[key], value)
+            for value in values
+        ]
+        for key, values in lists.items()
+    }
+
+
+def _fidelity(value: object) -> str:
+    model: str = read_value(str, "[each] ", "fidelity", value)
+    with prefixed("[each] "):
+        MODELS.check(model)
+    return model
+
+
+def combinations_of(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
+    """Return every combination of the values under ``[each]``."""
+    places = [
+        [{} if value is None else {key: value} for value in lists[key]]
+        for key in ("person_position_m", "radar_position_m")
+    ]
+    placed = [
+        dataclasses.replace(scene, **person, **radar)
+        for scene, person, radar in itertools.product(lists["scene"], *places)
+    ]
+    radars = lists["radar"]
+    if lists["radar_position_m"] != [None]:
+        # What the data set says goes before what the radar does.
+        usual = Radar().position_m
+        radars = [dataclasses.replace(radar, position_m=usual) for radar in radars]
+    values = itertools.product(
+        radars, placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
+    )
+    return tuple(itertools.starmap(Combination, values))
+
+
+def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
+    values = each.get(key, usual)
+    if not isinstance(values, list) or not values:
+        raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
+    different = {
+        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
+        for value in values
+    }
+    if len(different) < len(values):
+        raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
+    return values
+
+
+def _comparable(value: object) -> object:
+    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
+    return value if isinstance(value, int | float | str | None) else repr(value)
+
+
+def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
+    table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
+    source = read_value(str, "[each] ", key, table.get("base", table.get("board")))
+    if source.endswith((".toml", ".cfg")):
+        if inside(folder, source) is None:
+            raise InputError(
+                f"[each] {key} = {brief(source)} leaves the folder of the file; "
+                "put it beside it or below"
+            )
+        source = str(folder / source)
+    with prefixed(f"[each] {key}: "):
+        return load({**table, "base": source} if table is value else source)

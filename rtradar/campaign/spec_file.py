@@ -6,12 +6,10 @@ The page on data sets, ``docs/data-sets.md``, lists the keys and has an example.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,24 +19,23 @@ from rtradar.campaign.kept import KEPT
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (
     DRAWN,
+    EACH,
     RUN_KEYS,
     Actor,
-    Combination,
     Others,
     Recorded,
     Spec,
     check_equal_sizes,
     check_samples,
+    combinations_of,
+    lists_of,
 )
 from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
 from rtradar.description import MOST_FILES, check_files, path_from, versions
 from rtradar.errors import InputError, prefixed
 from rtradar.motion import ACTIVITIES
 from rtradar.process import DETECTORS, WindowFunctions
-from rtradar.radar import Radar
 from rtradar.recordings import SAID, said_of
-from rtradar.scatter import MODELS
-from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.system.checks import (
     Complaints,
@@ -57,17 +54,6 @@ from rtradar.system.files import digest_of
 
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
 """Limits of settings of a run, narrower than those of the settings themselves."""
-
-EACH: Mapping[str, list[Any]] = {
-    "radar": ["paper-12ghz"],
-    "scene": ["free-space"],
-    "fidelity": ["specular"],
-    "heading_deg": [None],
-    "snr_db": [None],
-    "person_position_m": [None],
-    "radar_position_m": [None],
-}
-"""Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
 _YES_OR_NO = {"angles": True, "skip_short": False, "random_rooms": False, "clouds": True}
 _TOP = (
@@ -208,7 +194,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         wrong.lines.append(
             "[windows] duration_s is missing; synthetic actors have no end of their own"
         )
-    lists = _lists(each, folder, wrong)
+    lists = lists_of(each, folder, wrong)
     drawn = {
         key: wrong.of(read_range, "[drawn] ", key, drawn_table.get(key, usual), least, most)
         or (0.0, 0.0)
@@ -240,7 +226,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     copies = 1 + (augmented.copies if augmented else 0)
     count += copies * sum(recorded.intervals.most() for recorded in recordings)
     check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
-    combinations = _combinations(lists)
+    combinations = combinations_of(lists)
     if keep:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
@@ -320,92 +306,6 @@ def _folder(table: Table, beside: Path) -> Path:
     if not there.is_dir():
         raise InputError(f"folder = {brief(named)}: there is no such folder")
     return there
-
-
-def _lists(each: Table, folder: Path, wrong: Complaints) -> dict[str, list[Any]]:
-    """Return the values under ``[each]``, checked; radars and scenes are loaded."""
-    readers: dict[str, Callable[[Any], Any]] = {
-        "radar": lambda value: _loaded("radar", value, folder, Radar.load),
-        "scene": lambda value: _loaded("scene", value, folder, Scene.load),
-        "fidelity": _fidelity,
-        **{
-            key: partial(read_value, hint, "[each] ", key)
-            for key, hint in {
-                "heading_deg": Annotated[float, Limits(*DRAWN["heading_deg"][1:])],
-                "snr_db": Annotated[float, Limits(*DRAWN["snr_db"][1:])],
-                "person_position_m": Annotated[tuple[float, float], Limits(-100, 100)],
-                "radar_position_m": Annotated[tuple[float, float, float], Limits(-100, 100)],
-            }.items()
-        },
-    }
-    lists = {key: wrong.of(_several, each, key, usual) or [] for key, usual in EACH.items()}
-    # A default of None stays: it is no value of the file.
-    return {
-        key: [
-            None if key not in each and value is None else wrong.of(readers[key], value)
-            for value in values
-        ]
-        for key, values in lists.items()
-    }
-
-
-def _fidelity(value: object) -> str:
-    model: str = read_value(str, "[each] ", "fidelity", value)
-    with prefixed("[each] "):
-        MODELS.check(model)
-    return model
-
-
-def _combinations(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
-    places = [
-        [{} if value is None else {key: value} for value in lists[key]]
-        for key in ("person_position_m", "radar_position_m")
-    ]
-    placed = [
-        dataclasses.replace(scene, **person, **radar)
-        for scene, person, radar in itertools.product(lists["scene"], *places)
-    ]
-    radars = lists["radar"]
-    if lists["radar_position_m"] != [None]:
-        # What the data set says goes before what the radar does.
-        usual = Radar().position_m
-        radars = [dataclasses.replace(radar, position_m=usual) for radar in radars]
-    values = itertools.product(
-        radars, placed, lists["fidelity"], lists["heading_deg"], lists["snr_db"]
-    )
-    return tuple(itertools.starmap(Combination, values))
-
-
-def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
-    values = each.get(key, usual)
-    if not isinstance(values, list) or not values:
-        raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
-    different = {
-        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
-        for value in values
-    }
-    if len(different) < len(values):
-        raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
-    return values
-
-
-def _comparable(value: object) -> object:
-    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
-    return value if isinstance(value, int | float | str | None) else repr(value)
-
-
-def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
-    table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
-    source = read_value(str, "[each] ", key, table.get("base", table.get("board")))
-    if source.endswith((".toml", ".cfg")):
-        if inside(folder, source) is None:
-            raise InputError(
-                f"[each] {key} = {brief(source)} leaves the folder of the file; "
-                "put it beside it or below"
-            )
-        source = str(folder / source)
-    with prefixed(f"[each] {key}: "):
-        return load({**table, "base": source} if table is value else source)
 
 
 def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:

@@ -75,7 +75,7 @@ def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
             for key in keys:
                 text = entry.get(key)
                 named = isinstance(text, str) and (key != "mesh" or Path(text).suffix)
-                if named and not str(text).startswith(SYNTHETIC):
+                if named and not str(text).startswith(SYNTHETIC) and isinstance(entry, dict):
                     yield where, key, entry
 
 

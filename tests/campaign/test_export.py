@@ -14,8 +14,8 @@ import zarr
 from rtradar.campaign import build_dataset, export_dataset, write_template
 from rtradar.campaign.intervals import INTERVAL_KEYS
 from rtradar.campaign.samples import Made, SamplePlan
-from rtradar.campaign.spec import DRAWN, RUN_KEYS
-from rtradar.campaign.spec_file import EACH, read_spec
+from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS
+from rtradar.campaign.spec_file import read_spec
 from rtradar.cli import main
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.sample_files import read_sample, write_index, write_sample
