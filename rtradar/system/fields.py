@@ -13,7 +13,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
 from typing import get_type_hints as hints_of
@@ -163,6 +163,7 @@ def read_table(kind: type[_Thing], where: str, table: Table) -> _Thing:
     return kind(**table)
 
 
+@lru_cache(maxsize=1024)
 def _rule(hint: Any, limits: Limits | None = None) -> Rule:
     """Make the rule of a type."""
     own, args = get_origin(hint) or hint, get_args(hint)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from rtradar.errors import InputError
-from rtradar.system.checks import brief, is_whole
-from rtradar.system.fields import Limits
+from rtradar.system.fields import Limits, read_value
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,11 +20,8 @@ _WORD = 2**32
 
 def check_seed(where: str, seed: object) -> int:
     """Return a seed from 0 to `MOST_SEED` as an int; InputError, begun with ``where``, if not."""
-    if not is_whole(seed) or not 0 <= seed <= MOST_SEED:
-        raise InputError(
-            f"{where}seed = {brief(seed)}; it must be a whole number from 0 to {MOST_SEED}"
-        )
-    return int(seed)
+    found: int = read_value(Seed, where, "seed", seed)
+    return found
 
 
 def stream(seed: int, *numbers: int) -> np.random.SeedSequence:
