@@ -134,7 +134,7 @@ def test_a_radar_of_one_channel_has_no_angles_and_does_without(small: rt.Radar) 
 
 
 def test_a_start_that_is_no_number_is_refused(kick: rt.Motion, small: rt.Radar) -> None:
-    with pytest.raises(InputError, match="start nan s"):
+    with pytest.raises(InputError, match="start_s = nan"):
         rt.run(kick, small, start_s=math.nan)
 
 
