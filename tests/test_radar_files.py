@@ -91,34 +91,6 @@ def test_unknown_preset(call: Any) -> None:
         assert name in message
 
 
-def test_missing_file(tmp_path: Path) -> None:
-    message = refusal(Radar.load, tmp_path / "none.toml")
-    assert "none.toml" in message
-    assert "No such file" in message
-
-
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    (tmp_path / "folder.toml").mkdir()
-    assert "folder.toml" in refusal(Radar.load, tmp_path / "folder.toml")
-
-
-@pytest.mark.parametrize(
-    "text", ["name = ", "tx_y = 6\ntx_y = 7", "\0", b"\xff\xfe", b'name = "\xe9"', "[radar", "12"]
-)
-def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
-    assert "mine.toml' is not TOML: " in refusal(Radar.load, write(tmp_path, text))
-
-
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [("chirp_time_s = 1", "chirp_time_s"), ("[radar]\ntx_y = 1", "radar"), ("n_tx = 3", "n_tx")],
-)
-def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
-    message = refusal(Radar.load, write(tmp_path, text))
-    assert f"unknown key '{key}'" in message
-    assert "chirp_duration_s" in message  # what is allowed
-
-
 @pytest.mark.parametrize(
     ("values", "says"),
     [

@@ -57,31 +57,6 @@ def test_unknown_name(name: str) -> None:
     assert "free-space" in message
 
 
-def test_missing_file(tmp_path: Path) -> None:
-    message = refusal(tmp_path / "none.toml")
-    assert "none.toml" in message
-    assert "No such file" in message
-
-
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    (tmp_path / "folder.toml").mkdir()
-    assert "folder.toml" in refusal(tmp_path / "folder.toml")
-
-
-@pytest.mark.parametrize("text", ["name = ", "name", "\0", b"\xff\xfe", "[walls"])
-def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
-    assert "attic.toml' is not TOML: " in refusal(write(tmp_path, text))
-
-
-@pytest.mark.parametrize(
-    ("text", "key"), [('colour = "red"', "colour"), ("[lights]\nnorth = 3", "lights")]
-)
-def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
-    message = refusal(write(tmp_path, text))
-    assert f"unknown key '{key}'" in message
-    assert "name, description" in message
-
-
 WALL = Wall(
     name="screen",
     corner_m=(-3.0, 0.0, 0.0),
