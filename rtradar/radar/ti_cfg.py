@@ -64,6 +64,9 @@ class _Line(NamedTuple):
         return int(value)
 
 
+_Commands = dict[str, list[_Line]]
+
+
 @dataclass(frozen=True)
 class TiProfile:
     """What a configuration file says: the radar, and how its samples leave the chip.
@@ -94,12 +97,7 @@ def _warn(path: Path, text: str) -> None:
     warnings.warn(f"profile '{path}': {text}", ValidityWarning, stacklevel=6)
 
 
-def _read(
-    path: Path,
-    commands: dict[str, list[_Line]],
-    platform: str | None,
-    board: str | None,
-) -> TiProfile:
+def _read(path: Path, commands: _Commands, platform: str | None, board: str | None) -> TiProfile:
     """Read the commands of the mmWave SDK."""
     mode = commands.get("dfeDataOutputMode", [])
     if mode and mode[-1].values[0] != 1:
@@ -145,10 +143,7 @@ def _read(
 
 
 def _read_low_power(
-    path: Path,
-    commands: dict[str, list[_Line]],
-    platform: str | None,
-    board: str | None,
+    path: Path, commands: _Commands, platform: str | None, board: str | None
 ) -> TiProfile:
     """Read the commands of the low-power chips (xWRL), whose samples are real."""
     common, timing, frame, channels = (commands[one][-1] for one in _NEEDED_LOW_POWER)
@@ -241,7 +236,7 @@ def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places
     return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
 
 
-def _pose(commands: dict[str, list[_Line]], base: Radar) -> dict[str, Any]:
+def _pose(commands: _Commands, base: Radar) -> dict[str, Any]:
     """Height and tilt of the sensor where a file says them; beneath a ceiling it is above x = 0."""
     if "sensorPosition" not in commands:
         return {}
@@ -252,7 +247,7 @@ def _pose(commands: dict[str, list[_Line]], base: Radar) -> dict[str, Any]:
     return {"position_m": place, "yaw_deg": -azimuth_deg, "pitch_deg": -tilt_deg}
 
 
-def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
+def _commands(path: Path) -> tuple[_Commands, str | None]:
     """Return the lines of each command that is read, and the platform that a comment names."""
     try:
         text = read_bytes(path, _MOST_BYTES).decode("utf-8-sig", errors="replace")
@@ -260,7 +255,7 @@ def _commands(path: Path) -> tuple[dict[str, list[_Line]], str | None]:
         raise InputError(f"{error.strerror}; give a .cfg file") from None
     except ValueError:
         raise InputError("it is larger than 1 MB, and no .cfg file") from None
-    found: dict[str, list[_Line]] = {}
+    found: _Commands = {}
     unknown: dict[str, int] = {}
     processing: dict[str, int] = {}
     platform = None
@@ -318,9 +313,7 @@ class _Sequence(NamedTuple):
     multiplexing: Literal["tdm", "ddm", "bpm"]
 
 
-def _sequence(
-    path: Path, commands: dict[str, list[_Line]], frame: _Line, channels: _Line
-) -> _Sequence:
+def _sequence(path: Path, commands: _Commands, frame: _Line, channels: _Line) -> _Sequence:
     chirps: dict[int, _Line] = {}
     for line in commands["chirpCfg"]:
         first = line.whole(0, 0, _MOST_CHIRPS - 1, "the first chirp")
@@ -399,9 +392,7 @@ def _with_signs(
     return order, "tdm"
 
 
-def _board(
-    path: Path, commands: dict[str, list[_Line]], platform: str | None, start_ghz: float
-) -> str:
+def _board(path: Path, commands: _Commands, platform: str | None, start_ghz: float) -> str:
     """Choose the board by its virtual antennas or the platform that the file names, or the band."""
     if "antGeometry0" in commands:
         board = _GEOMETRIES.get(tuple(map(int, commands["antGeometry0"][-1].values)))
