@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,22 +30,6 @@ _LINES_A_THREAD = 1 << 14
 """For fewer, waking threads costs more than the work."""
 
 _LOADING = threading.Lock()
-
-
-class Lines(NamedTuple):
-    """Lines of sight past a body in several poses.
-
-    They go from ``origins`` to ``targets (line, 3)``, world [m]. Those of a ``group (line,)`` have
-    their targets on the part ``own (group,)``, which cannot occlude them, -1 for none, in the pose
-    ``pose (group,)`` among ``poses``.
-    """
-
-    origins: Array
-    targets: Array
-    group: Indices
-    own: Indices
-    pose: Indices
-    poses: Poses
 
 
 class UnitSphere:
@@ -88,12 +72,25 @@ class BodyTracer:
         A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba
         decides about every line of sight and every part that the line comes near.
         """
-        return self.clear(self._lines(origins, targets, own))
+        return self.clear(origins, targets, *self._groups(own))
 
-    def clear(self, lines: Lines) -> NDArray[np.bool_]:
-        """Whether no part is in the way of each line (line,)."""
-        seen = np.ones(len(lines.origins), dtype=bool)
-        seen[self._met(lines)[0]] = False
+    def clear(
+        self,
+        origins: Array,
+        targets: Array,
+        group: Indices,
+        own: Indices,
+        pose: Indices,
+        poses: Poses,
+    ) -> NDArray[np.bool_]:
+        """Whether no part is in the way of lines of sight (line,) past the body in several poses.
+
+        Lines go from ``origins`` to ``targets (line, 3)``, world [m]. Those of a ``group (line,)``
+        have their targets on the part ``own (group,)``, which cannot occlude them, -1 for none, in
+        the pose ``pose (group,)`` among ``poses``.
+        """
+        seen = np.ones(len(origins), dtype=bool)
+        seen[self._met(origins, targets, group, own, pose, poses)[0]] = False
         return seen
 
     def meets(
@@ -103,7 +100,7 @@ class BodyTracer:
         centre, ball = ball_around(self._posed[0], self._semi_axes.max(axis=1))
         reach = np.linalg.norm(points - centre, axis=1) + ball
         ends = points + reach[:, None] * directions
-        line, part = self._met(self._lines(points, ends, own))
+        line, part = self._met(points, ends, *self._groups(own))
         entry, exit_ = self._crossings(part, points[line], directions[line])
         far = np.where(entry > 0, entry, exit_)
         nearest = np.lexsort((far, line))
@@ -156,18 +153,24 @@ class BodyTracer:
             raise RuntimeError("BodyTracer: pose the body before rays are sent")
         return self._pose
 
-    def _lines(self, origins: Array, targets: Array, own: Indices) -> Lines:
-        """Lines past the posed body, whose targets are on parts ``own (line,)``, -1 for none."""
+    def _groups(self, own: Indices) -> tuple[Indices, Indices, Indices, Poses]:
+        """Groups of lines by the part ``own (ray,)``, -1 for none, as `clear` takes them."""
         parts = len(self._semi_axes)
         centres, frames = self._posed
         # The last group is that of none.
         whose = np.append(np.arange(parts), -1), np.zeros(parts + 1, dtype=np.int64)
-        poses = Poses(centres[None], frames[None], self._semi_axes)
-        return Lines(origins, targets, own % (parts + 1), *whose, poses)
+        return own % (parts + 1), *whose, Poses(centres[None], frames[None], self._semi_axes)
 
-    def _met(self, lines: Lines) -> Indices:
-        """Which lines meet parts, and these (2, hit)."""
-        origins, targets, group, own, pose, poses = lines
+    def _met(
+        self,
+        origins: Array,
+        targets: Array,
+        group: Indices,
+        own: Indices,
+        pose: Indices,
+        poses: Poses,
+    ) -> Indices:
+        """Lines and the parts that they meet (2, hit), of lines and groups as of `clear`."""
         floats = (origins, targets, poses.centres, poses.frames, self._semi_axes)
         starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
 

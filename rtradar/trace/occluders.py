@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
 from rtradar.scene import Object, Scene
-from rtradar.trace.body_tracer import BodyTracer, Lines
+from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ class Occluders:
                 semi_axes=poses.semi_axes[self._parts],
             )
             none = np.full_like(numbers, -1)
-            clear = self._ellipsoids.clear(Lines(origins, targets, moment, none, numbers, own))
+            clear = self._ellipsoids.clear(origins, targets, moment, none, numbers, own)
         for number in np.unique(moment) if self._with_mesh else ():
             for skin in self._skins_at(float(moments[number])):
                 left = np.flatnonzero(clear & (moment == number))

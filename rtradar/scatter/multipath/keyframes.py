@@ -35,7 +35,7 @@ from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.system.threads import in_threads, thread_map
-from rtradar.trace.body_tracer import BodyTracer, Lines
+from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -349,9 +349,9 @@ def _not_occluded(
             # At the specular point the part itself cannot be in the way, before a wall it can.
             own = part[echo] if last else np.full(len(echo), kinds - 1)
             rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
-        *ends_of, group, keyframe, line, end, echo = (
+        *lines, group, keyframe, line, end, echo = (
             np.concatenate(column) for column in zip(*rays, strict=True)
         )
-        occluded = ~body.clear(Lines(*ends_of, group, parts, pose, poses))
+        occluded = ~body.clear(*lines, group, parts, pose, poses)
         clear[keyframe[occluded], line[occluded], end[occluded], echo[occluded]] = False
     return np.asarray(both[0][:, :, :, None] & both[1][:, :, None])

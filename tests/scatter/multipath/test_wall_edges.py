@@ -30,6 +30,12 @@ def wall(name: str = "sheet", **changes: object) -> Wall:
     return Wall(**{**own, **changes})  # type: ignore[arg-type]
 
 
+def box_of(name: str, thickness_m: float) -> tuple[Wall, ...]:
+    surface = Surface(material=material(name), thickness_m=thickness_m)
+    sides = ("near", "far", "right", "left", "floor", "ceiling")
+    return room_walls((6.0, 4.0, 2.5), (-4.0, -2.0), dict.fromkeys(sides, surface))
+
+
 def kirchhoff(sheet: Wall, source: Array, target: Array) -> complex:
     """Sum over the face, over the straight leg from the source's image: midpoints an eighth wide.
 
@@ -137,9 +143,7 @@ def test_over_the_sweep_an_edge_fades_as_the_mean_of_its_frequencies() -> None:
 
 
 def test_edges_on_other_walls_are_not_free() -> None:
-    surface = Surface(material=material("plasterboard"), thickness_m=0.0125)
-    sides = ("near", "far", "right", "left", "floor", "ceiling")
-    box = room_walls((6.0, 4.0, 2.5), (-4.0, -2.0), dict.fromkeys(sides, surface))
+    box = box_of("plasterboard", 0.0125)
     # One stands on the floor and ends inside the right wall; one floats, one leans on the far wall.
     stands = wall("stands", corner_m=(0, -2.01, 0), edge_u_m=(0, 2, 0), edge_v_m=(0, 0, 2))
     floats = wall("floats", corner_m=(0, 0.5, 1), edge_u_m=(0, 1, 0), edge_v_m=(0, 0, 1))
@@ -150,9 +154,7 @@ def test_edges_on_other_walls_are_not_free() -> None:
 
 
 def test_in_a_box_legs_run_as_between_endless_walls() -> None:
-    surface = Surface(material=material("plasterboard"), thickness_m=0.0125)
-    sides = ("near", "far", "right", "left", "floor", "ceiling")
-    box = room_walls((6.0, 4.0, 2.5), (-4.0, -2.0), dict.fromkeys(sides, surface))
+    box = box_of("plasterboard", 0.0125)
     rng = np.random.default_rng(0)
     low, high = np.array([-4.0, -2.0, 0.0]), np.array([2.0, 2.0, 2.5])
     antennas, points = (rng.uniform(low, high, (200, 3)) for _ in range(2))
@@ -167,9 +169,7 @@ def test_in_a_box_legs_run_as_between_endless_walls() -> None:
 
 
 def test_walls_that_are_crossed_are_those_that_a_leg_passes_through() -> None:
-    surface = Surface(material=material("concrete"), thickness_m=0.2)
-    sides = ("near", "far", "right", "left", "floor", "ceiling")
-    box = room_walls((4.0, 3.0, 2.5), (-2.0, -1.5), dict.fromkeys(sides, surface))
+    box = box_of("concrete", 0.2)
     edges = WallEdges(box, WAVELENGTH_M, ENDLESS_M)
     rng = np.random.default_rng(0)
     source, targets = np.array([0.0, 0.0, 1.0]), rng.uniform(-4, 4, (40, 3))

@@ -28,14 +28,7 @@ WALL = Wall(
     material=material("plasterboard"),
     thickness_m=0.0125,
 )
-METAL = Wall(
-    name="metal",
-    corner_m=(1.0, -2.0, 0.0),
-    edge_u_m=(0.6, 2.8, 0.0),
-    edge_v_m=(0.0, 0.0, 2.5),
-    material=material("perfect-conductor"),
-    thickness_m=0.01,
-)
+METAL = replace(WALL, name="metal", material=material("perfect-conductor"), thickness_m=0.01)
 MIDDLE = WALL.corners.mean(axis=0)
 coordinate = st.floats(-1.0, 1.0)
 
@@ -185,13 +178,7 @@ def test_te_and_tm_take_their_own_coefficients() -> None:
 
 
 def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
-    second = Wall(
-        **{
-            **{key: getattr(WALL, key) for key in WALL.__dataclass_fields__},
-            "corner_m": (2.0, -2.0, 0.0),
-            "name": "b",
-        }
-    )
+    second = replace(WALL, corner_m=(2.0, -2.0, 0.0), name="b")
     scene = Scene(walls=(WALL, second))
     origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
     targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
