@@ -49,7 +49,7 @@ class Inside:
     def __init__(self, scene: Scene, body: Body) -> None:
         self._scene, self._names, self._owner = scene, body.part_names, body.owner
         self._trunk, self._pelvis = (
-            np.array([name.endswith(ends) for name in body.part_names])
+            np.array([name.endswith(ends) for name in body.part_names], dtype=bool)
             for ends in (_TRUNK, _PELVIS)
         )
         pieces = (*scene.furniture, *scene.objects)
@@ -138,9 +138,10 @@ class Inside:
 
     def _refuse(self, number: int, parts: Bools) -> None:
         """Raise InputError if any of some parts (part,) was inside a wall."""
-        first_s = np.where(parts, self._first_s[number], np.inf)
-        part = int(first_s.argmin())
-        if np.isfinite(first_s[part]):
+        first_s = self._first_s[number]
+        found = np.flatnonzero(parts & np.isfinite(first_s))
+        if len(found):
+            part = int(found[first_s[found].argmin()])
             raise InputError(
                 f"scene '{self._scene.name}': at {first_s[part]:.2f} s the {self._names[part]} of "
                 f"the person is inside wall '{self._things[number]}'; move the person (position_m, "

@@ -60,11 +60,11 @@ class BodyTracer:
     def __init__(self, mi: ModuleType | Callable[[], ModuleType], semi_axes: Array) -> None:
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         self._sphere = UnitSphere(mi)
-        self._pose: tuple[Array, Array] | None = None
+        self._posed: tuple[Array, Array]
 
     def pose(self, centres: Array, frames: Array) -> None:
         """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes."""
-        self._pose = centres, frames
+        self._posed = centres, frames
 
     def sees(self, origins: Array, targets: Array, own: Indices) -> NDArray[np.bool_]:
         """Whether no other part is between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
@@ -146,12 +146,6 @@ class BodyTracer:
         return found
 
     # -- rays --------------------------------------------------------------------------------------
-
-    @property
-    def _posed(self) -> tuple[Array, Array]:
-        if self._pose is None:
-            raise RuntimeError("BodyTracer: pose the body before rays are sent")
-        return self._pose
 
     def _groups(self, own: Indices) -> tuple[Indices, Indices, Indices, Poses]:
         """Groups of lines by the part ``own (ray,)``, -1 for none, as `clear` takes them."""

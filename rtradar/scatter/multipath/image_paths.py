@@ -189,9 +189,7 @@ class ImageRadar(Radar):
 
     @classmethod
     def over(cls, radar: Radar, path: WallPath) -> Radar:
-        """Return the radar as it is seen over a path: itself, if that is the direct one."""
-        if path.order == 0:
-            return radar
+        """Return the radar as it is seen over a path."""
         given = {field.name: getattr(radar, field.name) for field in dataclasses.fields(radar)}
         isotropic = {"tx_antenna": None, "rx_antenna": None}
         return cls(**{**given, **isotropic}, out=path.out, back=path.back)
