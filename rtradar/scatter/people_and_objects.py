@@ -209,7 +209,7 @@ def build_model_of_all(
     past = None
     if scene.objects and model.variant is not None:
         past = Occluders(use(select(variant)), scene, body)
-    given = {"past": past, "walls": scene.walls, "spreading": spreading}
+    given: dict[str, Any] = {"past": past, "walls": scene.walls, "spreading": spreading}
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
     objects = [
         [rigid_echoes(radar, moving, body.duration_s, path=path, **given) for path in paths]

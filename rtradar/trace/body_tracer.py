@@ -9,9 +9,6 @@ their rays (`validation/cost/occluders.py`). The answers are held against float6
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -29,35 +26,28 @@ Indices = NDArray[np.int64]
 _LINES_A_THREAD = 1 << 14
 """For fewer, waking threads costs more than the work."""
 
-_LOADING = threading.Lock()
-
 
 class UnitSphere:
-    """The unit sphere in a Mitsuba scene of its own, made for the first rays."""
+    """The unit sphere in a scene of its own of Mitsuba, ``mi``, which has its variant set."""
 
-    def __init__(self, mi: ModuleType | Callable[[], ModuleType]) -> None:
-        self._mi: Any = mi
-        self._scene: Any = None
+    def __init__(self, mi: Any) -> None:
+        self._mi = mi
+        self._scene = mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
 
     def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which rays (7, ray) meet it: start, unit direction and length in its axes."""
-        with _LOADING:
-            if self._scene is None and rays.size:
-                self._mi = self._mi() if callable(self._mi) else self._mi
-                self._scene = self._mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
         return any_met(self._mi, self._scene, rays)
 
 
 class BodyTracer:
     """A body of ellipsoids with ``semi_axes (part, 3)`` [m], posed again and again.
 
-    Of its `Surfaces` each is a part. Mitsuba, ``mi``, has its variant set; or it is what loads it
-    for the first ray.
+    Of its `Surfaces` each is a part. Mitsuba, ``mi``, has its variant set.
     """
 
     flat = False
 
-    def __init__(self, mi: ModuleType | Callable[[], ModuleType], semi_axes: Array) -> None:
+    def __init__(self, mi: Any, semi_axes: Array) -> None:
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         self._sphere = UnitSphere(mi)
         self._posed: tuple[Array, Array]

@@ -349,9 +349,9 @@ def _not_occluded(
             # At the specular point the part itself cannot be in the way, before a wall it can.
             own = part[echo] if last else np.full(len(echo), kinds - 1)
             rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
-        *lines, group, keyframe, line, end, echo = (
+        starts, stops, group, keyframe, line, end, echo = (
             np.concatenate(column) for column in zip(*rays, strict=True)
         )
-        occluded = ~body.clear(*lines, group, parts, pose, poses)
+        occluded = ~body.clear(starts, stops, group, parts, pose, poses)
         clear[keyframe[occluded], line[occluded], end[occluded], echo[occluded]] = False
     return np.asarray(both[0][:, :, :, None] & both[1][:, :, None])
