@@ -8,7 +8,7 @@ person has. Mitsuba decides at keyframes what hides the three legs.
 from __future__ import annotations
 
 from functools import partial
-from itertools import combinations, permutations
+from itertools import combinations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -186,13 +186,15 @@ class _Keyframe(NamedTuple):
 class DoubleReflections:
     """Reflections over two parts of a moving body, for any chirps.
 
-    At keyframes 10 ms apart pairs are chosen that do not touch, or may do so with ``touching``,
-    whose legs nothing hides between the middles of the lines of antennas, and whose power exceeds
-    ``least_db`` of that of the single reflections of the person they belong to, or of the weaker of
-    both; a pair fades in above that, and between keyframes. Nothing depends on how long the
-    recording is, nor on who else is there. Lengths and amplitudes are those of every chirp and
-    receiver.
+    At keyframes 10 ms apart ``pairs`` are chosen, those that do not touch, whose legs nothing hides
+    between the middles of the lines of antennas, and whose power exceeds ``least_db`` of that of
+    the single reflections of the person they belong to, or of the weaker of both; a pair fades in
+    above that, and between keyframes. Nothing depends on how long the recording is, nor on who else
+    is there. Lengths and amplitudes are those of every chirp and receiver.
     """
+
+    least_db = LEAST_DB
+    pairs = staticmethod(pairs_apart)
 
     def __init__(
         self,
@@ -201,12 +203,9 @@ class DoubleReflections:
         tracer: BodyTracer,
         *,
         spreading: bool = True,
-        least_db: float = LEAST_DB,
-        touching: bool = False,
     ) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
         self._spreading, self._step = spreading, keyframe_step(radar)
-        self._least_db, self._touching = least_db, touching
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT, _PASSING)
         parts = len(body.part_names)
         self._power, self._beside = np.zeros((parts, parts)), np.zeros((parts, parts))
@@ -279,10 +278,7 @@ class DoubleReflections:
         radar, (centres, frames, semi_axes) = self._radar.at(time_s), self._body.at([time_s])
         tx, rx = (antennas.mean(axis=0)[None] for antennas in (radar.tx, radar.rx))
         at = Geometry(tx, rx[:, None], centres, frames, semi_axes)
-        if self._touching:
-            pairs = np.array(list(permutations(range(len(semi_axes)), 2)), dtype=np.int64)
-        else:
-            pairs = pairs_apart(centres[0], frames[0], semi_axes)
+        pairs = self.pairs(centres[0], frames[0], semi_axes)
         sent = Polarization(radar.polarization, radar.axes)
         found = solve_doubles(at, pairs, polarization=sent)
         power = found.amplitude[0, 0] ** 2
@@ -291,7 +287,7 @@ class DoubleReflections:
         of_person = np.bincount(owner, weights=single, minlength=len(self._body.names))
         beside = of_person[owner[pairs]].min(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            above_db = 10 * np.log10(power / beside) - self._least_db
+            above_db = 10 * np.log10(power / beside) - self.least_db
         worth = np.flatnonzero(above_db > 0)
         pairs, points = pairs[worth], found.points[:, :, worth]
         self._tracer.pose(centres[0], frames[0])

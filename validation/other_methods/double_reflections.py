@@ -32,7 +32,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from importlib.util import find_spec
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ from rtradar.full_wave import ConductingSurface
 from rtradar.motion import cut
 from rtradar.scatter import build_model
 from rtradar.scatter.common.interpolation import interpolation_weights
-from rtradar.scatter.double_reflections import LEAST_DB, DoubleReflections, pairs_apart
+from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart
 from rtradar.scatter.models.rays import Rays
 from rtradar.settings import RunSettings
 from rtradar.trace.backends.backend import select, use
@@ -145,6 +145,20 @@ class PartsApart(BodyTracer):
         return np.where(lost, -1, met), np.where(lost, np.inf, distance)
 
 
+class WeakPairs(DoubleReflections):
+    """Pairs down to -60 dB."""
+
+    least_db = -60.0
+
+
+class TouchingPairs(WeakPairs):
+    """The same with pairs that touch."""
+
+    @staticmethod
+    def pairs(centres: Array, frames: Array, semi_axes: Array) -> NDArray[np.int64]:
+        return np.array(list(permutations(range(len(semi_axes)), 2)), dtype=np.int64)
+
+
 def walker_rows() -> Iterator[Row]:
     array = {"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0}
     radar = dataclasses.replace(rt.Radar.preset("paper-12ghz"), **array)
@@ -156,12 +170,12 @@ def walker_rows() -> Iterator[Row]:
     single = {level: build_model(level, radar, body).echoes(chirps) for level in LEVELS}
     first = {level: by_bounces(echoes, frequency)[1] for level, echoes in single.items()}
     seconds: dict[str, Complex] = {}
-    for name, touching, least in (
-        ("as it is", False, LEAST_DB),
-        ("all that do not touch", False, -60.0),
-        ("with those that touch", True, -60.0),
+    for name, kind in (
+        ("as it is", DoubleReflections),
+        ("all that do not touch", WeakPairs),
+        ("with those that touch", TouchingPairs),
     ):
-        doubles = DoubleReflections(radar, body, tracer, touching=touching, least_db=least)
+        doubles = kind(radar, body, tracer)
         found = by_bounces(doubles.beside(single["specular"], chirps), frequency)
         seconds[name] = found[2]
         count = len(doubles.account()["double_reflections"])

@@ -94,7 +94,7 @@ class Surroundings(NamedTuple):
 
 
 def path_keyframes(
-    around: Surroundings, columns: EchoColumns, poses: Poses, times: Array | None = None
+    around: Surroundings, columns: EchoColumns, poses: Poses, times: Array
 ) -> PathKeyframes:
     """Compute what is left of the echoes at some poses, with objects where they are at ``times``.
 
@@ -306,16 +306,15 @@ def _left(
 
 
 def _past_solids(
-    solids: SolidEdges, leg: _Carried, exists: NDArray[np.bool_], times: Array | None
+    solids: SolidEdges, leg: _Carried, exists: NDArray[np.bool_], times: Array
 ) -> Field:
     """What furniture and objects leave of the field on a leg, (keyframe, line, end, echo)."""
     asked = leg.valid & exists[:, :, None]
     left = asked.astype(np.complex128)
     for echo, origins, targets, _, at_solid in leg.sections:
         own = left[..., echo]
-        still, moments = own != 0, None
-        if times is not None:
-            moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
+        still = own != 0
+        moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
         # What a face of furniture reflects has its edges already.
         given = origins[still], targets[still], moments
         own[still] *= solids.left(*given, bent=not at_solid)

@@ -124,13 +124,11 @@ class SolidEdges:
         self._still = [_Edges.of(piece.triangles(), scene.walls) for piece in scene.furniture]
         self._moving = [(moving, _Edges.of(moving.shape)) for moving in scene.objects]
 
-    def left(
-        self, origins: Array, targets: Array, times: Array | None = None, *, bent: bool = True
-    ) -> Field:
+    def left(self, origins: Array, targets: Array, times: Array, *, bent: bool = True) -> Field:
         """Compute what solids leave of straight waves from origins to targets (leg, 3) [m], (leg,).
 
-        Objects are where they are at the ``times (leg,)`` [s]; without times only what stands still
-        counts. Not ``bent``, waves go straight on or not at all.
+        Objects are where they are at the ``times (leg,)`` [s]. Not ``bent``, waves go straight on
+        or not at all.
         """
         if len(origins) == 0:
             return np.zeros(0, dtype=np.complex128)
@@ -140,7 +138,7 @@ class SolidEdges:
             return field
         for edges in self._still:
             self._add(field, lit, edges, origins, targets, times)
-        if times is not None and self._moving:
+        if self._moving:
             moments, moment = np.unique(times, return_inverse=True)
             for moving, edges in self._moving:
                 pose = tuple(own[moment] for own in moving.pose(moments))
@@ -154,7 +152,7 @@ class SolidEdges:
         edges: _Edges,
         origins: Array,
         targets: Array,
-        times: Array | None,
+        times: Array,
         pose: tuple[Array, ...] | None = None,
     ) -> None:
         """Add what the edges of one solid send; its ``pose`` has rotations and places by leg."""
@@ -172,8 +170,7 @@ class SolidEdges:
             leg, beside = found.leg, found.beside
             if pose is not None:
                 beside = np.einsum("rij,rj->ri", pose[0][leg], beside)
-            moments = None if times is None else times[leg]
-            free = self._room.clear(origins[leg] + beside, targets[leg] + beside, moments)
+            free = self._room.clear(origins[leg] + beside, targets[leg] + beside, times[leg])
             leg = leg[free]
             np.add.at(field, leg, self._sent(found.take(free), lit[leg]))
 
