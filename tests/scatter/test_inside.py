@@ -149,18 +149,16 @@ def test_the_summary_tells(tmp_path: Path) -> None:
     assert "head" not in told["message"]
 
 
-@pytest.mark.parametrize("name", scene_files())
 @pytest.mark.parametrize("activity", ["walk", "kick", "punch", "jumping_jack"])
-def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, activity: str) -> None:
-    scene = Scene.load(name)
-    placed = place(
-        rt.synthetic_motion(activity, seed=0, duration_s=2.0), heading_deg=scene.heading_deg
-    )
-    body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
-    times = np.arange(0, body.duration_s, 0.02)
-    solid = Inside(scene, body)
-    solid.look(times, body.at(times), np.ones((len(times), len(body.part_names))))
-    assert solid.found(np.ones(len(body.part_names))) == []
+def test_nobody_stands_in_anything_in_the_scenes_that_come_along(activity: str) -> None:
+    motion = rt.synthetic_motion(activity, seed=0, duration_s=2.0)
+    for scene in map(Scene.load, scene_files()):
+        placed = place(motion, heading_deg=scene.heading_deg)
+        body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
+        times = np.arange(0, body.duration_s, 0.02)
+        solid = Inside(scene, body)
+        solid.look(times, body.at(times), np.ones((len(times), len(body.part_names))))
+        assert solid.found(np.ones(len(body.part_names))) == [], scene.name
 
 
 def box(name: str, x: float, motion: rt.FollowingPath | None = None) -> rt.Object:

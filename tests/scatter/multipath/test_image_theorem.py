@@ -16,7 +16,6 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.multipath.image_paths import images, wall_paths
-from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Surface, Wall, material, room_walls
 
@@ -26,11 +25,6 @@ Make = Callable[..., Any]
 
 def unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
-
-
-def by_name(model: RoomModel, name: str) -> int:
-    """Place of the echo of a one-part body over that path."""
-    return [path.name for path in model.paths].index(name)
 
 
 # -- paths -----------------------------------------------------------------------------------------
@@ -75,7 +69,7 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
     model = room(radar, body, wall(side), order=2)
     chirps = np.arange(24)
     echoes = model.echoes(chirps)
-    number = by_name(model, f"{side} > body > {side}")
+    number = model.path_names.index(f"{side} > body > {side}")
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
@@ -129,7 +123,7 @@ def test_floor_out_and_a_side_wall_back_by_hand(
         fields.append(reflected(way, unit(up - (up @ way) * way), normal))
     normal = unit(point - centre)
     expected = -bare * fields[1] @ (2 * (normal @ fields[0]) * normal - fields[0])
-    number = by_name(model, "floor > body > left")
+    number = model.path_names.index("floor > body > left")
     assert echoes.length[0, 0, number] == pytest.approx(length, abs=1e-9)
     # Amplitudes of Echoes are conjugate. Half-space and slab, and the polynomial over the sweep,
     # agree to 1e-3 here.

@@ -33,11 +33,6 @@ def unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
-def by_name(model: RoomModel, name: str) -> int:
-    """Place of the echo of a one-part body over that path."""
-    return [path.name for path in model.paths].index(name)
-
-
 # -- what occludes and what transmits --------------------------------------------------------------
 
 
@@ -127,9 +122,9 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
     np.testing.assert_array_equal(seen, not hides)
     second = room(*given, **options, order=2)
     seen = np.abs(second.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
-    number = by_name(second, "left > body > left")
+    number = second.path_names.index("left > body > left")
     assert seen[number]
-    assert seen[by_name(second, "floor > body > floor")] == (not hides)
+    assert seen[second.path_names.index("floor > body > floor")] == (not hides)
 
 
 def test_furniture_occludes_by_the_backend_that_was_asked_for_also_where_no_part_does(
@@ -193,7 +188,7 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
     assert names["body"].kept == ["part 0"]
     assert kept.length.shape[2] == 3
     again = room(*given).echoes(np.arange(20))
-    stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
+    stay = [0, model.path_names.index("body > left"), model.path_names.index("left > body")]
     # What is left is of conductors, and the same at all frequencies.
     assert len(kept.frequency) == 1
     for amplitude in again.amplitude[..., stay]:
@@ -297,11 +292,11 @@ def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
     amplitude = model.echoes(np.arange(3)).amplitude
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
-        number = by_name(model, name)
+        number = model.path_names.index(name)
         np.testing.assert_array_equal(
             amplitude[..., number], np.broadcast_to(amplitude[1, ..., number], amplitude.shape[:3])
         )
-    number = by_name(model, "left > body")
+    number = model.path_names.index("left > body")
     assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
 
 
