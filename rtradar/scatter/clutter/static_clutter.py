@@ -55,35 +55,26 @@ class ClutterItem:
     reason: str = ""
 
 
-@dataclass(frozen=True)
-class _Room:
-    """What the static clutter of a room depends on, whoever is in it; equal rooms are one key.
-
-    ``meshes`` is a hash of the furniture's triangles, whose files may change; ``backend`` is
-    that of Mitsuba.
-    """
-
-    radar: Radar
-    scene: Scene
-    meshes: bytes
-    backend: Backend
-
-    @classmethod
-    def of(cls, radar: Radar, scene: Scene, backend: Backend) -> _Room:
-        """Return the room of a scene, without what does not stand still."""
-        digest = hashlib.sha256()
-        for piece in scene.furniture:
-            triangles = piece.triangles()
-            digest.update(triangles.vertices.tobytes())
-            digest.update(triangles.faces.tobytes())
-        still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
-        return cls(radar, still, digest.digest(), backend)
+def _meshes(scene: Scene) -> bytes:
+    """Hash the triangles of furniture, whose files may change."""
+    digest = hashlib.sha256()
+    for piece in scene.furniture:
+        triangles = piece.triangles()
+        digest.update(triangles.vertices.tobytes())
+        digest.update(triangles.faces.tobytes())
+    return digest.digest()
 
 
 @lru_cache(maxsize=KEPT_ROOMS)
-def _returns(room: _Room, order: int) -> tuple[tuple[ClutterItem, RoomEchoes], ...]:
-    """Trace walls as mirrors, furniture, and the diffuse returns of rough walls."""
-    radar, scene, mi = room.radar, room.scene, use(room.backend)
+def _returns(
+    radar: Radar, scene: Scene, meshes: bytes, backend: Backend, order: int
+) -> tuple[tuple[ClutterItem, RoomEchoes], ...]:
+    """Trace walls as mirrors, furniture, and the diffuse returns of rough walls.
+
+    The scene has nothing but these, and ``meshes`` are those of its furniture: equal rooms are one
+    key, whoever is in them.
+    """
+    mi = use(backend)
     occluders = Occluders(mi, scene)
     found = (
         *specular_returns(radar, scene, occluders, order),
@@ -114,8 +105,10 @@ class Clutter:
             raise InputError(
                 f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
             )
-        self.radar, room = radar, _Room.of(radar, scene, select(variant))
-        found = _returns(room, order)
+        self.radar = radar
+        # Without what does not stand still.
+        still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
+        found = _returns(radar, still, _meshes(scene), select(variant), order)
         _refuse_not_followed([echoes for _, echoes in found], scene)
         ranked = sorted(found, key=lambda one: -one[0].cell_m2)
         self.objects = tuple(echoes for item, echoes in ranked if item.cell_m2 > 0)
