@@ -13,8 +13,8 @@ What a person takes from the clutter by their shadow is left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +37,6 @@ _MOST_TERMS = 4_000_000
 """Echoes of channels that are in memory at once."""
 
 
-class _Keyframe(NamedTuple):
-    """What the room returns at a keyframe.
-
-    ``rest (tx, rx, echo)`` of each object is the length that no way of `_ways` holds [m].
-    """
-
-    objects: Sequence[Any]
-    rest: tuple[_Array, ...]
-
-
 class MovingRoomIf(RoomIf):
     """IF samples of a room, for a capture of ``duration_s`` by a radar that moves.
 
@@ -56,7 +46,8 @@ class MovingRoomIf(RoomIf):
 
     def __init__(self, radar: Radar, duration_s: float, trace: Callable[[Radar], Any]) -> None:
         self._trace, self.times = trace, keyframe_times(radar, duration_s)
-        self._kept: KeyframeCache[int, _Keyframe] = KeyframeCache(0, 3)
+        # Each object at a keyframe, with the lengths (tx, rx, echo) that `_ways` does not hold [m].
+        self._kept: KeyframeCache[int, list[tuple[Any, _Array]]] = KeyframeCache(0, 3)
         super().__init__(radar, trace(radar.at(0.0)).cycle())
 
     def add(self, samples: _Samples, chirps: NDArray[np.int64]) -> None:
@@ -81,7 +72,7 @@ class MovingRoomIf(RoomIf):
         found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         at_tx, at_rx = antennas_in_use(radar, times, tx)
-        for own, rest in zip(found.objects, found.rest, strict=True):
+        for own, rest in found:
             at_once = max(1, _MOST_TERMS // (radar.n_rx * own.n_echoes))
             for first in range(0, len(chirps), at_once):
                 some = slice(first, first + at_once)
@@ -95,10 +86,10 @@ class MovingRoomIf(RoomIf):
                 )
                 samples[some] += synthesize(echoes, radar, times[some], dtype=np.complex64)
 
-    def _keyframe(self, keyframe: int) -> _Keyframe:
+    def _keyframe(self, keyframe: int) -> list[tuple[Any, _Array]]:
         radar = self._radar.at(float(self.times[keyframe]))
         objects, rx = self._trace(radar).objects, radar.rx[radar.rx_of_tx]
-        return _Keyframe(objects, tuple(own.length - _ways(own, radar.tx, rx) for own in objects))
+        return [(own, own.length - _ways(own, radar.tx, rx)) for own in objects]
 
 
 def keyframe_times(radar: Radar, duration_s: float) -> _Array:
