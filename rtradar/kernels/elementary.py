@@ -12,26 +12,75 @@ from numpy.polynomial import Chebyshev, Polynomial
 
 from rtradar.kernels.jit import compiled, inlined
 
+# -- vectors of three, as tuples: an array would cost as much as the sums ------------------------
 
-@inlined()
+
+@inlined(fastmath={"contract"})
 def dot(a, b):
     """Product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined()
-def apply(matrix, vector, out):
-    """Fill ``out`` with the matrix times the vector."""
-    x, y, z = vector[0], vector[1], vector[2]
-    for i in range(3):
-        out[i] = matrix[i, 0] * x + matrix[i, 1] * y + matrix[i, 2] * z
+@inlined(fastmath={"contract"})
+def cross(a, b):
+    """Vector across both, as long as their parallelogram is large."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined(fastmath={"contract"})
+def plus(a, b):
+    """Sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined(fastmath={"contract"})
+def minus(a, b):
+    """Difference of two vectors."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined(fastmath={"contract"})
+def scaled(a, factor):
+    """A vector times a number."""
+    return a[0] * factor, a[1] * factor, a[2] * factor
+
+
+@inlined(fastmath={"contract"})
+def stretched(a, b):
+    """Product of two vectors, coordinate by coordinate."""
+    return a[0] * b[0], a[1] * b[1], a[2] * b[2]
+
+
+@inlined(fastmath={"contract"})
+def with_length(a):
+    """Unit vector, and the length of the vector; 0 has no direction and stays 0."""
+    size = math.sqrt(dot(a, a))
+    return scaled(a, 1 / size if size > 0 else 0.0), size
+
+
+@inlined(fastmath={"contract"})
+def turned(matrix, a):
+    """A matrix (3, 3) times a vector: from the axes of its columns to where they are given."""
+    return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
+
+
+@inlined(fastmath={"contract"})
+def turned_back(matrix, a):
+    """The transposed matrix times a vector: into the axes of its columns."""
+    return (
+        matrix[0, 0] * a[0] + matrix[1, 0] * a[1] + matrix[2, 0] * a[2],
+        matrix[0, 1] * a[0] + matrix[1, 1] * a[1] + matrix[2, 1] * a[2],
+        matrix[0, 2] * a[0] + matrix[1, 2] * a[1] + matrix[2, 2] * a[2],
+    )
 
 
 @inlined()
-def subtract(a, b, out):
-    """Fill ``out`` with a - b."""
-    for i in range(3):
-        out[i] = a[i] - b[i]
+def least_axis(a):
+    """Unit vector of the coordinate axis that a vector is the least along, the first of these."""
+    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
+    first = x <= y and x <= z
+    second = not first and y <= z
+    return 1.0 if first else 0.0, 1.0 if second else 0.0, 0.0 if first or second else 1.0
 
 
 # -- phasors --

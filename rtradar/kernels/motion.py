@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from rtradar.kernels.elementary import cross, scaled
 from rtradar.kernels.jit import compiled
 
 
@@ -43,13 +44,12 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
                 four[i] *= scale
             if joint > 0:
                 # Rotate the bone by Rodrigues' form, and add it to the parent's position.
-                x, y, z, w = four[0], four[1], four[2], four[3]
-                a, b, c = offsets[joint, 0], offsets[joint, 1], offsets[joint, 2]
-                u, v, s = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-                parent = place[parents[joint]]
-                place[joint, 0] = parent[0] + a + w * u + y * s - z * v
-                place[joint, 1] = parent[1] + b + w * v + z * u - x * s
-                place[joint, 2] = parent[2] + c + w * s + x * v - y * u
+                bone, parent = offsets[joint], place[parents[joint]]
+                across = scaled(cross(four, bone), 2.0)
+                again = cross(four, across)
+                for axis in range(3):
+                    moved = bone[axis] + four[3] * across[axis] + again[axis]
+                    place[joint, axis] = parent[axis] + moved
 
 
 @compiled(fastmath={"contract"})

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtradar.kernels.elementary import dot, fast_phasor
+from rtradar.kernels.elementary import dot, fast_phasor, minus
 from rtradar.kernels.jit import compiled, inlined
 
 
@@ -75,7 +75,7 @@ def fill_moments(triangles, edge_of, rules, equation, antennas, out):
             for p in range(len(rules.weights)):
                 for axis in range(3):
                     point[axis] = place_on(corners, rules.places[p], axis)
-                away = point[0] - position[0], point[1] - position[1], point[2] - position[2]
+                away = minus(point, position)
                 distance = math.sqrt(dot(away, away))
                 # The path beyond that to the origin, without the cancellation of far antennas.
                 squares = dot(point, point) - 2 * dot(point, position)
@@ -89,11 +89,8 @@ def fill_moments(triangles, edge_of, rules, equation, antennas, out):
                 by_ray = -along * complex(1 - 3 * inverse**2, -3 * inverse)
                 weight = rules.weights[p] * triangles.areas[t]
                 for i in range(3):
-                    x, y, z = (
-                        point[0] - corners[i, 0], point[1] - corners[i, 1], point[2] - corners[i, 2]
-                    )  # fmt: skip
-                    m = x * moment[0] + y * moment[1] + z * moment[2]
-                    u = (x * away[0] + y * away[1] + z * away[2]) / distance
+                    place = minus(point, corners[i])
+                    m, u = dot(place, moment), dot(place, away) / distance
                     shape = wave * (weight * triangles.scales[t, i])
                     field = by_moment * m + by_ray * u
                     jump = magnetic * (u * n_moment - m * n_unit)

@@ -21,8 +21,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import (
+    cross,
+    dot,
+    minus,
+    plus,
+    scaled,
+    stretched,
+    turned,
+    turned_back,
+    with_length,
+)
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.scatter.specular_point import ROOT_PI, dot
+from rtradar.kernels.scatter.specular_point import ROOT_PI
 
 Array = NDArray[np.float64]
 
@@ -47,67 +58,40 @@ class Reflector(NamedTuple):
 
 
 @inlined()
-def _tangents(u, both):
-    """Fill in two unit vectors across a unit vector ``u (3,)``, ``both (2, 3)``."""
+def _place(body, u):
+    """Point of an ellipsoid at a unit vector, and its derivatives along two tangents of the sphere.
+
+    The tangents (Duff et al., 2017) come last.
+    """
     sign = math.copysign(1.0, u[2])
     a = -1 / (sign + u[2])
     b = u[0] * u[1] * a
-    both[0, 0], both[0, 1], both[0, 2] = 1 + sign * u[0] * u[0] * a, sign * b, -sign * u[0]
-    both[1, 0], both[1, 1], both[1, 2] = b, sign + u[1] * u[1] * a, -u[1]
+    one = 1 + sign * u[0] * u[0] * a, sign * b, -sign * u[0]
+    other = b, sign + u[1] * u[1] * a, -u[1]
+    point = plus(body.centre, turned(body.frame, stretched(body.axes, u)))
+    along = (
+        turned(body.frame, stretched(body.axes, one)),
+        turned(body.frame, stretched(body.axes, other)),
+    )
+    return point, along, (one, other)
 
 
 @inlined()
-def _place(body, u, tangents, point, along):
-    """Point (3,) of an ellipsoid at a unit vector, and its derivatives ``along (2, 3)``."""
-    for i in range(3):
-        point[i], along[0, i], along[1, i] = body.centre[i], 0.0, 0.0
-        for j in range(3):
-            scale = body.frame[i, j] * body.axes[j]
-            point[i] += scale * u[j]
-            along[0, i] += scale * tangents[0, j]
-            along[1, i] += scale * tangents[1, j]
+def _normal(body, u):
+    """Outward unit normal at a unit vector, and the area there over that of the sphere."""
+    steep = u[0] / body.axes[0], u[1] / body.axes[1], u[2] / body.axes[2]
+    normal, size = with_length(turned(body.frame, steep))
+    return normal, body.axes[0] * body.axes[1] * body.axes[2] * size
 
 
 @inlined()
-def _normal(body, u, normal):
-    """Outward unit normal (3,) at a unit vector, and the area there over that of the sphere."""
-    size = 0.0
-    for j in range(3):
-        size += (u[j] / body.axes[j]) ** 2
-    size = math.sqrt(size)
-    for i in range(3):
-        normal[i] = 0.0
-        for j in range(3):
-            normal[i] += body.frame[i, j] * u[j] / (body.axes[j] * size)
-    return body.axes[0] * body.axes[1] * body.axes[2] * size
-
-
-@inlined()
-def _way(start, end, out):
-    """Unit vector (3,) from one point to another, and how far that is."""
-    for i in range(3):
-        out[i] = end[i] - start[i]
-    size = math.sqrt(dot(out, out))
-    for i in range(3):
-        out[i] /= size
-    return size
-
-
-@inlined()
-def _bisecting(body, first, second, u):
-    """Unit vector (3,) at which an ellipsoid's normal bisects the ways to two places."""
-    one, other = np.empty(3), np.empty(3)
-    _way(body.centre, first, one)
-    _way(body.centre, second, other)
-    size = 0.0
-    for j in range(3):
-        u[j] = 0.0
-        for i in range(3):
-            u[j] += body.axes[j] * body.frame[i, j] * (one[i] + other[i])
-        size += u[j] * u[j]
-    size = math.sqrt(size)
-    for j in range(3):
-        u[j] = u[j] / size if size > 0 else (1.0 if j == 0 else 0.0)
+def _bisecting(body, first, second):
+    """Unit vector at which an ellipsoid's normal bisects the ways to two places."""
+    one, _ = with_length(minus(first, body.centre))
+    other, _ = with_length(minus(second, body.centre))
+    between = turned_back(body.frame, plus(one, other))
+    u, size = with_length(stretched(body.axes, between))
+    return u if size > 0 else (1.0, 0.0, 0.0)
 
 
 @inlined()
@@ -142,50 +126,24 @@ def _solved(lower, right, out):
 
 
 @inlined()
-def _stretch(u, along, step):
-    """Move a unit vector by a step (2,) along its tangents."""
-    size = 0.0
-    for i in range(3):
-        u[i] += along[0, i] * step[0] + along[1, i] * step[1]
-        size += u[i] * u[i]
-    size = math.sqrt(size)
-    for i in range(3):
-        u[i] /= size
+def _moved(u, tangents, e, f):
+    """A unit vector after a step along its tangents."""
+    step = plus(scaled(tangents[0], e), scaled(tangents[1], f))
+    return with_length(plus(u, step))[0]
 
 
 @inlined()
-def _polarised(direction, above, horizontal, out):
-    """Field (3,) that an antenna sends or receives along a unit vector; 0 along its up."""
-    x, y, z = direction[0], direction[1], direction[2]
-    u, v, w = above[0], above[1], above[2]
-    if horizontal:
-        out[0], out[1], out[2] = y * w - z * v, z * u - x * w, x * v - y * u
-    else:
-        along = dot(direction, above)
-        out[0], out[1], out[2] = u - along * x, v - along * y, w - along * z
-    size = math.sqrt(dot(out, out))
-    for i in range(3):
-        out[i] = out[i] / size if size > 1e-9 else 0.0
+def _polarised(direction, above, horizontal):
+    """Field that an antenna sends or receives along a unit vector; 0 along its up."""
+    upright = minus(above, scaled(direction, dot(direction, above)))
+    field, size = with_length(cross(direction, above) if horizontal else upright)
+    return field if size > 1e-9 else (0.0, 0.0, 0.0)
 
 
 @inlined()
 def _reflected(field, normal):
-    """Turn a field (3,) into what a conductor reflects of it."""
-    along = 2 * dot(field, normal)
-    for i in range(3):
-        field[i] = along * normal[i] - field[i]
-
-
-@inlined()
-def _leaning(body, point, one, other, sign):
-    """How fast the path would change if the ellipsoid grew about its centre: its curvature's part.
-
-    The path changes along ``one + sign other`` as the point moves.
-    """
-    total = 0.0
-    for i in range(3):
-        total += (point[i] - body.centre[i]) * (one[i] + sign * other[i])
-    return total
+    """What a conductor reflects of a field."""
+    return minus(scaled(normal, 2 * dot(field, normal)), field)
 
 
 @inlined()
@@ -215,29 +173,26 @@ def _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix):
 
 
 @inlined()
-def _search(tx, rx, above, first, second, options, u, v, points, rows, square):
-    """Find the path of one pair from the unit vectors ``u, v (3,)``; they and ``points`` are set.
+def _search(tx, rx, above, first, second, options, u, v, square):
+    """Find the path of one pair from the unit vectors ``u, v``.
 
-    Returned are its length and its amplitude, 0 where there is no such reflection. ``rows (15, 3)``
-    and ``square (10, 4)`` are room to work in.
+    Returned are its length and its amplitude, 0 where there is no such reflection; the unit vectors
+    and the points on both ellipsoids. ``square (10, 4)`` is room to work in.
     """
-    p, q = points[0], points[1]
-    tangent_p, tangent_q, along_p, along_q = rows[0:2], rows[2:4], rows[4:6], rows[6:8]
-    s1, s2, s3 = rows[8], rows[9], rows[10]
     matrix, lower, slope, step = square[0:4], square[4:8], square[8], square[9]
-    r1 = r2 = r3 = 0.0
-    found, drop = False, 0.0
+    found, definite, more, drop, length = False, True, 0.0, 0.0, 0.0
     for _ in range(_MAX_STEPS):
-        _tangents(u, tangent_p)
-        _tangents(v, tangent_q)
-        _place(first, u, tangent_p, p, along_p)
-        _place(second, v, tangent_q, q, along_q)
-        r1, r2, r3 = _way(tx, p, s1), _way(p, q, s2), _way(rx, q, s3)
+        p, along_p, tangents_p = _place(first, u)
+        q, along_q, tangents_q = _place(second, v)
+        s1, r1 = with_length(minus(p, tx))
+        s2, r2 = with_length(minus(q, p))
+        s3, r3 = with_length(minus(q, rx))
+        # How fast the path would change if the ellipsoids grew: the part of their curvature.
+        lean_p = dot(minus(p, first.centre), minus(s1, s2))
+        lean_q = dot(minus(q, second.centre), plus(s2, s3))
         legs, ranges = (s1, s2, s3), (r1, r2, r3)
-        lean_p, lean_q = _leaning(first, p, s1, s2, -1.0), _leaning(second, q, s2, s3, 1.0)
         _derivatives(along_p, along_q, legs, ranges, lean_p, lean_q, slope, matrix)
-        definite = _factor(matrix, lower)
-        more = 0.0
+        definite, more = _factor(matrix, lower), 0.0
         while not definite and more < _MOST_ADDED:
             # Toward steepest descent, until the matrix is positive definite.
             more = max(2 * more, 1e-3)
@@ -245,40 +200,34 @@ def _search(tx, rx, above, first, second, options, u, v, points, rows, square):
                 matrix[i, i] += more
             definite = _factor(matrix, lower)
         if not definite:
-            # Not a number, as where both points are one.
-            return r1 + r3, 0.0
+            break  # not a number, as where both points are one
         _solved(lower, slope, step)
-        size = 0.0
+        size, drop = 0.0, 0.0
         for i in range(4):
             size += step[i] * step[i]
-        size = math.sqrt(size)
-        drop = 0.0
-        for i in range(4):
             drop += 0.5 * slope[i] * step[i]
+        size = math.sqrt(size)
         shorter = min(1.0, _LONGEST_STEP / size) if size > 0 else 1.0
-        for i in range(4):
-            step[i] *= -shorter
-        _stretch(u, tangent_p, step[:2])
-        _stretch(v, tangent_q, step[2:])
+        u = _moved(u, tangents_p, -shorter * step[0], -shorter * step[1])
+        v = _moved(v, tangents_q, -shorter * step[2], -shorter * step[3])
         if size < _STEP_TOLERANCE:
             found = more == 0.0
             break
-    length = r1 + r2 + r3 - drop
-    if not found:
-        return length, 0.0
-    normal_p, normal_q, sent, received = rows[11], rows[12], rows[13], rows[14]
-    area = _normal(first, u, normal_p) * _normal(second, v, normal_q)
+    length, amplitude = (r1 + r2 + r3 - drop if definite else r1 + r3), 0.0
+    normal_p, area_p = _normal(first, u)
+    normal_q, area_q = _normal(second, v)
     cosine_p, cosine_q = -dot(s1, normal_p), -dot(s3, normal_q)
     # Each surface faces both ends of its legs.
-    if min(min(cosine_p, dot(s2, normal_p)), min(cosine_q, -dot(s2, normal_q))) <= 0:
-        return length, 0.0
-    root = lower[0, 0] * lower[1, 1] * lower[2, 2] * lower[3, 3]
-    _polarised(s1, above, options.horizontal, sent)
-    _polarised(s3, above, options.horizontal, received)
-    _reflected(sent, normal_p)
-    _reflected(sent, normal_q)
-    value = -2 * ROOT_PI * cosine_p * cosine_q * area / (r2 * root) * dot(sent, received)
-    return length, value / (r1 * r3) if options.spreading else value
+    least = min(min(cosine_p, dot(s2, normal_p)), min(cosine_q, -dot(s2, normal_q)))
+    if found and least > 0:
+        root = lower[0, 0] * lower[1, 1] * lower[2, 2] * lower[3, 3]
+        sent = _polarised(s1, above, options.horizontal)
+        received = _polarised(s3, above, options.horizontal)
+        copolar = dot(_reflected(_reflected(sent, normal_p), normal_q), received)
+        amplitude = -2 * ROOT_PI * cosine_p * cosine_q * area_p * area_q / (r2 * root) * copolar
+        if options.spreading:
+            amplitude /= r1 * r3
+    return length, amplitude, u, v, p, q
 
 
 @compiled()
@@ -291,7 +240,7 @@ def solve_double(begin, end, at, above, pairs, start, options, length, amplitude
     the last receiver.
     """
     tx, rx, centres, frames, semi_axes = at
-    u, v, rows, square = np.empty(3), np.empty(3), np.empty((15, 3)), np.empty((10, 4))
+    square = np.empty((10, 4))
     for chirp in range(begin, end):
         for pair in range(len(pairs)):
             a, b = pairs[pair, 0], pairs[pair, 1]
@@ -299,17 +248,21 @@ def solve_double(begin, end, at, above, pairs, start, options, length, amplitude
             second = Reflector(centres[chirp, b], frames[chirp, b], semi_axes[b])
             known = not math.isnan(start[chirp, pair, 0, 0])
             for receiver in range(rx.shape[1]):
+                here = rx[chirp, receiver]
                 if known:
-                    for i in range(3):
-                        u[i], v[i] = start[chirp, pair, 0, i], start[chirp, pair, 1, i]
+                    begins = start[chirp, pair]
+                    u = begins[0, 0], begins[0, 1], begins[0, 2]
+                    v = begins[1, 0], begins[1, 1], begins[1, 2]
                 else:
-                    _bisecting(first, tx[chirp], second.centre, u)
-                    _bisecting(second, first.centre, rx[chirp, receiver], v)
-                ends = tx[chirp], rx[chirp, receiver], above[chirp]
-                given = first, second, options, u, v, points[chirp, receiver, pair]
-                found = _search(*ends, *given, rows, square)
-                length[chirp, receiver, pair], amplitude[chirp, receiver, pair] = found
+                    u = _bisecting(first, tx[chirp], second.centre)
+                    v = _bisecting(second, first.centre, here)
+                given = first, second, options, u, v, square
+                found = _search(tx[chirp], here, above[chirp], *given)
+                length[chirp, receiver, pair], amplitude[chirp, receiver, pair] = found[:2]
                 known = found[1] != 0
-                if known:
-                    for i in range(3):
-                        start[chirp, pair, 0, i], start[chirp, pair, 1, i] = u[i], v[i]
+                for i in range(3):
+                    points[chirp, receiver, pair, 0, i] = found[4][i]
+                    points[chirp, receiver, pair, 1, i] = found[5][i]
+                    if known:
+                        start[chirp, pair, 0, i] = found[2][i]
+                        start[chirp, pair, 1, i] = found[3][i]

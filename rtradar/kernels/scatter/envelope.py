@@ -8,57 +8,6 @@ from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.jit import compiled, inlined
 
 
-@compiled()
-def find_slopes(inside, before, here, after, slope):
-    """Fill the slopes per place (place, node, pair, part) where a part is known.
-
-    ``before``, ``here`` and ``after`` are intervals, each a ratio (place, node, pair, part) and
-    where it is known (place, part); places are evenly from one end to the other. Slopes are those
-    of the parabola through three places; at the
-    very start, not ``inside``, that of a straight line.
-    """
-    (ratio_before, known_before), (ratio, known), (ratio_after, known_after) = before, here, after
-    last_place, (nodes, pairs, parts) = len(ratio) - 1, ratio.shape[1:]
-    for part in range(parts):
-        left = -1
-        for place in range(last_place + 1):
-            if not known[place, part]:
-                continue
-            # Find the neighbours. At both ends the one on the other side belongs to the next
-            # interval, where this part has its own.
-            right = place + 1
-            while right <= last_place and not known[right, part]:
-                right += 1
-            beyond = last_place - 1 if left < 0 else 1
-            while left < 0 and not known_before[beyond, part]:
-                beyond -= 1
-            while right > last_place and not known_after[beyond, part]:
-                beyond += 1
-            gap = place - left if left >= 0 else last_place - beyond
-            next_gap = right - place if right <= last_place else beyond
-            # Weigh the slopes to both by the width of the other.
-            for node in range(nodes):
-                for pair in range(pairs):
-                    value = ratio[place, node, pair, part]
-                    last = (
-                        ratio[left, node, pair, part]
-                        if left >= 0
-                        else ratio_before[beyond, node, pair, part]
-                    )
-                    following = (
-                        ratio[right, node, pair, part]
-                        if right <= last_place
-                        else ratio_after[beyond, node, pair, part]
-                    )
-                    rise, next_rise = (value - last) / gap, (following - value) / next_gap
-                    if left < 0 and not inside:
-                        rise = next_rise
-                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (
-                        gap + next_gap
-                    )
-            left = place
-
-
 @inlined()
 def stretch(known, place):
     """The known places (place,) on either side of one between the first and the last."""

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from rtradar.kernels.elementary import dot, minus, turned_back
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.facet_shadows import into_ball
 from rtradar.kernels.scatter.near_rays import NEAR, longest_axes
@@ -80,13 +81,8 @@ def _grown(rays):
 @inlined()
 def _may_stand_before(antenna, part, other, centres, longest):
     """Whether one bounding ball may occlude another: it begins nearer, and their cones overlap."""
-    to_part, to_other, along = 0.0, 0.0, 0.0
-    for i in range(3):
-        a, b = centres[part, i] - antenna[i], centres[other, i] - antenna[i]
-        to_part += a * a
-        to_other += b * b
-        along += a * b
-    to_part, to_other = math.sqrt(to_part), math.sqrt(to_other)
+    a, b = minus(centres[part], antenna), minus(centres[other], antenna)
+    to_part, to_other, along = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), dot(a, b)
     own, its = NEAR * longest[part], NEAR * longest[other]
     if to_other - its >= to_part + own:
         return False
@@ -139,7 +135,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     ``whose (2, ray)``: the place of the vertex in (antenna, n, vertex), and that part.
     """
     every, n_vertices = len(centres), vertices.shape[2]
-    turn, shift, start, local = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    turn, shift, start = np.empty((3, 3)), np.empty(3), np.empty(3)
     longest = longest_axes(semi_axes)
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
@@ -162,10 +158,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
                 if not checked:
                     # The vertices that face the antenna, once for all parts that may occlude them.
                     checked = True
-                    for i in range(3):
-                        local[i] = 0.0
-                        for j in range(3):
-                            local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
+                    local = turned_back(frames[part], minus(antennas[a], centres[part]))
                     _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
                     for vertex in range(n_vertices):
                         # The next one takes its place where this one is not wanted: no branch.

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import dot, minus, plus, turned
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.triangles import positive_fraction
 
@@ -52,15 +53,9 @@ def into_ball(part, other, antenna, centres, frames, semi_axes, turn, shift, sta
 @inlined()
 def _clearance(ball, vertex):
     """Least distance of the way to a vertex from the unit ball's middle, less 1."""
-    x, y, z = vertex[0], vertex[1], vertex[2]
-    start_square, along, span = 0.0, 0.0, 0.0
-    for i in range(3):
-        start = ball[4, i]
-        way = ball[i, 0] * x + ball[i, 1] * y + ball[i, 2] * z
-        way += ball[3, i] - start
-        start_square += start * start
-        along += start * way
-        span += way * way
+    start = ball[4]
+    way = minus(plus(turned(ball, vertex), ball[3]), start)
+    start_square, along, span = dot(start, start), dot(start, way), dot(way, way)
     nearest = min(1.0, max(0.0, -along / span))
     return math.sqrt(max(start_square + nearest * (2 * along + nearest * span), 0.0)) - 1
 

@@ -22,6 +22,7 @@ from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.triangles import (
     FAST,
     SERIES,
+    excess_paths,
     largest_spread,
     sum_large,
     sum_small,
@@ -151,19 +152,6 @@ def _choose(facets, own, antennas, row, seen, x, y, z):
 
 
 @inlined(fastmath=FAST)
-def _excess(antenna, x, y, z, out):
-    """Path from the antenna to each vertex less that to the origin, which is returned."""
-    a, b, c = antenna[0], antenna[1], antenna[2]
-    distance = math.sqrt(a * a + b * b + c * c)
-    for i in range(len(x)):
-        p, q, r = x[i], y[i], z[i]
-        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
-        # |T - p| - |T| without the loss of digits of a far antenna.
-        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
-    return distance
-
-
-@inlined(fastmath=FAST)
 def _see(antenna, distance, excess, chosen, seen, view):
     """Rows of ``view``: mean path, two deviations from it, n.s, and the fraction that is seen."""
     a, b, c = antenna[0], antenna[1], antenna[2]
@@ -240,7 +228,7 @@ def integrate(begin, end, facets, views, waves, out):
         # What each antenna sees of them.
         view = np.empty((count_antennas, 5, count))
         for antenna in range(count_antennas):
-            far[antenna] = _excess(antennas[antenna], x, y, z, excess)
+            far[antenna] = excess_paths(antennas[antenna], x, y, z, excess)
             seen = views.seen[row[antenna]]
             _see(antennas[antenna], far[antenna], excess, chosen, seen, view[antenna])
         # Pair by pair, the sum over facets at each frequency.

@@ -19,12 +19,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.elementary import fast_phasor, smoothstep
+from rtradar.kernels.elementary import dot, fast_phasor, smoothstep
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.triangles import (
     FAST,
     SERIES,
     by_series,
+    excess_paths,
     mean_of_phasor,
 )
 
@@ -88,20 +89,6 @@ class LengthGrid(NamedTuple):
     wavenumber: Array
     sweep: float
     back: NDArray[np.complex128]
-
-
-@inlined(fastmath=FAST)
-def _excess(antenna, vertices, out):
-    """Path from the antenna to each vertex less that to the origin, which is returned."""
-    a, b, c = antenna[0], antenna[1], antenna[2]
-    distance = math.sqrt(a * a + b * b + c * c)
-    x, y, z = vertices[0], vertices[1], vertices[2]
-    for i in range(len(out)):
-        p, q, r = x[i], y[i], z[i]
-        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
-        # |T - p| - |T| without the loss of digits of a far antenna.
-        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
-    return distance
 
 
 @inlined(fastmath=FAST)
@@ -191,7 +178,7 @@ def _blend(before, after, fraction, weight, out):
 def facets_by_length(begin, end, facets, views, grid, spreading, out):
     """Add to ``out (task, rx, node, echo)`` amplitudes as of `Echoes` [m], from begin to end."""
     n_facets, n_vertices = len(facets.faces), facets.vertices.shape[1]
-    middle = n_vertices - n_facets
+    middle, (x, y, z) = n_vertices - n_facets, facets.vertices
     field, value = np.empty(3, dtype=np.complex128), np.empty(3, dtype=np.complex128)
     to_tx, to_rx = np.empty(n_vertices), np.empty(n_vertices)
     open_tx, open_rx, facing = np.empty(n_facets), np.empty(n_facets), np.empty(n_facets)
@@ -201,12 +188,12 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
         before, after = views.seen[views.before[task]], views.seen[views.after[task]]
         first, last = views.factor[views.before[task]], views.factor[views.after[task]]
         tx = views.tx[task]
-        far_tx = _excess(tx, facets.vertices, to_tx)
+        far_tx = excess_paths(tx, x, y, z, to_tx)
         _blend(before, after, fraction, views.tx_weight[task], open_tx)
         count = 0
         for f in range(n_facets):
             normal = facets.normals[f]
-            height = normal[0] * tx[0] + normal[1] * tx[1] + normal[2] * tx[2] - facets.planes[f]
+            height = dot(normal, tx) - facets.planes[f]
             if open_tx[f] > 0 and (height > 0 or facets.both_sides):
                 facing[f] = height / (far_tx + to_tx[middle + f])
                 for node in range(3):
@@ -216,12 +203,11 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
                 count += 1
         for r in range(views.rx.shape[1]):
             rx = views.rx[task, r]
-            far_rx = _excess(rx, facets.vertices, to_rx)
+            far_rx = excess_paths(rx, x, y, z, to_rx)
             _blend(before, after, fraction, views.rx_weight[task, r], open_rx)
             for f in lit[:count]:
                 normal, far_r = facets.normals[f], far_rx + to_rx[middle + f]
-                height = normal[0] * rx[0] + normal[1] * rx[1] + normal[2] * rx[2]
-                along = (height - facets.planes[f]) / far_r
+                along = (dot(normal, rx) - facets.planes[f]) / far_r
                 # Both on one side of the facet, which of a closed mesh is the outside.
                 if open_rx[f] <= 0 or along * facing[f] <= 0:
                     continue

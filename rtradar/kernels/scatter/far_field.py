@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from rtradar.kernels.elementary import minus, turned_back
 from rtradar.kernels.jit import compiled
 
 _NO_BISECTOR = 1e-24
@@ -23,7 +24,6 @@ def far_field(start, stop, at, spreading, length, amplitude):
     tx, rx, centres, frames, semi_axes = at
     _, receivers, parts = length.shape
     for chirp in range(start, stop):
-        to_tx = np.empty(3)
         # Receivers side by side: to each of them in the axes of the part, then length and
         # amplitude. In one array of a known size: of many the compiler would have to fear that they
         # overlap.
@@ -32,12 +32,8 @@ def far_field(start, stop, at, spreading, length, amplitude):
             # The transmitter in the axes of the part.
             centre, frame = centres[chirp, part], frames[chirp, part]
             a, b, c = semi_axes[part, 0], semi_axes[part, 1], semi_axes[part, 2]
-            for i in range(3):
-                to_tx[i] = 0.0
-                for j in range(3):
-                    to_tx[i] += frame[j, i] * (tx[chirp, j] - centre[j])
-            norm_tx = math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
-            t0, t1, t2 = to_tx[0], to_tx[1], to_tx[2]
+            t0, t1, t2 = turned_back(frame, minus(tx[chirp], centre))
+            norm_tx = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
             u0, u1, u2 = t0 / norm_tx, t1 / norm_tx, t2 / norm_tx
             root_volume = math.sqrt(math.pi) * a * b * c
             for first in range(0, receivers, _LANES):
@@ -45,11 +41,9 @@ def far_field(start, stop, at, spreading, length, amplitude):
                 count = min(_LANES, receivers - first)
                 for k in range(_LANES):
                     receiver = first + min(k, count - 1)
-                    x = rx[chirp, receiver, 0] - centre[0]
-                    y = rx[chirp, receiver, 1] - centre[1]
-                    z = rx[chirp, receiver, 2] - centre[2]
+                    away = turned_back(frame, minus(rx[chirp, receiver], centre))
                     for i in range(3):
-                        lanes[i, k] = frame[0, i] * x + frame[1, i] * y + frame[2, i] * z
+                        lanes[i, k] = away[i]
                 for k in range(_LANES):
                     # |A n| for the unit normal n is the support function h; the surface point with
                     # that normal is A^2 n / h.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.elementary import dot
+from rtradar.kernels.elementary import cross, dot, least_axis, minus, plus, scaled, with_length
 from rtradar.kernels.jit import compiled, inlined
 
 _NORMAL_INCIDENCE = 1e-9
@@ -78,13 +78,6 @@ def _coefficients(cosine, node, slab):
     return _term(te, once, slab) * taken, _term(tm, once, slab) * taken
 
 
-@inlined()
-def _cross(a, b, out):
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-
-
 @compiled()
 def slab_fields(field, ways, slab, out):
     """Fill ``out (node, wave, 3)`` complex128 with fields after one `SlabPass`.
@@ -93,35 +86,20 @@ def slab_fields(field, ways, slab, out):
     numbers of passes reflect it, odd ones let it through.
     """
     nodes, waves, _ = out.shape
-    # Rows of one array are of one type: for each other Numba would compile `_cross` again.
-    normal, way, across, up, leaving, up_after, axis, spare = np.zeros((8, 3))
-    least = 0
-    for i in range(3):
-        normal[i] = slab.normal[i]
-        if abs(normal[i]) < abs(normal[least]):
-            least = i
+    normal = slab.normal
     # At normal incidence both coefficients do the same: any direction across the ray serves.
-    axis[least] = 1
-    _cross(normal, axis, spare)
-    size = math.sqrt(dot(spare, spare))
+    spare, _ = with_length(cross(normal, least_axis(normal)))
     for wave in range(waves):
-        for i in range(3):
-            way[i] = ways[wave, i]
+        way = ways[wave]
         along = dot(way, normal)
-        bend = 2 * along if slab.passes % 2 == 0 else 0.0
-        for i in range(3):
-            leaving[i] = way[i] - bend * normal[i]
-        _cross(way, normal, across)
-        sine = math.sqrt(dot(across, across))
-        for i in range(3):
-            across[i] = across[i] / sine if sine > _NORMAL_INCIDENCE else spare[i] / size
-        _cross(across, way, up)
-        _cross(across, leaving, up_after)
+        leaving = minus(way, scaled(normal, 2 * along if slab.passes % 2 == 0 else 0.0))
+        across, sine = with_length(cross(way, normal))
+        across = across if sine > _NORMAL_INCIDENCE else spare
+        up, up_after = cross(across, way), cross(across, leaving)
         for node in range(nodes):
             te, tm = _coefficients(min(abs(along), 1.0), node, slab)
-            own = field[node, wave]
-            te *= own[0] * across[0] + own[1] * across[1] + own[2] * across[2]
-            tm *= own[0] * up[0] + own[1] * up[1] + own[2] * up[2]
+            te *= dot(field[node, wave], across)
+            tm *= dot(field[node, wave], up)
             for i in range(3):
                 out[node, wave, i] = te * across[i] + tm * up_after[i]
 
@@ -137,22 +115,17 @@ def received_from_conductors(start, stop, sent, received, to_tx, to_rx, out):
     both returns 2 (n.E) n - E; where they are opposite, n is 0.
     """
     nodes, _, lines, tx_ends, rx_ends, echoes = out.shape
-    normal = np.empty(3)
     for keyframe in range(start, stop):
         for line in range(lines):
             for one in range(tx_ends):
                 for other in range(rx_ends):
                     for echo in range(echoes):
                         a, b = to_tx[keyframe, line, one, echo], to_rx[keyframe, line, other, echo]
-                        for i in range(3):
-                            normal[i] = a[i] + b[i]
+                        normal = plus(a, b)
                         square = dot(normal, normal)
                         scale = 2 / square if square > 1e-24 else 0.0
                         for node in range(nodes):
                             e = sent[node, keyframe, line, one, echo]
                             f = received[node, keyframe, line, other, echo]
-                            straight = e[0] * f[0] + e[1] * f[1] + e[2] * f[2]
-                            of_e = e[0] * normal[0] + e[1] * normal[1] + e[2] * normal[2]
-                            of_f = f[0] * normal[0] + f[1] * normal[1] + f[2] * normal[2]
-                            value = scale * of_e * of_f - straight
+                            value = scale * dot(e, normal) * dot(f, normal) - dot(e, f)
                             out[node, keyframe, line, one, other, echo] = value

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from rtradar.kernels.elementary import dot, minus, scaled, turned
 from rtradar.kernels.jit import compiled, inlined
 
 NEAR = 1.1
@@ -24,10 +25,8 @@ def _bundle(places, group, counts, middle, radius):
         for i in range(3):
             middle[group[line], i] += places[line, i] / counts[group[line]]
     for line in range(len(group)):
-        square = 0.0
-        for i in range(3):
-            square += (places[line, i] - middle[group[line], i]) ** 2
-        radius[group[line]] = max(radius[group[line]], square)
+        away = minus(places[line], middle[group[line]])
+        radius[group[line]] = max(radius[group[line]], dot(away, away))
 
 
 @inlined()
@@ -43,22 +42,19 @@ def _near_parts(origins, targets, group, own, pose, centres, longest):
     near = np.zeros((groups, parts), dtype=np.bool_)
     for g in range(groups):
         a, b = middles[g, 0], middles[g, 1]
-        way0, way1, way2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        way = minus(b, a)
         first, last = math.sqrt(radii[g, 0]), math.sqrt(radii[g, 1])
-        span = way0 * way0 + way1 * way1 + way2 * way2
+        span = dot(way, way)
         length = math.sqrt(span)
         for part in range(parts):
             if part != own[g] and counts[g] > 0:
-                c = centres[pose[g], part]
-                gap0, gap1, gap2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-                fraction = (gap0 * way0 + gap1 * way1 + gap2 * way2) / max(span, 1e-300)
-                fraction = min(1.0, max(0.0, fraction))
-                square = (gap0 - fraction * way0) ** 2 + (gap1 - fraction * way1) ** 2
-                square += (gap2 - fraction * way2) ** 2
+                gap = minus(centres[pose[g], part], a)
+                fraction = min(1.0, max(0.0, dot(gap, way) / max(span, 1e-300)))
+                aside = minus(gap, scaled(way, fraction))
                 # The bundle narrows towards one end: its width is taken before this part.
                 before = max(0.0, fraction - NEAR * longest[part] / max(length, 1e-300))
                 wide = max(first + before * (last - first), last) if first > last else last
-                near[g, part] = math.sqrt(square) < NEAR * longest[part] + wide
+                near[g, part] = math.sqrt(dot(aside, aside)) < NEAR * longest[part] + wide
     return near
 
 
@@ -115,21 +111,15 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     count = 0
     for line in range(len(group)):
         g = group[line]
-        a, b, c = origins[line, 0], origins[line, 1], origins[line, 2]
-        d, e, f = targets[line, 0] - a, targets[line, 1] - b, targets[line, 2] - c
+        origin = origins[line]
+        way = minus(targets[line], origin)
         for n in range(near_count[g]):
             part = near_part[g, n]
-            centre, m = centres[pose[g], part], maps[pose[g], part]
-            o0, o1, o2 = a - centre[0], b - centre[1], c - centre[2]
-            x = m[0, 0] * o0 + m[0, 1] * o1 + m[0, 2] * o2
-            y = m[1, 0] * o0 + m[1, 1] * o1 + m[1, 2] * o2
-            z = m[2, 0] * o0 + m[2, 1] * o1 + m[2, 2] * o2
-            u = m[0, 0] * d + m[0, 1] * e + m[0, 2] * f
-            v = m[1, 0] * d + m[1, 1] * e + m[1, 2] * f
-            w = m[2, 0] * d + m[2, 1] * e + m[2, 2] * f
-            span, back = u * u + v * v + w * w, -(x * u + y * v + z * w)
+            m = maps[pose[g], part]
+            start, along = turned(m, minus(origin, centres[pose[g], part])), turned(m, way)
+            span, back = dot(along, along), -dot(start, along)
             # The least square of the distance along the line, times its span: no division.
-            square = x * x + y * y + z * z
+            square = dot(start, start)
             least = (
                 square * span - back * back if back < span else (square - 2 * back + span) * span
             )
@@ -138,9 +128,9 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
             # float32 is too coarse for a far antenna: the ray starts two radii before that point.
             scale = 1 / math.sqrt(span)
             ahead = max(min(1.0, max(0.0, back * scale * scale)) - 2 * scale, 0.0)
-            rays[0, count], rays[1, count] = x + ahead * u, y + ahead * v
-            rays[2, count], rays[3, count] = z + ahead * w, u * scale
-            rays[4, count], rays[5, count] = v * scale, w * scale
+            for i in range(3):
+                rays[i, count] = start[i] + ahead * along[i]
+                rays[3 + i, count] = along[i] * scale
             rays[6, count] = (1 - ahead) * span * scale
             whose[0, count], whose[1, count] = line, part
             count += 1

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import dot, minus, plus, turned, turned_back
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.specular_point import (
     ROOT_PI,
     Array,
     Options,
     Plane,
-    dot,
     leg,
     look,
     moved,
@@ -97,33 +97,9 @@ class Nearby(NamedTuple):
 
 
 @inlined()
-def _to_part(vector, centre, frame):
-    """A place in the axes of a part."""
-    x, y, z = vector[0] - centre[0], vector[1] - centre[1], vector[2] - centre[2]
-    return (
-        frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
-        frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z,
-        frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z,
-    )
-
-
-@inlined()
-def _to_world(vector, frame):
-    """A direction of a part's axes in those of the world."""
-    x, y, z = vector
-    return (
-        frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
-        frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z,
-        frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z,
-    )
-
-
-@inlined()
 def _plane_in_world(plane, frame):
     normal, e, f = plane.normal, plane.e, plane.f
-    return Plane(
-        _to_world(normal, frame), _to_world(e, frame), _to_world(f, frame), plane.curvature
-    )
+    return Plane(turned(frame, normal), turned(frame, e), turned(frame, f), plane.curvature)
 
 
 @inlined()
@@ -201,8 +177,8 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
             axes, frame = semi_axes[part], frames[chirp, part]
             centre = centres[chirp, part]
             rx = images_rx[back_leg[echo], transmitter]
-            tx = _to_part(images_tx[out_leg[echo], transmitter], centre, frame)
-            middle = _to_part(images_middle[back_leg[echo], transmitter], centre, frame)
+            tx = turned_back(frame, minus(images_tx[out_leg[echo], transmitter], centre))
+            middle = turned_back(frame, minus(images_middle[back_leg[echo], transmitter], centre))
             if not wanted[which, line, echo]:
                 over_centre = math.sqrt(dot(tx, tx)) + math.sqrt(dot(middle, middle))
                 for i in range(receivers):
@@ -219,8 +195,7 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
                     guess[k] += ends[end] * ((1 - fraction) * first + fraction * last)
             # Find the point for the middle of the receivers, and correct it for each of them.
             good, point, plane, out = _settle(tx, middle, axes, guess)
-            place = _to_world(point, frame)
-            place = (place[0] + centre[0], place[1] + centre[1], place[2] + centre[2])
+            place = plus(turned(frame, point), centre)
             least = min(axes[0], min(axes[1], axes[2]))
             good &= _correct(rx, place, _plane_in_world(plane, frame), out, least, room)
             if not good:
@@ -229,7 +204,7 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
                 for k in range(3):
                     source[k], guess[k] = tx[k], math.nan
                 for i in range(receivers):
-                    antenna = _to_part((rx[0, i], rx[1, i], rx[2, i]), centre, frame)
+                    antenna = turned_back(frame, minus(rx[:, i], centre))
                     local_r[0, i], local_r[1, i], local_r[2, i] = antenna
                 options = Options(False, True)
                 search_all(source, local_r, axes, up, options, guess, one, room)

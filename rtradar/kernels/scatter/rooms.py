@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.elementary import smoothstep
+from rtradar.kernels.elementary import dot, minus, plus, scaled, smoothstep, turned, with_length
 from rtradar.kernels.jit import compiled, inlined
 
 Array = NDArray[np.float64]
@@ -127,12 +127,11 @@ class SlabDelays(NamedTuple):
 @inlined()
 def _delay(antenna, place, first, last, delays):
     """Length that the passages on a leg add to it."""
-    x, y, z = place[0] - antenna[0], place[1] - antenna[1], place[2] - antenna[2]
-    inverse = 1 / math.sqrt(x * x + y * y + z * z)
+    way, _ = with_length(minus(place, antenna))
     total = 0.0
     for one in range(first, last):
         slab, passes = delays.slabs[one], delays.passes[one]
-        cosine = min(abs(x * slab[0] + y * slab[1] + z * slab[2]) * inverse, 1.0)
+        cosine = min(abs(dot(way, slab)), 1.0)
         total += slab[3] * passes * math.sqrt(slab[4] - 1 + cosine * cosine)
         if passes % 2:
             total -= slab[3] * cosine
@@ -162,14 +161,13 @@ def delayed_lengths(start, stop, antennas, tx_index, points, bodies, delays, len
             part = points.part[echo]
             axes, centre = bodies.semi_axes[part], bodies.centres[chirp, part]
             frame, local = bodies.frames[chirp, part], points.local[chirp, echo]
-            x, y, z = local[0], local[1], local[2]
-            size = math.sqrt((x / axes[0]) ** 2 + (y / axes[1]) ** 2 + (z / axes[2]) ** 2)
+            x, y, z = local[0] / axes[0], local[1] / axes[1], local[2] / axes[2]
+            size = math.sqrt(x * x + y * y + z * z)
             # An echo without a specular point takes any place.
             scale = 1 / size if size > 0 else 0.0
+            place = plus(centre, scaled(turned(frame, local), scale))
             for row in range(3):
-                own = frame[row]
-                along = own[0] * x + own[1] * y + own[2] * z
-                places[echo, row] = centre[row] + scale * along
+                places[echo, row] = place[row]
         for column in range(columns):
             # Add the delays on the way out, which all receivers share, and those on the way back.
             echo = delays.echo[column]
@@ -204,10 +202,9 @@ class EdgeBalls(NamedTuple):
 @inlined()
 def _beside(origin, way, square, centre, reach):
     """Whether a leg comes so near to a place."""
-    x, y, z = centre[0] - origin[0], centre[1] - origin[1], centre[2] - origin[2]
-    place = min(max((x * way[0] + y * way[1] + z * way[2]) / square, 0.0), 1.0)
-    x, y, z = x - place * way[0], y - place * way[1], z - place * way[2]
-    return x * x + y * y + z * z < reach * reach
+    there = minus(centre, origin)
+    aside = minus(there, scaled(way, min(max(dot(there, way) / square, 0.0), 1.0)))
+    return dot(aside, aside) < reach * reach
 
 
 @compiled()
@@ -221,7 +218,7 @@ def outline_near(origins, ways, later_m, edges):
     found, count = np.empty((2, 1024), dtype=np.int64), 0
     for leg in range(len(origins)):
         origin, way = origins[leg], ways[leg]
-        square = way[0] * way[0] + way[1] * way[1] + way[2] * way[2]
+        square = dot(way, way)
         if square == 0:
             continue
         wide = math.sqrt(later_m * (2 * math.sqrt(square) + later_m)) / 2
@@ -229,8 +226,7 @@ def outline_near(origins, ways, later_m, edges):
             continue
         for edge in range(len(edges.radii)):
             one, other = edges.normals[edge, 0], edges.normals[edge, 1]
-            along = one[0] * way[0] + one[1] * way[1] + one[2] * way[2] > 0
-            if along == (other[0] * way[0] + other[1] * way[1] + other[2] * way[2] > 0):
+            if (dot(one, way) > 0) == (dot(other, way) > 0):
                 continue
             if not _beside(origin, way, square, edges.middles[edge], edges.radii[edge] + wide):
                 continue

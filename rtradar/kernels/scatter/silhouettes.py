@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import cross, dot, least_axis, minus, scaled, turned, with_length
 from rtradar.kernels.jit import compiled, inlined
 
 Array = NDArray[np.float64]
@@ -86,30 +87,11 @@ def _crossing(rho, scales, table, sign, out):
 
 
 @inlined(fastmath={"contract"})
-def _across(way, side, up):
-    """Fill in two unit vectors across a leg, a right-handed frame with its direction."""
-    axis = 0
-    for i in range(1, 3):
-        if abs(way[i]) < abs(way[axis]):
-            axis = i
-    for i in range(3):
-        side[i] = (1.0 if i == axis else 0.0) - way[axis] * way[i]
-    norm = math.sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2])
-    for i in range(3):
-        side[i] /= norm
-    up[0] = way[1] * side[2] - way[2] * side[1]
-    up[1] = way[2] * side[0] - way[0] * side[2]
-    up[2] = way[0] * side[1] - way[1] * side[0]
-
-
-@inlined(fastmath={"contract"})
-def _mapped(m, g):
-    """The matrix times the vector, as a tuple: an array would cost as much as the sums."""
-    return (
-        m[0, 0] * g[0] + m[0, 1] * g[1] + m[0, 2] * g[2],
-        m[1, 0] * g[0] + m[1, 1] * g[1] + m[1, 2] * g[2],
-        m[2, 0] * g[0] + m[2, 1] * g[1] + m[2, 2] * g[2],
-    )
+def _across(way):
+    """Two unit vectors across a leg, a right-handed frame with its direction."""
+    axis = least_axis(way)
+    side, _ = with_length(minus(axis, scaled(way, dot(way, axis))))
+    return side, cross(way, side)
 
 
 @inlined(fastmath={"contract"})
@@ -119,15 +101,11 @@ def _near_parts(start, way, side, up, size, before, length, wavelength, reach, b
     widest = 0.5 * reach * math.sqrt(wavelength * length)
     count = 0
     for part in range(len(centres)):
-        g0, g1, g2 = (
-            centres[part, 0] - start[0],
-            centres[part, 1] - start[1],
-            centres[part, 2] - start[2],
-        )
-        along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+        g = minus(centres[part], start)
+        along = dot(g, way)
         if along < -longest[part] or along > size + longest[part]:
             continue
-        square = g0 * g0 + g1 * g1 + g2 * g2 - along * along
+        square = dot(g, g) - along * along
         # No zone is wider than that in the middle of the path, which spares most parts the rest.
         if square > (longest[part] + widest) ** 2:
             continue
@@ -137,11 +115,8 @@ def _near_parts(start, way, side, up, size, before, length, wavelength, reach, b
         if gap > longest[part] + reach * zone:
             continue
         m = maps[part]
-        x, y, u, v = _mapped(m, (g0, g1, g2)), _mapped(m, way), _mapped(m, side), _mapped(m, up)
-        yy = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
-        xy = x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-        uy = u[0] * y[0] + u[1] * y[1] + u[2] * y[2]
-        vy = v[0] * y[0] + v[1] * y[1] + v[2] * y[2]
+        x, y, u, v = turned(m, g), turned(m, way), turned(m, side), turned(m, up)
+        yy, xy, uy, vy = dot(y, y), dot(x, y), dot(u, y), dot(v, y)
         nearest = xy / yy
         # A part that an end of the leg is beside counts by what of it is before that end.
         inside = 0.5 + 0.5 * min(nearest, size - nearest) * math.sqrt(yy)
@@ -149,18 +124,17 @@ def _near_parts(start, way, side, up, size, before, length, wavelength, reach, b
             continue
         inside = min(inside, 1.0)
         # The outline's place that is nearest to the leg, if the leg is outside.
-        aside = math.sqrt(max(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - xy * nearest, 1.0))
-        along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+        aside = math.sqrt(max(dot(x, x) - xy * nearest, 1.0))
         past = before + min(max(along + (nearest - along) / aside, 0.0), size)
         square = max(wavelength * past * max(length - past, 0.0) / length, _LEAST_M2)
         zone = math.sqrt(square)
         form = near[count]
-        form[0] = square * (u[0] * u[0] + u[1] * u[1] + u[2] * u[2] - uy * uy / yy)
-        form[1] = square * (u[0] * v[0] + u[1] * v[1] + u[2] * v[2] - uy * vy / yy)
-        form[2] = square * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - vy * vy / yy)
-        form[3] = zone * (x[0] * u[0] + x[1] * u[1] + x[2] * u[2] - xy * uy / yy)
-        form[4] = zone * (x[0] * v[0] + x[1] * v[1] + x[2] * v[2] - xy * vy / yy)
-        form[5] = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] - xy * xy / yy - inside * inside
+        form[0] = square * (dot(u, u) - uy * uy / yy)
+        form[1] = square * (dot(u, v) - uy * vy / yy)
+        form[2] = square * (dot(v, v) - vy * vy / yy)
+        form[3] = zone * (dot(x, u) - xy * uy / yy)
+        form[4] = zone * (dot(x, v) - xy * vy / yy)
+        form[5] = dot(x, x) - xy * xy / yy - inside * inside
         count += 1
     return count
 
@@ -176,15 +150,13 @@ def _near_faces(start, way, side, up, size, before, length, wavelength, reach, b
         least = np.inf
         largest = 0.0
         for i in range(3):
-            corner = corners[face, i]
-            g0, g1, g2 = corner[0] - start[0], corner[1] - start[1], corner[2] - start[2]
-            along = g0 * way[0] + g1 * way[1] + g2 * way[2]
+            g = minus(corners[face, i], start)
+            along = dot(g, way)
             behind += along < 0
             beyond += along > size
             past = before + min(max(along, 0.0), size)
             zone = math.sqrt(max(wavelength * past * max(length - past, 0.0) / length, _LEAST_M2))
-            own[i, 0] = (g0 * side[0] + g1 * side[1] + g2 * side[2]) / zone
-            own[i, 1] = (g0 * up[0] + g1 * up[1] + g2 * up[2]) / zone
+            own[i, 0], own[i, 1] = dot(g, side) / zone, dot(g, up) / zone
             least = min(least, math.hypot(own[i, 0], own[i, 1]))
             edge0, edge1 = own[i, 0] - own[0, 0], own[i, 1] - own[0, 1]
             largest = max(largest, math.hypot(edge0, edge1))
@@ -278,23 +250,16 @@ def occluded_fractions(legs, wavelength, body, reach, lines, scales, table, out)
     near, flat = np.empty((parts, 6)), np.empty((faces, 3, 2))
     lows, highs = np.empty(parts + faces), np.empty(parts + faces)
     begins, stops = np.empty((parts, lines)), np.empty((parts, lines))
-    way, side, up = np.empty(3), np.empty(3), np.empty(3)
     cosines, sines = np.empty(lines), np.empty(lines)
     half = 0.5 * math.pi / lines
     for line in range(lines):
         angle = (line + 0.5) * math.pi / lines
         cosines[line], sines[line] = math.cos(angle), math.sin(angle)
     for leg in range(len(starts)):
-        size = 0.0
-        for i in range(3):
-            way[i] = ends[leg, i] - starts[leg, i]
-            size += way[i] * way[i]
-        size = math.sqrt(size)
-        for i in range(3):
-            way[i] /= size
+        way, size = with_length(minus(ends[leg], starts[leg]))
+        side, up = _across(way)
         own = out[leg]
         own[:] = 0
-        _across(way, side, up)
         # Of the leg, and of the whole path that it belongs to.
         start, past, whole = starts[leg], before[leg], length[leg]
         count = _near_parts(start, way, side, up, size, past, whole, wavelength, reach, body, near)

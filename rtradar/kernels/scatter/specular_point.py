@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import cross, dot, minus, scaled, turned
 from rtradar.kernels.jit import compiled, inlined
 
 Array = NDArray[np.float64]
@@ -87,12 +88,6 @@ class Step(NamedTuple):
     f: float
     drop: float
     determinant: float
-
-
-@inlined(fastmath={"contract"})
-def dot(a, b):
-    """Product of two vectors."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined(fastmath={"contract"})
@@ -172,15 +167,8 @@ def _copolar(t, r, n, up, horizontal):
 
     Each polarisation is across its own line of sight.
     """
-    u0, u1, u2 = up[0], up[1], up[2]
-    along_t, along_r = dot(up, t), dot(up, r)
-    p0 = u1 * t[2] - u2 * t[1] if horizontal else u0 - along_t * t[0]
-    p1 = u2 * t[0] - u0 * t[2] if horizontal else u1 - along_t * t[1]
-    p2 = u0 * t[1] - u1 * t[0] if horizontal else u2 - along_t * t[2]
-    s0 = u1 * r[2] - u2 * r[1] if horizontal else u0 - along_r * r[0]
-    s1 = u2 * r[0] - u0 * r[2] if horizontal else u1 - along_r * r[1]
-    s2 = u0 * r[1] - u1 * r[0] if horizontal else u2 - along_r * r[2]
-    p, s = (p0, p1, p2), (s0, s1, s2)
+    p = cross(up, t) if horizontal else minus(up, scaled(t, dot(up, t)))
+    s = cross(up, r) if horizontal else minus(up, scaled(r, dot(up, r)))
     size = math.sqrt(dot(p, p) * dot(s, s))
     return (dot(p, s) - 2 * dot(p, n) * dot(s, n)) / size if size > 1e-12 else 1.0
 
@@ -339,8 +327,6 @@ def solve(begin, end, at, above, start, options, length, amplitude, point):
                 length[chirp, receiver, part] = out[0, receiver]
                 amplitude[chirp, receiver, part] = out[1, receiver]
                 if point.shape[0] > 0:
-                    x, y, z = out[2, receiver], out[3, receiver], out[4, receiver]
+                    place = turned(frame, (out[2, receiver], out[3, receiver], out[4, receiver]))
                     for j in range(3):
-                        point[chirp, receiver, part, j] = (
-                            centre[j] + frame[j, 0] * x + frame[j, 1] * y + frame[j, 2] * z
-                        )
+                        point[chirp, receiver, part, j] = centre[j] + place[j]

@@ -10,6 +10,8 @@ themselves, divided by the largest of the three.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rtradar.kernels.elementary import fast_phasor, sine
@@ -26,6 +28,19 @@ _EXACT_SERIES = 1.0
 
 _LEAST = 1e-4
 """Least spread of phases in the formula for large ones; less is taken for it, to 1e-9."""
+
+
+@inlined(fastmath=FAST)
+def excess_paths(antenna, x, y, z, out):
+    """Path from the antenna to each vertex less that to the origin, which is returned."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    distance = math.sqrt(a * a + b * b + c * c)
+    for i in range(len(x)):
+        p, q, r = x[i], y[i], z[i]
+        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
+        # |T - p| - |T| without the loss of digits of a far antenna.
+        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
+    return distance
 
 
 @inlined()

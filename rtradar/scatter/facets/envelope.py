@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.envelope import fill_envelope, find_slopes
+from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
@@ -148,9 +148,7 @@ class Envelope:
         self.prepare_courses([index])
         here, after = self._interval(index), self._interval(index + 1)
         before = self._interval(index - 1) if index > 0 else here
-        slope = np.empty_like(here.ratio)
-        find_slopes(index > 0, tuple(before), tuple(here), tuple(after), slope)
-        return Course(here.ratio, slope, here.known)
+        return Course(here.ratio, _slopes(before, here, after, inside=index > 0), here.known)
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
         """The keyframe before an interval, if any, those at its ends, and the one after it."""
@@ -216,6 +214,36 @@ def whole_echo(sample: Sample, owner: Indices) -> Scale:
     """
     power = (np.abs(sample.ratio * sample.strength) ** 2).mean(axis=(0, 1))
     return np.asarray(np.sqrt(np.bincount(owner, power)[owner]))
+
+
+def _slopes(before: _Interval, here: _Interval, after: _Interval, *, inside: bool) -> Field:
+    """Slopes per place (place, node, pair, part) where a part is known.
+
+    They are those of the parabola through three places, the known ones on either side of it; at the
+    very start, not ``inside``, that of a straight line.
+    """
+    last = len(here.known) - 1
+    known = np.concatenate([before.known[:-1], here.known, after.known[1:]])
+    number = np.arange(len(known))[:, None]
+    earlier = np.maximum.accumulate(np.where(known, number, 0))
+    later = np.minimum.accumulate(np.where(known, number, 3 * last)[::-1])[::-1]
+    place, part = np.nonzero(here.known)
+    at = place + last
+    left, right = earlier[at - 1, part], later[at + 1, part]
+    gap, next_gap = (at - left)[:, None, None], (right - at)[:, None, None]
+
+    def ratio(number: Indices) -> Field:
+        several = np.stack([before.ratio, here.ratio, after.ratio])
+        interval = np.clip(number // last, 0, 2)
+        return np.asarray(several[interval, number - interval * last, :, :, part])
+
+    value = ratio(at)
+    rise, next_rise = (value - ratio(left)) / gap, (ratio(right) - value) / next_gap
+    if not inside:
+        rise = np.where((place == 0)[:, None, None], next_rise, rise)
+    slope = np.empty_like(here.ratio)
+    slope[place, :, :, part] = (rise * next_gap + next_rise * gap) / (gap + next_gap)
+    return slope
 
 
 # -- before a whole array --------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import numpy as np
 from references.cases import Pair, filled, kernel_case
 from references.specular_point import geometry
 from rtradar.kernels.elementary import add_blended, cubic_weights, hermite_weights, smoothstep
-from rtradar.kernels.scatter.envelope import fill_envelope, find_slopes
+from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.mirrors import SlabPass, received_from_conductors, slab_fields
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.rooms import (
@@ -29,23 +29,6 @@ PLACES = 8
 # -- envelopes -------------------------------------------------------------------------------------
 
 
-def find_slopes_reference(before, here, after):
-    """Slopes (place, node, pair, part) of `find_slopes` inside a capture, 0 where unknown."""
-    slope = np.zeros_like(here[0])
-    parts, intervals = slope.shape[3], (before, here, after)
-    for part in range(parts):
-        # Both intervals that meet at a keyframe have it.
-        places = [np.flatnonzero(known[:, part]) for _, known in intervals]
-        at = np.concatenate([places[0][:-1] - PLACES, places[1], places[2][1:] + PLACES])
-        values = [ratio[own, ..., part] for (ratio, _), own in zip(intervals, places, strict=True)]
-        y = np.concatenate([values[0][:-1], values[1], values[2][1:]])
-        gaps = np.diff(at)[:, None, None]
-        rises = np.diff(y, axis=0) / gaps
-        through = (rises[:-1] * gaps[1:] + rises[1:] * gaps[:-1]) / (gaps[:-1] + gaps[1:])
-        slope[places[1], ..., part] = through[(at[1:-1] >= 0) & (at[1:-1] <= PLACES)]
-    return slope
-
-
 def _courses() -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Three neighbouring intervals of an envelope, each known at some of the places."""
     rng, size = np.random.default_rng(0), (9, 3, 5, 21)
@@ -54,13 +37,6 @@ def _courses() -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     ratio = rng.normal(size=(3, *size)) + 1j * rng.normal(size=(3, *size))
     ratio[1:, 0] = ratio[:2, 8]
     return tuple((r * k[:, None, None], k) for r, k in zip(ratio, known, strict=True))
-
-
-@kernel_case(find_slopes)
-def _slopes() -> Pair:
-    given, slope = _courses(), np.zeros((9, 3, 5, 21), dtype=np.complex128)
-    found = filled(find_slopes, True, *given, out=(slope,), adds=True)
-    return found, find_slopes_reference(*given)
 
 
 def fill_envelope_reference(chirps, fraction, tx, weights, course, strength):
