@@ -9,10 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from rtradar.kernels.elementary import dot, fast_phasor, minus
-from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.elementary import dot, fast_phasor, minus, turned_back
+from rtradar.kernels.jit import compiled
 
 
 class Triangles(NamedTuple):
@@ -50,12 +48,6 @@ class Equation(NamedTuple):
     electric: float
 
 
-@inlined()
-def place_on(corners, place, axis):
-    """One coordinate of the point that has these barycentric coordinates."""
-    return corners[0, axis] * place[0] + corners[1, axis] * place[1] + corners[2, axis] * place[2]
-
-
 @compiled(fastmath={"reassoc", "contract", "nsz", "arcp"})
 def fill_moments(triangles, edge_of, rules, equation, antennas, out):
     """Add to ``out (2, antenna, edge)`` the products of each current with the field of a dipole.
@@ -65,7 +57,6 @@ def fill_moments(triangles, edge_of, rules, equation, antennas, out):
     with the field that the equation has on its other side.
     """
     k, electric = equation.wavenumber, equation.electric
-    point = np.empty(3)
     for antenna in range(len(antennas)):
         position, moment = antennas[antenna, 0], antennas[antenna, 1]
         from_origin = math.sqrt(dot(position, position))
@@ -73,8 +64,7 @@ def fill_moments(triangles, edge_of, rules, equation, antennas, out):
             corners, normal = triangles.corners[t], triangles.normals[t]
             n_moment = dot(normal, moment)
             for p in range(len(rules.weights)):
-                for axis in range(3):
-                    point[axis] = place_on(corners, rules.places[p], axis)
+                point = turned_back(corners, rules.places[p])
                 away = minus(point, position)
                 distance = math.sqrt(dot(away, away))
                 # The path beyond that to the origin, without the cancellation of far antennas.

@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from rtradar.kernels.elementary import fast_phasor
+from rtradar.kernels.elementary import dot, fast_phasor, minus, plus, turned_back
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.surface_currents import place_on
 
 _LANES = 64
 _FAST = {"reassoc", "contract", "nsz", "arcp"}
@@ -40,8 +39,9 @@ def fill_matrices(triangles, orbits, rules, equation, out):
         corners = triangles.corners[s]
         radii[s] = _middle(corners, centroids[s])
         for q in range(points):
+            place = minus(turned_back(corners, rules.places[q]), centroids[s])
             for axis in range(3):
-                places[q, axis, s] = place_on(corners, rules.places[q], axis) - centroids[s, axis]
+                places[q, axis, s] = place[axis]
     sums, block = np.empty((_ROWS, _LANES)), np.empty((3, 3), dtype=np.complex128)
     stack = np.empty((15 * DEEPEST + 16, 2, 3, 3))
     for row in range(len(orbits.tested)):
@@ -77,7 +77,7 @@ def _scatter(t, s, orbits, weight, scales, block, out):
 
 @inlined()
 def _squared_distance(a, b):
-    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+    return dot(minus(a, b), minus(a, b))
 
 
 @inlined()
@@ -97,59 +97,48 @@ _ROWS = 32
 
 
 @inlined(fastmath=_FAST)
-def _add_pair(sums, lane, x, y, z, ox, oy, oz, rx, ry, rz, n0, n1, n2, weight, k, electric):
-    """Add a pair of points: (x, y, z) from the centroid of the tested triangle, o of the other.
+def _add(sums, row, lane, real, imaginary):
+    sums[2 * row, lane] += real
+    sums[2 * row + 1, lane] += imaginary
 
-    R = (rx, ry, rz) goes from the other point to the tested one, n is the normal at the latter. The
-    rows are pairs of real and imaginary part: G; K = j k G - h n.R; K times the tested place; K
+
+@inlined(fastmath=_FAST)
+def _add_times(sums, row, lane, real, imaginary, vector):
+    """Add a number times a vector, which takes three pairs of rows."""
+    _add(sums, row, lane, real * vector[0], imaginary * vector[0])
+    _add(sums, row + 1, lane, real * vector[1], imaginary * vector[1])
+    _add(sums, row + 2, lane, real * vector[2], imaginary * vector[2])
+
+
+@inlined(fastmath=_FAST)
+def _add_pair(sums, lane, tested, other, between, normal, weight, equation):
+    """Add a pair of points, each given from the centroid of its triangle.
+
+    R is ``between`` them, from the other point to the tested one, and n the normal at the latter.
+    The rows are pairs of real and imaginary part: G; K = j k G - h n.R; K times the tested place; K
     times the other place o; K times their product; h times the product of R and the tested place,
     times n.o and times 1; h R times n.o, and h R; with h = (1 + jkR) G / R^2, and both parts of the
     equation by their weights.
     """
-    squared = rx * rx + ry * ry + rz * rz
+    k, electric = equation.wavenumber, equation.electric
+    squared = dot(between, between)
     distance = math.sqrt(squared)
     cosine, sine = fast_phasor(-k * distance)
     g = weight / (4 * math.pi * distance)
     g_re, g_im = g * cosine, g * sine
     factor, turn = (1 - electric) / squared, k * distance
     h_re, h_im = factor * (g_re - turn * g_im), factor * (g_im + turn * g_re)
-    along = n0 * rx + n1 * ry + n2 * rz
+    along = dot(normal, between)
     k_re, k_im = -electric * k * g_im - h_re * along, electric * k * g_re - h_im * along
-    product = x * ox + y * oy + z * oz
-    up = n0 * ox + n1 * oy + n2 * oz
-    across = x * rx + y * ry + z * rz
-    sums[0, lane] += g_re
-    sums[1, lane] += g_im
-    sums[2, lane] += k_re
-    sums[3, lane] += k_im
-    sums[4, lane] += k_re * x
-    sums[5, lane] += k_im * x
-    sums[6, lane] += k_re * y
-    sums[7, lane] += k_im * y
-    sums[8, lane] += k_re * z
-    sums[9, lane] += k_im * z
-    sums[10, lane] += k_re * ox
-    sums[11, lane] += k_im * ox
-    sums[12, lane] += k_re * oy
-    sums[13, lane] += k_im * oy
-    sums[14, lane] += k_re * oz
-    sums[15, lane] += k_im * oz
-    sums[16, lane] += k_re * product + h_re * across * up
-    sums[17, lane] += k_im * product + h_im * across * up
-    sums[18, lane] += h_re * across
-    sums[19, lane] += h_im * across
-    sums[20, lane] += h_re * rx * up
-    sums[21, lane] += h_im * rx * up
-    sums[22, lane] += h_re * ry * up
-    sums[23, lane] += h_im * ry * up
-    sums[24, lane] += h_re * rz * up
-    sums[25, lane] += h_im * rz * up
-    sums[26, lane] += h_re * rx
-    sums[27, lane] += h_im * rx
-    sums[28, lane] += h_re * ry
-    sums[29, lane] += h_im * ry
-    sums[30, lane] += h_re * rz
-    sums[31, lane] += h_im * rz
+    product, up, across = dot(tested, other), dot(normal, other), dot(tested, between)
+    _add(sums, 0, lane, g_re, g_im)
+    _add(sums, 1, lane, k_re, k_im)
+    _add_times(sums, 2, lane, k_re, k_im, tested)
+    _add_times(sums, 5, lane, k_re, k_im, other)
+    _add(sums, 8, lane, k_re * product + h_re * across * up, k_im * product + h_im * across * up)
+    _add(sums, 9, lane, h_re * across, h_im * across)
+    _add_times(sums, 10, lane, h_re * up, h_im * up, between)
+    _add_times(sums, 13, lane, h_re, h_im, between)
 
 
 @inlined()
@@ -158,30 +147,23 @@ def _term(sums, row, lane):
 
 
 @inlined()
+def _vector(sums, row, lane):
+    return _term(sums, row, lane), _term(sums, row + 1, lane), _term(sums, row + 2, lane)
+
+
+@inlined()
 def _block(t, s, triangles, centroids, sums, lane, equation, block):
     """Fill the block (edge, edge) of two triangles from the sums, but for the scales."""
-    normal = triangles.normals[t]
     charge = complex(0.0, -4 * equation.electric / equation.wavenumber) * _term(sums, 0, lane)
+    both = plus(_vector(sums, 5, lane), _vector(sums, 10, lane))
     for i in range(3):
-        u0 = triangles.corners[t, i, 0] - centroids[t, 0]
-        u1 = triangles.corners[t, i, 1] - centroids[t, 1]
-        u2 = triangles.corners[t, i, 2] - centroids[t, 2]
-        tested = charge + _term(sums, 8, lane)
-        tested -= u0 * (_term(sums, 5, lane) + _term(sums, 10, lane))
-        tested -= u1 * (_term(sums, 6, lane) + _term(sums, 11, lane))
-        tested -= u2 * (_term(sums, 7, lane) + _term(sums, 12, lane))
-        upward = u0 * _term(sums, 13, lane) + u1 * _term(sums, 14, lane)
-        upward += u2 * _term(sums, 15, lane) - _term(sums, 9, lane)
+        u = minus(triangles.corners[t, i], centroids[t])
+        tested = charge + _term(sums, 8, lane) - dot(u, both)
+        upward = dot(u, _vector(sums, 13, lane)) - _term(sums, 9, lane)
         for j in range(3):
-            v0 = triangles.corners[s, j, 0] - centroids[s, 0]
-            v1 = triangles.corners[s, j, 1] - centroids[s, 1]
-            v2 = triangles.corners[s, j, 2] - centroids[s, 2]
-            value = tested + (u0 * v0 + u1 * v1 + u2 * v2) * _term(sums, 1, lane)
-            value -= v0 * _term(sums, 2, lane)
-            value -= v1 * _term(sums, 3, lane)
-            value -= v2 * _term(sums, 4, lane)
-            height = normal[0] * v0 + normal[1] * v1 + normal[2] * v2
-            block[i, j] = value + height * upward
+            v = minus(triangles.corners[s, j], centroids[s])
+            value = tested + dot(u, v) * _term(sums, 1, lane) - dot(v, _vector(sums, 2, lane))
+            block[i, j] = value + dot(triangles.normals[t], v) * upward
 
 
 @inlined()
@@ -193,18 +175,15 @@ def _add_own_field(t, triangles, centroids, equation, block):
         spread += _squared_distance(corners[i], centroid) / 12
     for i in range(3):
         for j in range(3):
-            product = 0.0
-            for axis in range(3):
-                product += (corners[i, axis] - centroid[axis]) * (corners[j, axis] - centroid[axis])
+            product = dot(minus(corners[i], centroid), minus(corners[j], centroid))
             block[i, j] += (1 - equation.electric) / 2 * triangles.areas[t] * (spread + product)
 
 
 @inlined(fastmath=_FAST)
 def _far_sums(t, first, lanes, triangles, centroids, places, rules, equation, sums):
     """Fill the sums of the tested triangle with each one of the lanes, by one product rule."""
-    k, electric = equation.wavenumber, equation.electric
-    n0, n1, n2 = triangles.normals[t, 0], triangles.normals[t, 1], triangles.normals[t, 2]
-    area = triangles.areas[t]
+    normal, area = triangles.normals[t], triangles.areas[t]
+    normal = normal[0], normal[1], normal[2]
     away = np.empty((3, _LANES))
     for axis in range(3):
         for lane in range(lanes):
@@ -213,17 +192,15 @@ def _far_sums(t, first, lanes, triangles, centroids, places, rules, equation, su
         for lane in range(lanes):
             sums[row, lane] = 0.0
     for p in range(len(rules.weights)):
-        x, y, z = places[p, 0, t], places[p, 1, t], places[p, 2, t]
+        tested = places[p, 0, t], places[p, 1, t], places[p, 2, t]
         for q in range(len(rules.weights)):
             weight = rules.weights[p] * rules.weights[q] * area
             for lane in range(lanes):
                 s = first + lane
-                ox, oy, oz = places[q, 0, s], places[q, 1, s], places[q, 2, s]
-                rx, ry, rz = away[0, lane] + x - ox, away[1, lane] + y - oy, away[2, lane] + z - oz
+                other = places[q, 0, s], places[q, 1, s], places[q, 2, s]
+                between = plus((away[0, lane], away[1, lane], away[2, lane]), minus(tested, other))
                 both = weight * triangles.areas[s]
-                _add_pair(
-                    sums, lane, x, y, z, ox, oy, oz, rx, ry, rz, n0, n1, n2, both, k, electric
-                )  # fmt: skip
+                _add_pair(sums, lane, tested, other, between, normal, both, equation)
 
 
 # -- triangles that are near or touch --------------------------------------------------------------
@@ -265,21 +242,11 @@ def _add_places(
     one, other, pairs, weight, t, s, triangles, centroids, equation, sums, lane
 ):  # fmt: skip
     """Add pairs of points, given by barycentric coordinates on parts of both triangles."""
-    normal, centroid, middle = triangles.normals[t], centroids[t], centroids[s]
     for pair in range(len(pairs)):
-        place, beside = pairs[pair, :3], pairs[pair, 3:6]
-        a0, a1, a2 = place_on(one, place, 0), place_on(one, place, 1), place_on(one, place, 2)
-        b0, b1, b2 = (
-            place_on(other, beside, 0),
-            place_on(other, beside, 1),
-            place_on(other, beside, 2),
-        )
-        _add_pair(
-            sums, lane, a0 - centroid[0], a1 - centroid[1], a2 - centroid[2],
-            b0 - middle[0], b1 - middle[1], b2 - middle[2], a0 - b0, a1 - b1, a2 - b2,
-            normal[0], normal[1], normal[2], weight * pairs[pair, 6], equation.wavenumber,
-            equation.electric,
-        )  # fmt: skip
+        place = turned_back(one, pairs[pair, :3])
+        beside = turned_back(other, pairs[pair, 3:6])
+        ends = minus(place, centroids[t]), minus(beside, centroids[s]), minus(place, beside)
+        _add_pair(sums, lane, *ends, triangles.normals[t], weight * pairs[pair, 6], equation)
 
 
 @inlined()

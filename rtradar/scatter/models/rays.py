@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
+from rtradar.body import Body, Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
@@ -25,7 +25,7 @@ from rtradar.scatter.facets.skin import Skin, skin_of
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, PosedGrid
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -207,7 +207,7 @@ class _Ellipsoids:
     def at(self, time_s: float) -> _Posed:
         (centres,), (frames,), axes = self._body.at([time_s])
         self._tracer.pose(centres, frames)
-        grid = PosedGrid(self._grid, centres, frames, axes)
+        grid = replace(self._grid, pose=Ellipsoids(centres, frames, axes))
         return _Posed(self._tracer, grid, np.arange(len(axes)))
 
 
@@ -224,7 +224,7 @@ class _Skins:
         parts = zip(self._skins, counts[:-1], strict=True)
         self._part = np.concatenate([np.repeat(own.part, 4) + first for own, first in parts])
         # As at the start, so that each facet keeps its place in the material.
-        self._divisions = MeshGrid.divisions_of_skin(self._corners(0.0), edge)
+        self._divisions = MeshGrid.divisions(self._corners(0.0), edge, by_area=True)
 
     def at(self, time_s: float) -> _Posed:
         corners = self._corners(time_s)

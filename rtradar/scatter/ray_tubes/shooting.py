@@ -184,8 +184,5 @@ def _trace(surfaces: Surfaces, here: Footprints, onward: Array) -> tuple[NDArray
 def _joined(parts: list[Footprints], like: Footprints) -> Footprints:
     if not parts:
         return like.take(np.zeros(len(like), dtype=bool))
-    arrays = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in Footprints.__dataclass_fields__
-    )
-    return Footprints(*arrays)
+    names = Footprints.__dataclass_fields__
+    return Footprints(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

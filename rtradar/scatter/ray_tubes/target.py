@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -13,7 +14,7 @@ from rtradar.errors import InputError
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, PosedGrid
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid
 from rtradar.scatter.target import target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
@@ -83,8 +84,7 @@ def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surface
     if isinstance(solid, Ellipsoids):
         surfaces = BodyTracer(mi, solid.semi_axes)
         surfaces.pose(solid.centres, solid.frames)
-        facets = EllipsoidGrid.cover(solid.semi_axes, edge)
-        return surfaces, PosedGrid(facets, solid.centres, solid.frames, solid.semi_axes)
+        return surfaces, replace(EllipsoidGrid.cover(solid.semi_axes, edge), pose=solid)
     grid = MeshGrid.cut(solid.corners, MeshGrid.divisions(solid.corners, edge))
     return MeshTracer(mi, solid.corners), grid
 

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body import Ellipsoids
 from rtradar.errors import InputError
 
 MOST_TUBES = 4_000_000
@@ -42,11 +43,12 @@ class EllipsoidGrid:
     """Facets of the parts of a body, in the axes in which each part is a unit sphere.
 
     ``corners (tube, 3, 3)`` are on a sphere a little larger than 1, so that the mean of |x|^2 over
-    the facets is 1; ``part (tube,)`` is the part of each.
+    the facets is 1; ``part (tube,)`` is the part of each. In one ``pose`` the body is `Ellipsoids`.
     """
 
     corners: Array
     part: NDArray[np.int64]
+    pose: Ellipsoids | None = None
 
     @classmethod
     def cover(cls, semi_axes: Array, edge: float) -> EllipsoidGrid:
@@ -71,35 +73,21 @@ class EllipsoidGrid:
         out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
         size = np.linalg.norm(quarters, axis=-1, keepdims=True)
         quarters *= (1 + np.repeat(out, 4)[:, None, None] / 4) / size
-        return EllipsoidGrid(quarters, np.repeat(self.part[which], 4))
-
-
-@dataclass(frozen=True)
-class PosedGrid:
-    """Facets of a body in one pose: ``centres``, ``frames``, ``semi_axes`` of its parts [m]."""
-
-    grid: EllipsoidGrid
-    centres: Array
-    frames: Array
-    semi_axes: Array
+        return EllipsoidGrid(quarters, np.repeat(self.part[which], 4), self.pose)
 
     @cached_property
     def tubes(self) -> Tubes:
-        """The facets in the world."""
-        u, part = _with_middle(self.grid.corners), self.grid.part
+        """The facets in the world, in their pose."""
+        assert self.pose is not None
+        u, part = _with_middle(self.corners), self.part
         place, normal = np.empty_like(u), np.empty_like(u)
-        for index, (centre, frame, axes) in enumerate(
-            zip(self.centres, self.frames, self.semi_axes, strict=True)
-        ):
+        each = zip(self.pose.centres, self.pose.frames, self.pose.semi_axes, strict=True)
+        for index, (centre, frame, axes) in enumerate(each):
             own = slice(*np.searchsorted(part, [index, index + 1]))
             place[own] = centre + (u[own] * axes) @ frame.T
             normal[own] = (u[own] / axes) @ frame.T
         normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         return Tubes(place, normal, part)
-
-    def split(self, which: NDArray[np.int64]) -> PosedGrid:
-        """Those facets, each in four."""
-        return PosedGrid(self.grid.split(which), self.centres, self.frames, self.semi_axes)
 
 
 @dataclass(frozen=True)
@@ -110,24 +98,18 @@ class MeshGrid:
     face: NDArray[np.int64]
 
     @staticmethod
-    def divisions(triangles: Array, edge: float) -> NDArray[np.int64]:
+    def divisions(triangles: Array, edge: float, *, by_area: bool = False) -> NDArray[np.int64]:
         """How often to cut triangles (face, 3, 3) until no side is longer than ``edge`` [m].
 
-        An `InputError` is raised if the facets would be more than `MOST_TUBES`.
+        With ``by_area`` facets get the area that those of `EllipsoidGrid` have: no triangle of a
+        skin is so long and thin that its sides would have to be cut. An `InputError` is raised if
+        the facets would be more than `MOST_TUBES`.
         """
-        divisions = np.maximum(1, np.ceil(_longest(triangles) / edge * (1 - 1e-12)))
-        _refuse_many(divisions**2)
-        return divisions.astype(np.int64)
-
-    @staticmethod
-    def divisions_of_skin(triangles: Array, edge: float) -> NDArray[np.int64]:
-        """How often to cut triangles (face, 3, 3) for facets of the area that `EllipsoidGrid` has.
-
-        None of a skin is so long and thin that its sides would have to be cut. An `InputError` is
-        raised if the facets would be more than `MOST_TUBES`.
-        """
-        areas = np.linalg.norm(_across(triangles), axis=1) / 2
-        divisions = np.maximum(1, np.round(_sides(areas, edge)))
+        if by_area:
+            wanted = np.round(_sides(np.linalg.norm(_across(triangles), axis=1) / 2, edge))
+        else:
+            wanted = np.ceil(_longest(triangles) / edge * (1 - 1e-12))
+        divisions = np.maximum(1, wanted)
         _refuse_many(divisions**2)
         return divisions.astype(np.int64)
 
@@ -155,7 +137,7 @@ class MeshGrid:
         return MeshGrid(in_four(self.corners[which]), np.repeat(self.face[which], 4))
 
 
-Grid = PosedGrid | MeshGrid
+Grid = EllipsoidGrid | MeshGrid
 """Facets, fixed in the material, that can be split."""
 
 

@@ -140,7 +140,7 @@ def test_tubes_on_a_skin_are_as_large_as_asked_and_cover_it(preset):
     skin = skin_of(person(), radar.start_frequency_hz + radar.bandwidth_hz)
     corners, edge = skin.posed(0.0)[1][skin.fine], radar.wavelength_m / RAYS_PER_WAVELENGTH
     areas = area_of(corners)
-    divisions = MeshGrid.divisions_of_skin(corners, edge)
+    divisions = MeshGrid.divisions(corners, edge, by_area=True)
     assert (divisions**2).sum() < MOST_TUBES
     # Rounding leaves a side of 1.5 edges whole.
     assert (areas / divisions**2).max() <= 2.25 * np.sqrt(3) / 4 * edge**2
