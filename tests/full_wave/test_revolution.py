@@ -123,11 +123,10 @@ def test_an_antenna_too_near_is_warned_of() -> None:
 
 
 def test_each_pair_of_antennas_may_have_its_own_frequency() -> None:
-    sphere = bodies(0.0, turn=ALONG_X)
-    frequencies, at = np.array([8e9, 12e9, 8e9]), np.array([[1.0, 0.0, 0.2]] * 3)
-    several = rt.scattering_length(sphere, at, at, frequencies, "full-wave")
-    single = [rt.scattering_length(sphere, at[0], at[0], f, "full-wave")[0] for f in frequencies]
-    np.testing.assert_allclose(several, single, rtol=1e-12)
+    sphere, at = bodies(0.0, turn=ALONG_X), np.array([[1.0, 0.0, 0.2]] * 2)
+    several = rt.scattering_length(sphere, at, at, np.array([8e9, 12e9]), "full-wave")
+    assert several[1] == pytest.approx(full_wave(sphere, at[0], at[0]), rel=1e-12)
+    assert abs(several[0] / several[1] - 1) > 0.1
 
 
 def test_a_body_of_skin_is_one_of_its_permittivity() -> None:

@@ -112,19 +112,6 @@ def test_the_longest_tables_have_room(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("n_cycles", [133, 666])
-def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
-    dft = prime_factor_dft(n_cycles)
-    assert dft is not None
-    n = np.arange(n_cycles)
-    tones = np.exp(2j * np.pi * np.outer(n, n) / n_cycles).astype(np.complex64)[:, None]
-    power = np.zeros((n_cycles, n_cycles), dtype=np.float32)
-    add_doppler_power(
-        tones, range(1), np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power
-    )
-    np.testing.assert_allclose(power, np.eye(n_cycles), atol=1e-6)
-
-
 def test_what_is_no_number_stays_in_its_range_bin() -> None:
     spectra = np.ones((133, 1, 70), dtype=np.complex64)
     spectra[7, 0, 3] = np.nan
@@ -133,11 +120,3 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
     add_doppler_power(spectra, range(1), np.ones(133, dtype=np.float32), dft, power)
     assert np.isnan(power[:, 3]).all()
     assert np.isfinite(np.delete(power, 3, axis=1)).all()
-
-
-def test_its_multiply_adds_are_counted() -> None:
-    dft = prime_factor_dft(35)
-    assert dft is not None
-    # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and
-    # five of seven; of both parts.
-    assert dft.multiply_adds == 2 * (7 * (2 * 2 + 2 * 2) + 5 * (3 * 3 + 3 * 3))

@@ -95,30 +95,26 @@ class SpecularVisibility:
         visible, start = trace_keyframe(self._tracer, at)
         return np.packbits(visible), start
 
-    def at(
-        self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Visibility and starting points at chirps, of some parts or all of them.
+    def at(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Visibility and starting points at chirps.
 
         Returned are weights (chirp, rx, part), 1 visible, 0 occluded, in between on the ramp
         between two keyframes that differ; and the specular points (chirp, part, 3) of one pair at
         the keyframe before, in the parts' axes [m].
         """
         chirps = np.asarray(chirps, dtype=np.int64)
-        if parts is None:
-            parts = np.arange(len(self._body.part_names))
-        weight = np.empty((len(chirps), self._radar.n_rx, len(parts)))
-        start = np.empty((len(chirps), len(parts), 3))
+        parts = len(self._body.part_names)
+        weight = np.empty((len(chirps), self._radar.n_rx, parts))
+        start = np.empty((len(chirps), parts, 3))
         tx = self._radar.tx_of_chirp(chirps)
         intervals, rest = keyframe_before(self._radar, chirps, self._step)
         for interval in np.unique(intervals):
             inside = np.flatnonzero(intervals == interval)
             first = int(interval) * self._step
             before = self._keyframe(first)
-            weight[inside] = before.visible[..., parts][tx[inside]]
-            start[inside] = before.start[parts]
+            weight[inside], start[inside] = before.visible[tx[inside]], before.start
             if (rest[inside] > 0).any():
-                after = self._keyframe(first + self._step).visible[..., parts][tx[inside]]
+                after = self._keyframe(first + self._step).visible[tx[inside]]
                 ramp = smoothstep(rest[inside] / self._step)[:, None, None]
                 weight[inside] = (1 - ramp) * weight[inside] + ramp * after
         return weight, start

@@ -8,7 +8,6 @@ import scipy.fft
 from references.cases import Pair, filled, kernel_case, samples
 from rtradar.kernels.angles import Steering, beam_power
 from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
-from rtradar.kernels.prime_factor_dft import add_doppler_power, pick_cells, prime_factor_dft
 
 # -- expected echoes -------------------------------------------------------------------------------
 
@@ -66,32 +65,6 @@ def doppler_power_reference(spectra, channels, weights):
     """The power that `add_doppler_power` adds, by SciPy."""
     chosen = spectra[:, channels.start : channels.stop].astype(np.complex128)
     return (np.abs(scipy.fft.fft(chosen * weights[:, None, None], axis=0)) ** 2).sum(axis=1)
-
-
-# Of 261 range bins, 256 are transformed together.
-@kernel_case(add_doppler_power, 3e-6)
-def _doppler_power() -> Pair:
-    given = samples(133, 3, 261), range(3), np.linspace(0, 1, 133, dtype=np.float32)
-    out = (np.empty((133, 261), dtype=np.float32),)
-    found = filled(add_doppler_power, *given, prime_factor_dft(133), out=out, adds=True)
-    return found, doppler_power_reference(*given)
-
-
-def pick_cells_reference(spectra, weights, cells):
-    """The values of `pick_cells` in all channels, by SciPy."""
-    turns, at, bins = cells
-    weighted = spectra.astype(np.complex128) * weights[:, None, None]
-    transformed = scipy.fft.fft(weighted, axis=0)
-    return transformed[turns[:, None], :, bins[at]]
-
-
-@kernel_case(pick_cells, 3e-6)
-def _pick_cells() -> Pair:
-    spectra, weights, cell = samples(133, 3, 256), np.linspace(0, 1, 133, "f4"), np.arange(400)
-    cells = cell * 7 % 133, cell[:, None] // 3 + np.arange(9), np.arange(142) + 60
-    given, out = (spectra, range(3), weights, prime_factor_dft(133), cells), (400, 9, 3)
-    found = filled(pick_cells, *given, out=(np.empty(out, dtype=np.complex64),))
-    return found, pick_cells_reference(spectra, weights, cells)
 
 
 # -- angles ----------------------------------------------------------------------------------------

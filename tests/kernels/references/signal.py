@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 from numpy.polynomial.polynomial import polyvander
 
 from references.cases import Pair, filled, kernel_case, samples
@@ -17,7 +16,6 @@ from rtradar.kernels.nufft import (
     BetweenAnchors,
     add_anchored_tones,
     fill_anchors,
-    sum_by_nufft,
 )
 from rtradar.kernels.tone_sum import Tones, add_tones, tone_tables
 
@@ -52,12 +50,6 @@ def _tone_sum(nodes: int, echoes: int, n_samples: int) -> Pair:
     out = (np.empty((3, 3, n_samples), dtype=np.complex64),)
     found = filled(add_tones, 0, 3, tones, tone_tables(np.float32), out=out)
     return found, tone_sum_reference(tones, n_samples, polyvander)
-
-
-@kernel_case(sum_by_nufft, 1e-6)
-def _nufft() -> Pair:
-    tones, out = _tones(3, 315, 2, legvander), (np.empty((2, 3, 256), dtype=np.complex64),)
-    return filled(sum_by_nufft, tones, out=out), tone_sum_reference(tones, 256, legvander)
 
 
 def anchored_tones_reference(anchors, between, samples):

@@ -10,18 +10,15 @@ from rtradar.scatter.common.interpolation import interpolation_weights, sweep_no
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 33])
-def test_nodes_ascend_and_are_zeros_of_the_chebyshev_polynomial(count: int) -> None:
+def test_nodes_are_chebyshevs_and_the_polynomial_through_them_is_of_their_degree(
+    count: int,
+) -> None:
     radar = Radar.preset("paper-12ghz")
     nodes = sweep_nodes(radar, count)
     assert (np.diff(nodes) > 0).all()
     place = (nodes - radar.centre_frequency_hz) / (radar.bandwidth_hz / 2)
     np.testing.assert_allclose(np.cos(count * np.arccos(place)), 0, atol=1e-12)
-
-
-@pytest.mark.parametrize("count", [1, 2, 5, 33])
-def test_the_polynomial_through_nodes_is_that_of_its_degree(count: int) -> None:
-    radar = Radar.preset("paper-12ghz")
-    nodes, places = sweep_nodes(radar, count), sweep_nodes(radar, 7)
+    places = sweep_nodes(radar, 7)
 
     def polynomial(frequency: np.ndarray) -> np.ndarray:
         x = (frequency - radar.centre_frequency_hz) / radar.bandwidth_hz
@@ -30,8 +27,3 @@ def test_the_polynomial_through_nodes_is_that_of_its_degree(count: int) -> None:
     np.testing.assert_allclose(
         interpolation_weights(nodes, places) @ polynomial(nodes), polynomial(places), rtol=1e-12
     )
-
-
-def test_places_at_nodes_take_their_values() -> None:
-    nodes = np.linspace(0, 1, 4)
-    np.testing.assert_array_equal(interpolation_weights(nodes, nodes), np.eye(4))

@@ -12,14 +12,12 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import (
     Polarization,
     antenna_field,
-    bisector,
     body_material,
     body_reflection,
     material_factor,
@@ -170,17 +168,3 @@ def test_a_model_of_skin_is_the_conductor_times_its_factor(fidelity: str) -> Non
     straight = np.conj((np.sqrt(ETA[0]) - 1) / (np.sqrt(ETA[0]) + 1))
     # Half of the angle between Tx and Rx is at most 3 degrees: TE and TM differ by its square.
     np.testing.assert_allclose(ratio, straight, rtol=3e-3)
-
-
-def test_what_a_conductor_sends_to_a_receiver_is_the_product_with_its_reflected_field() -> None:
-    rng = np.random.default_rng(0)
-    fields = rng.normal(size=(2, 3, 4, 2, 2, 5, 3, 2)).view(np.complex128)[..., 0]
-    to_tx, to_rx = unit(rng.normal(size=(2, 4, 2, 2, 5, 3)))
-    sent, received = fields
-    normals = bisector(to_tx[:, :, :, None], to_rx[:, :, None])
-    eta = np.full(3, np.inf)
-    returned = body_reflection(sent[:, :, :, :, None], -normals, normals, eta)
-    expected = (received[:, :, :, None] * returned).sum(axis=-1)
-    found = np.empty(expected.shape, dtype=np.complex128)
-    received_from_conductors(0, 4, sent, received, to_tx, to_rx, found)
-    assert np.allclose(found, expected, rtol=0, atol=1e-12)

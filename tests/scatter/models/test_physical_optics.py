@@ -301,6 +301,10 @@ def test_a_slow_envelope_is_interpolated_from_the_keyframes_alone() -> None:
     np.testing.assert_allclose(got[:, 0], [law(4 + s) for s in fraction], atol=1.5e-3)
     np.testing.assert_allclose(got[:, 1], 1, rtol=1e-15)
     assert all(place == round(place) for place in asked)
+    # They may be asked for backwards.
+    for index in [*range(40, 0, -1), 40, 20, 1]:
+        got, expected = between(envelope, index, fraction), [law(index + s) for s in fraction]
+        np.testing.assert_allclose(got[:, 0], expected, atol=1.5e-3)
 
 
 def test_where_it_bends_keyframes_come_closer_and_the_error_falls() -> None:
@@ -353,21 +357,6 @@ def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
             )
     assert len(asked) == len(set(asked)) > 21
     assert any(place != round(place) for place in asked)
-
-
-def test_courses_may_be_asked_for_backwards() -> None:
-    def law(t: float) -> complex:
-        return complex(np.exp(0.3j * t))
-
-    fraction = np.linspace(0, 1, 5, endpoint=False)
-    envelope, _ = envelope_of(law, tolerance=0.1)
-    for index in [*range(40, 0, -1), 40, 20, 1]:
-        # As above: a cubic through slopes by neighbours.
-        np.testing.assert_allclose(
-            between(envelope, index, fraction)[:, 0],
-            [law(index + s) for s in fraction],
-            atol=1.5e-3,
-        )
 
 
 @given(st.integers(0, 2**32 - 1))

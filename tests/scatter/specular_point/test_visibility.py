@@ -178,14 +178,3 @@ def test_keyframes_are_the_same_where_only_a_few_are_remembered(
     np.testing.assert_array_equal(np.concatenate(pieces), whole)
     # The first two stayed; each of the others is traced once more.
     assert len(traced) == 12 + 10
-
-
-def test_some_parts_are_as_among_all(backend: Backend) -> None:
-    radar, body = small_radar(), Curtain(speed=0.5)
-    seen = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
-    for chirps in (np.arange(100, 160), np.array([100])):
-        weight, start = seen.at(chirps)
-        for parts in ([1], [1, 0], []):
-            some, of_some = seen.at(chirps, np.array(parts, dtype=np.int64))
-            np.testing.assert_array_equal(some, weight[..., parts])
-            np.testing.assert_array_equal(of_some, start[:, parts])
