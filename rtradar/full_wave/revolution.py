@@ -21,13 +21,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import qr, solve_triangular
 
 from rtradar.errors import InputError
 from rtradar.full_wave.antennas import Dipole, Polarization, antenna_moments, wavenumber
-from rtradar.full_wave.least_squares import LeastSquares
 from rtradar.full_wave.revolution_curves import Rings, Spheroid
 from rtradar.full_wave.revolution_modes import Medium
 
@@ -39,6 +40,10 @@ LARGEST_BYTES = 2 * 2**30
 
 _OF_THE_WAY = 0.75
 """How far sources stand between the surface and the line between the foci, at most."""
+
+
+_NEGLIGIBLE = 1e-13
+"""Pivot, relative to the largest one, below which a source adds nothing but rounding."""
 
 
 @dataclass(frozen=True)
@@ -221,8 +226,8 @@ class BodiesOfRevolution:
     # -- the problem of each mode ------------------------------------------------------------------
 
     @cached_property
-    def _factors(self) -> list[LeastSquares]:
-        return [LeastSquares.of(matrix) for matrix in self._matrices()]
+    def _factors(self) -> list[_LeastSquares]:
+        return [_LeastSquares.of(matrix) for matrix in self._matrices()]
 
     def _matrices(self) -> Iterator[Field]:
         """Tangential fields (row, unknown) of all sources, the matrix of each mode.
@@ -382,3 +387,39 @@ def _distinct(
     places, index = np.unique(antennas, axis=0, return_inverse=True)
     moments = antenna_moments(places, polarization)
     return [Dipole(*one) for one in zip(places, moments, strict=True)], index.ravel()
+
+
+class _LeastSquares(NamedTuple):
+    """Pivoted orthogonal factors of a matrix, some of whose columns may be spoiled by rounding.
+
+    Attributes
+    ----------
+    q : (row, rank) complex128
+        Orthonormal columns.
+    r : (rank, rank) complex128
+        Upper triangle.
+    columns : (rank,) int64
+        Unknowns that are used, in the order of the triangle.
+    unknowns : int
+        Number of all unknowns.
+    """
+
+    q: Field  # (row, rank)
+    r: Field  # (rank, rank)
+    columns: NDArray[np.int64]  # (rank,)
+    unknowns: int
+
+    @classmethod
+    def of(cls, matrix: Field) -> _LeastSquares:
+        """Factorise a matrix (row, unknown), and leave out what rounding has spoiled."""
+        q, r, pivots = qr(matrix, mode="economic", pivoting=True, check_finite=False)
+        size = np.abs(np.diagonal(r))
+        rank = int(np.count_nonzero(size > _NEGLIGIBLE * size[0]))
+        return cls(q[:, :rank], r[:rank, :rank], pivots[:rank], matrix.shape[1])
+
+    def solve(self, right: Field) -> tuple[Field, Array]:
+        """Find solutions (unknown, case), and the squares of what they leave (case,)."""
+        seen = self.q.conj().T @ right
+        out = np.zeros((self.unknowns, right.shape[1]), dtype=np.complex128)
+        out[self.columns] = solve_triangular(self.r, seen, check_finite=False)
+        return out, np.sum(np.abs(right - self.q @ seen) ** 2, axis=0)

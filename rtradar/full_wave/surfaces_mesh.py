@@ -11,7 +11,7 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from rtradar.errors import InputError
-from rtradar.kernels.surface_currents import Orbits, Triangles
+from rtradar.kernels.surface_integrals import Orbits, Triangles
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -13,7 +13,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.full_wave import ClosedMesh, ConductingSurface
-from rtradar.full_wave.surfaces_quadrature import rules
+from rtradar.full_wave.surfaces import rules
 
 solves = pytest.mark.slow
 """What solves compiles for 40 s, and no level of a run does."""

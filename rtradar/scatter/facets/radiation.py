@@ -177,10 +177,18 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
 
     It is for exp(+j omega t), and 0 where nothing is lit. `Views` need not mark what faces away.
     """
-    views = Views(*map(_own, views, (np.int64, np.float64, np.int64, np.float32)))
-    pairs, carrier, wavenumber, spreading, currents = waves
-    reals = (_own(array, np.float64) for array in (carrier, wavenumber))
-    waves = Waves(_own(pairs, np.int64), *reals, spreading, _own(currents, np.float64))
+    views = Views(
+        _own(views.part, np.int64),
+        _own(views.antennas, np.float64),
+        _own(views.row, np.int64),
+        _own(views.seen, np.float32),
+    )
+    waves = waves._replace(
+        pairs=_own(waves.pairs, np.int64),
+        carrier=_own(waves.carrier, np.float64),
+        wavenumber=_own(waves.wavenumber, np.float64),
+        currents=_own(waves.currents, np.float64),
+    )
     tasks = len(views.part)
     shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
     out = np.empty(shape, dtype=np.complex128)

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from references.cases import Pair, filled, kernel_case
+from rtradar.full_wave.surfaces import rules
 from rtradar.full_wave.surfaces_mesh import ClosedMesh
-from rtradar.full_wave.surfaces_quadrature import rules
-from rtradar.kernels.surface_currents import Equation, fill_moments
-from rtradar.kernels.surface_integrals import DEEPEST, FAR, fill_matrices
+from rtradar.kernels.surface_integrals import DEEPEST, FAR, Equation, fill_matrices, fill_moments
 
 
 def _octahedron() -> Any:
