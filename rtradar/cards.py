@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
@@ -116,3 +116,11 @@ def quantity(value: float, unit: str) -> str:
     power = 3 * math.floor(math.log10(abs(value)) / 3) if value and math.isfinite(value) else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{value / 10.0**power:.4g} {_PREFIXES[power]}{unit}"
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> str:
+    """Return rows of cells as aligned text: the first column to the left, the others right."""
+    first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
+    return "\n".join(
+        "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]).rstrip() for row in rows
+    )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.cards import text_table
 from rtradar.classify.scores import Answers
 from rtradar.classify.splits import Split
 from rtradar.clouds.collection import Collection
@@ -21,9 +22,12 @@ HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy",
 """Quantities measured in every epoch."""
 
 _MAX_CHARACTERS = 100_000_000
-_COLUMNS = dict.fromkeys(("indices", "truth", "predicted"), np.int64) | dict.fromkeys(
-    ("tested_on", "recordings"), np.str_
-)
+_KINDS = {
+    "indices": "i", "truth": "i", "predicted": "i", "tested_on": "U", "recordings": "U",
+    "subjects": "U", "probabilities": "f",
+}  # fmt: skip
+_LATER = ("subjects", "probabilities")
+"""Kind of each array in NumPy's letters, and those that are empty in older files."""
 
 
 @dataclass(frozen=True)
@@ -116,15 +120,18 @@ def save_outcome(path: Path, outcome: Outcome) -> None:
 def load_outcome(path: Path) -> Outcome:
     """Read an outcome; InputError if it cannot be read or is damaged."""
     try:
-        content = read_json(path)
-        content = {"subjects": [], "probabilities": []} | content
-        columns = {name: _column(content[name], dtype) for name, dtype in _COLUMNS.items()}
-        columns["subjects"] = _column(content["subjects"], np.str_)
-        columns["probabilities"] = _chances(content["probabilities"], len(columns["subjects"]))
-        outcome = Outcome(**content | columns)
-        if not _is_whole(outcome):
+        outcome = Outcome(**read_json(path))
+        count = len(outcome.truth)
+        arrays = {name: _array(name, getattr(outcome, name), count) for name in _KINDS}
+        texts = (outcome.name, outcome.trained_on)
+        rows = [[row[name] for name in HISTORY] for row in outcome.history]
+        # NaN and infinity are numbers, as a training may diverge.
+        numbers = np.array(rows).dtype.kind in "if"
+        if not all(isinstance(text, str) for text in texts) or not numbers:
             raise ValueError
-        return outcome
+        if type(outcome.history) is not list or any(len(row) > len(HISTORY) for row in rows):
+            raise ValueError
+        return replace(outcome, **arrays)
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
         raise InputError(
             f"'{path}' is damaged; remove it and train again: "
@@ -132,48 +139,23 @@ def load_outcome(path: Path) -> Outcome:
         ) from None
 
 
-def _column(values: Any, dtype: Any) -> NDArray[Any]:
-    """Array of one value for each cloud; TypeError or ValueError for another type or huge names."""
-    expected = str if dtype is np.str_ else int
-    if not isinstance(values, list) or not all(type(one) is expected for one in values):
-        raise TypeError
-    # NumPy allocates the length of the longest name for every name.
-    if dtype is np.str_ and len(values) * max(map(len, values), default=0) > _MAX_CHARACTERS:
+def _array(name: str, values: Any, count: int) -> NDArray[Any]:
+    """Array of a value, or a row of probabilities, for each cloud; ValueError if it is none."""
+    kind = _KINDS[name]
+    if name in _LATER and not len(values):
+        return np.zeros(0, np.str_) if kind == "U" else np.zeros((0, 0))
+    if kind == "U":
+        # NumPy would make texts of numbers, and allocate the length of the longest for every one.
+        lengths = [len(value) for value in values if isinstance(value, str)]
+        if len(lengths) < len(values) or len(values) * max(lengths, default=0) > _MAX_CHARACTERS:
+            raise ValueError
+    array = np.array(values)
+    fits = array.dtype.kind == kind and array.ndim == (2 if kind == "f" else 1)
+    if not fits or len(array) != count or (kind != "U" and array.min() < 0):
         raise ValueError
-    return np.array(values, dtype=dtype)
-
-
-def _chances(values: Any, count: int) -> NDArray[np.float64]:
-    """Array (test, class) of probabilities, or an empty one; ValueError for any other."""
-    if not isinstance(values, list) or len(values) != count:
+    if kind == "f" and array.max() > 1 + 1e-6:
         raise ValueError
-    if not values:
-        return np.zeros((0, 0))
-    found = np.array(values, dtype=np.float64)
-    if found.ndim != 2 or not np.all((found >= 0) & (found <= 1 + 1e-6)):
-        raise ValueError
-    return found
-
-
-def _is_number(value: Any) -> bool:
-    """Return whether a value is a number; NaN and infinity are, as a training may diverge."""
-    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**53)
-
-
-def _is_whole(outcome: Outcome) -> bool:
-    """Return whether all fields are present and of their types."""
-    columns = [getattr(outcome, name) for name in _COLUMNS]
-    return (
-        isinstance(outcome.name, str)
-        and isinstance(outcome.trained_on, str)
-        and all(column.shape == (len(outcome.truth),) for column in columns)
-        and len(outcome.subjects) in (0, len(outcome.truth))
-        and len(outcome.truth) > 0
-        and min(outcome.indices.min(), outcome.truth.min(), outcome.predicted.min()) >= 0
-        and isinstance(outcome.history, list)
-        and all(isinstance(row, dict) and set(row) == set(HISTORY) for row in outcome.history)
-        and all(_is_number(value) for row in outcome.history for value in row.values())
-    )
+    return array
 
 
 TABLE_4 = {
@@ -251,44 +233,39 @@ def accuracy_table(rows: Sequence[tuple[str, Sequence[float], str]]) -> str:
     Accuracies are between 0 and 1, one for each training. Of more than `_MAX_COLUMNS` trainings
     only mean and spread are shown.
     """
-    width = max(len("accuracy in %"), *(len(title) for title, _, _ in rows))
     columns = max((len(each) for _, each, _ in rows if len(each) <= _MAX_COLUMNS), default=0)
-    numbers = "".join(f"{number:>6}" for number in range(1, columns + 1))
-    lines = [f"{'accuracy in %':<{width}}  {numbers}    mean  spread"]
+    table = [["accuracy in %", *map(str, range(1, columns + 1)), "mean", "spread", ""]]
     for title, fractions, remark in rows:
-        spread = f"{100 * np.std(fractions, ddof=1):8.1f}" if len(fractions) > 1 else f"{'-':>8}"
-        each = f"  {len(fractions)} trainings"
-        if len(fractions) <= columns:
-            each = "".join(f"{100 * fraction:6.1f}" for fraction in fractions)
-        row = f"{title:<{width}}  {each:<{6 * columns}}{100 * np.mean(fractions):8.1f}{spread}"
-        lines.append(f"{row}  {remark}" if remark else row)
-    return "\n".join(lines)
+        percent = [f"{100 * fraction:.1f}" for fraction in fractions]
+        if len(percent) > columns:
+            percent, remark = [], f"{len(percent)} trainings {remark}"
+        spread = f"{100 * np.std(fractions, ddof=1):.1f}" if len(fractions) > 1 else "-"
+        empty = [""] * (columns - len(percent))
+        table.append([title, *percent, *empty, f"{100 * np.mean(fractions):.1f}", spread, remark])
+    return text_table(table)
 
 
 def confusion_table(
     counts: NDArray[np.int64], classes: Sequence[str], recordings: Sequence[int]
 ) -> str:
     """Format a confusion matrix (true class down, predicted class across) with recordings."""
-    width = max(8, *(len(name) for name in classes)) + 2
-    head = "".join(f"{name:>{width}}" for name in classes)
-    lines = [f"{'shows':<{width}}{head}  right  recordings"]
+    table = [["shows", *classes, "right", "recordings"]]
     for name, row, own, number in zip(classes, counts, np.diag(counts), recordings, strict=True):
-        right = f"{own / row.sum():7.1%}" if row.sum() else f"{'-':>7}"
-        cells = "".join(f"{count:>{width}}" for count in row)
-        lines.append(f"{name:<{width}}{cells}{right}{number:>12}")
-    return "\n".join(lines)
+        right = f"{own / row.sum():.1%}" if row.sum() else "-"
+        table.append([name, *map(str, row), right, str(number)])
+    return text_table(table)
 
 
 def transfer_table(
     values: Sequence[str], mean: NDArray[np.float64], spread: NDArray[np.float64]
 ) -> str:
     """Format accuracies and spreads [%] by training value (down) and test value (across)."""
-    width = max(14, *(len(value) for value in values)) + 2
-    lines = [f"{'trained on':<{width}}" + "".join(f"{value:>{width}}" for value in values)]
-    for value, fractions, errors in zip(values, mean, spread, strict=True):
-        cells = []
-        for fraction, error in zip(fractions, errors, strict=True):
-            spread_text = "" if np.isnan(error) else f" +- {100 * error:.1f}"
-            cells.append("-" if np.isnan(fraction) else f"{100 * fraction:.1f}{spread_text}")
-        lines.append(f"{value:<{width}}" + "".join(f"{cell:>{width}}" for cell in cells))
-    return "\n".join(lines)
+
+    def cell(fraction: float, error: float) -> str:
+        text = "-" if np.isnan(fraction) else f"{100 * fraction:.1f}"
+        return text if np.isnan(error) else f"{text} +- {100 * error:.1f}"
+
+    rows = zip(values, mean, spread, strict=True)
+    return text_table(
+        [["trained on", *values], *([name, *map(cell, *each)] for name, *each in rows)]
+    )

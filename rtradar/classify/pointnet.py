@@ -1,6 +1,6 @@
-"""PointNet, a classifier of point sets that is invariant to the order of their points.
+"""The networks: PointNet, a classifier of point sets in any order, and smaller ones.
 
-The network is that of Qi, Su, Mo and Guibas, "PointNet: deep learning on point sets for 3D
+PointNet is that of Qi, Su, Mo and Guibas, "PointNet: deep learning on point sets for 3D
 classification and segmentation" (CVPR 2017, arXiv:1612.00593), appendix C. Two steps are computed
 in another order, with the same result up to rounding:
 
@@ -11,15 +11,25 @@ in another order, with the same result up to rounding:
   are searched without gradients (bfloat16 only decides between near ties there), and the outputs
   are then computed in float32, with gradients, for these points alone. The backward pass of these
   layers, nine tenths of the network, then costs almost nothing.
+
+The sizes of the small networks suit some thousands of clouds. `PooledNet` is PointNet without its
+T-Nets and with few layers, which takes the mean over the points beside the maximum. `EdgeNet` looks
+at neighbours: the edge convolutions of Y. Wang et al., Dynamic graph CNN for learning on point
+clouds, ACM Trans. Graph. 38 (2019) 146, on one graph of neighbours in scaled time, range and
+velocity. `SpectrogramNet` takes spectrograms.
 """
 
 from __future__ import annotations
+
+import itertools
+from abc import ABC, abstractmethod
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
 from rtradar.classify.recipes import Recipe
+from rtradar.classify.spectrograms import VELOCITIES
 
 _GLOBAL_FEATURES = 1024
 _MOMENTUM, _EPSILON = 0.1, 1e-5  # torch's defaults of batch norm
@@ -119,6 +129,22 @@ class PooledLayer(_NormedLinear):
         return functional.relu((inputs * weight).sum(dim=2) + bias)
 
 
+def answer_layers(inputs: int, hidden: int, n_classes: int, dropout: float) -> nn.Sequential:
+    """Two layers that answer by the features of a cloud or image, with dropout before each."""
+    return nn.Sequential(
+        nn.Dropout(dropout),
+        nn.Linear(inputs, hidden),
+        nn.ReLU(),
+        nn.Dropout(dropout),
+        nn.Linear(hidden, n_classes),
+    )
+
+
+def largest_and_mean(features: Tensor, axis: int) -> Tensor:
+    """Largest and mean value over the points or the times, beside each other."""
+    return torch.cat([features.amax(dim=axis), features.mean(dim=axis)], dim=1)
+
+
 def _dense(inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(nn.Linear(inputs, outputs, bias=False), _BatchNorm(outputs), nn.ReLU())
 
@@ -198,3 +224,129 @@ class PointNet(nn.Module):
             identity = torch.eye(matrix.shape[1], device=matrix.device)
             skewness = (identity - matrix @ matrix.transpose(1, 2)).square().sum(dim=(1, 2)).mean()
         return functional.log_softmax(self.classifier(self.high(features)), dim=1), skewness
+
+
+# -- small networks --------------------------------------------------------------------------------
+
+_POINT_WIDTHS, _CLOUD_WIDTH = (3, 64, 64, 128), 128
+_NEIGHBOURS = 12
+_IMAGE_WIDTHS = (1, 16, 32, 64)
+
+
+class _SmallNet(nn.Module, ABC):
+    """Classifier of the largest and the mean value of the features of all points."""
+
+    def __init__(self, n_classes: int, recipe: Recipe) -> None:
+        super().__init__()
+        inputs = 2 * _POINT_WIDTHS[-1]
+        self.cloud = answer_layers(inputs, _CLOUD_WIDTH, n_classes, recipe.dropout)
+
+    @abstractmethod
+    def features(self, points: Tensor) -> Tensor:
+        """Compute features of every point, (cloud, point, feature)."""
+
+    def forward(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Classify clouds as `PointNet` does; there is no transform that could be skewed."""
+        pooled = largest_and_mean(self.features(points), 1)
+        return functional.log_softmax(self.cloud(pooled), dim=1), points.new_zeros(())
+
+
+class PooledNet(_SmallNet):
+    """Three layers over every point, and two over their largest and mean values.
+
+    Parameters
+    ----------
+    n_classes : int
+        Number of classes.
+    recipe : Recipe
+        Recipe, of which the dropout counts.
+    """
+
+    def __init__(self, n_classes: int, recipe: Recipe) -> None:
+        super().__init__(n_classes, recipe)
+        widths = itertools.pairwise(_POINT_WIDTHS)
+        self.points = nn.Sequential(*(PointwiseLayer(*pair) for pair in widths))
+
+    def features(self, points: Tensor) -> Tensor:
+        """Compute features of every point, (cloud, point, feature)."""
+        found: Tensor = self.points(points)
+        return found
+
+
+class EdgeNet(_SmallNet):
+    """Two edge convolutions over the nearest neighbours of every point, and a layer over both.
+
+    Parameters
+    ----------
+    n_classes, recipe
+        See `PooledNet`.
+    """
+
+    def __init__(self, n_classes: int, recipe: Recipe) -> None:
+        super().__init__(n_classes, recipe)
+        width = _POINT_WIDTHS[1] // 2
+        self.first = PointwiseLayer(2 * 3, width)
+        self.second = PointwiseLayer(2 * width, width)
+        self.both = PointwiseLayer(2 * width, _POINT_WIDTHS[-1])
+
+    def features(self, points: Tensor) -> Tensor:
+        """Compute features of every point, (cloud, point, feature)."""
+        near = torch.cdist(points, points).topk(_NEIGHBOURS, dim=2, largest=False).indices
+        first = _over_edges(self.first, points, near)
+        second = _over_edges(self.second, first, near)
+        found: Tensor = self.both(torch.cat([first, second], dim=2))
+        return found
+
+
+def _over_edges(layer: PointwiseLayer, values: Tensor, near: Tensor) -> Tensor:
+    """Largest output over the edges to the neighbours ``near (cloud, point, neighbour)``."""
+    n_clouds, n_points, n_near = near.shape
+    index = near.reshape(n_clouds, -1, 1).expand(-1, -1, values.shape[2])
+    others = values.gather(1, index).view(n_clouds, n_points, n_near, -1)
+    own = values[:, :, None].expand_as(others)
+    edges = torch.cat([own, others - own], dim=3).flatten(1, 2)
+    found: Tensor = layer(edges).view(n_clouds, n_points, n_near, -1).amax(dim=2)
+    return found
+
+
+class SpectrogramNet(nn.Module):
+    """Three convolutions over time and velocity, whose values are pooled over all times.
+
+    So the network does not see when something happens, and sees at which velocities.
+
+    Parameters
+    ----------
+    n_classes : int
+        Number of classes.
+    recipe : Recipe
+        Recipe, of which the dropout counts.
+    """
+
+    def __init__(self, n_classes: int, recipe: Recipe) -> None:
+        super().__init__()
+        layers = [
+            nn.Sequential(
+                nn.Conv2d(before, after, 3, padding=1, bias=False),
+                nn.BatchNorm2d(after),
+                nn.ReLU(),
+                nn.MaxPool2d(2),
+            )
+            for before, after in itertools.pairwise(_IMAGE_WIDTHS)
+        ]
+        self.image = nn.Sequential(*layers)
+        pooled = 2 * _IMAGE_WIDTHS[-1] * VELOCITIES // 2 ** len(layers)
+        self.head = answer_layers(pooled, _CLOUD_WIDTH, n_classes, recipe.dropout)
+
+    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
+        """Classify images as `PointNet` does clouds; there is no transform to be skewed."""
+        pooled = largest_and_mean(self.image(images[:, None]), 2).flatten(1)
+        return functional.log_softmax(self.head(pooled), dim=1), images.new_zeros(())
+
+
+def build_network(n_classes: int, recipe: Recipe) -> nn.Module:
+    """Build the network of a recipe, which gives log-probabilities and a penalty."""
+    kinds = {
+        "pointnet": PointNet, "pooled": PooledNet, "edges": EdgeNet, "spectrogram": SpectrogramNet
+    }  # fmt: skip
+    network: nn.Module = kinds[recipe.network](n_classes, recipe)
+    return network

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from rtradar.errors import InputError
+from rtradar.system.checks import check_number, is_whole
 
 Schedule = Literal["step", "one-cycle"]
 Scaling = Literal["unit-sphere", "physical"]
@@ -23,6 +24,10 @@ _CHOICES = {
     "precision": get_args(Precision),
     "network": get_args(Network),
 }
+_LIMITS = {
+    "rate": (1e-12, 1e3), "stop_below": (0.0, 1e3), "weight_decay": (0.0, 1e3),
+    "edge_s": (0.0, 1e3), "dropout": (0.0, 0.99), "label_smoothing": (0.0, 0.99),
+}  # fmt: skip
 _FILE_KEYS = {"resample": "redraw", "step_epochs": "halve_every"}
 _LATER_FIELDS = ("network", "edge_s", "label_smoothing", "balanced")
 """Fields that files of studies have only where they differ from their defaults."""
@@ -62,7 +67,7 @@ class Recipe:
     input_transform, feature_transform : bool
         Whether T-Nets transform the points (3 x 3) and their features (64 x 64).
     dropout : float
-        Fraction of the last hidden layer that is dropped at random, at least 0 and below 1.
+        Fraction of the last hidden layer that is dropped at random, from 0 to 0.99.
     scaling : {"unit-sphere", "physical"}
         Normalisation of time, range and velocity, see `rtradar.classify.prepare`.
     resample : bool
@@ -74,12 +79,12 @@ class Recipe:
         Precision of the search for the maximum over the points during training. Values, gradients
         and predictions are always float32.
     network : {"pointnet", "pooled", "edges", "spectrogram"}
-        PointNet, one of `rtradar.classify.small_networks`, or `rtradar.classify.spectrograms`.
+        Network of `rtradar.classify.pointnet`.
     edge_s : float
         Time at both ends of each interval whose points are left out [s]. The surface from which
         points are drawn is closed there.
     label_smoothing : float
-        Probability that is spread over all classes in the loss, at least 0 and below 1.
+        Probability that is spread over all classes in the loss, from 0 to 0.99.
     balanced : bool
         Whether each class has the same weight in the loss, however many clouds show it.
 
@@ -118,22 +123,13 @@ class Recipe:
     balanced: bool = False
 
     def __post_init__(self) -> None:
-        least_points = int(self.takes_points)
-        for field, least in (
-            ("points", least_points), ("batch", 2), ("epochs", 1), ("step_epochs", 1)
-        ):  # fmt: skip
+        whole = {"points": int(self.takes_points), "batch": 2, "epochs": 1, "step_epochs": 1}
+        for field, least in whole.items():
             value = getattr(self, field)
-            whole = isinstance(value, int) and not isinstance(value, bool)
-            self._demand(field, whole and value >= least, f"a whole number, at least {least}")
-        positive = math.isfinite(self.rate) and self.rate > 0
-        self._demand("rate", positive, "a finite number above 0, such as 1e-4")
-        for field in ("stop_below", "weight_decay", "edge_s"):
-            value = getattr(self, field)
-            self._demand(
-                field, math.isfinite(value) and value >= 0, "a finite number, not negative"
-            )
-        for field in ("dropout", "label_smoothing"):
-            self._demand(field, 0 <= getattr(self, field) < 1, "at least 0 and below 1")
+            fits = is_whole(value) and value >= least
+            self._demand(field, fits, f"a whole number, at least {least}")
+        for field, (low, high) in _LIMITS.items():
+            check_number("recipe", field, getattr(self, field), low, high)
         words = {old: new for new, old in _FILE_VALUES.items()}
         for field, allowed in _CHOICES.items():
             value = words.get(getattr(self, field), getattr(self, field))

@@ -1,4 +1,4 @@
-"""Spectrograms for a network: stacking as images, how they are varied, and the network over them.
+"""Spectrograms for a network: stacking as images, and how they are varied.
 
 An image has 64 steps of the time and 64 of the velocity, whatever the radar, and levels of 0 at 40
 dB below its maximum and of 1 at that.
@@ -6,15 +6,12 @@ dB below its maximum and of 1 at that.
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
-from rtradar.classify.recipes import Recipe
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 
@@ -27,8 +24,6 @@ _TEMPO, _SIZE, _ASPECT = 0.25, 0.15, 0.25
 _DRIFT_MPS, _SHIFT = 0.3, 0.2
 _SLOW_MPS, _FILTERED, _NOISE = 0.4, 0.2, 0.1
 """How images are varied: as clouds are by ``wide``, in `rtradar.classify.prepare`."""
-
-_WIDTHS, _HIDDEN = (1, 16, 32, 64), 128
 
 
 def stack_spectrograms(clouds: Collection, *, edge_s: float = 0.0) -> Tensor:
@@ -109,44 +104,3 @@ def varied_spectrograms(images: Tensor) -> Tensor:
 
 def _uniform(count: int) -> Tensor:
     return 2 * torch.rand(count) - 1
-
-
-class SpectrogramNet(nn.Module):
-    """Three convolutions over time and velocity, whose values are pooled over all times.
-
-    So the network does not see when something happens, and sees at which velocities.
-
-    Parameters
-    ----------
-    n_classes : int
-        Number of classes.
-    recipe : Recipe
-        Recipe, of which the dropout counts.
-    """
-
-    def __init__(self, n_classes: int, recipe: Recipe) -> None:
-        super().__init__()
-        layers = [
-            nn.Sequential(
-                nn.Conv2d(before, after, 3, padding=1, bias=False),
-                nn.BatchNorm2d(after),
-                nn.ReLU(),
-                nn.MaxPool2d(2),
-            )
-            for before, after in itertools.pairwise(_WIDTHS)
-        ]
-        self.image = nn.Sequential(*layers)
-        pooled = 2 * _WIDTHS[-1] * VELOCITIES // 2 ** len(layers)
-        self.head = nn.Sequential(
-            nn.Dropout(recipe.dropout),
-            nn.Linear(pooled, _HIDDEN),
-            nn.ReLU(),
-            nn.Dropout(recipe.dropout),
-            nn.Linear(_HIDDEN, n_classes),
-        )
-
-    def forward(self, images: Tensor) -> tuple[Tensor, Tensor]:
-        """Classify images as `PointNet` does clouds; there is no transform to be skewed."""
-        each = self.image(images[:, None])
-        pooled = torch.cat([each.amax(dim=2), each.mean(dim=2)], dim=1).flatten(1)
-        return functional.log_softmax(self.head(pooled), dim=1), images.new_zeros(())

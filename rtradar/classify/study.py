@@ -10,8 +10,8 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,9 @@ from tqdm import tqdm
 
 from rtradar.classify import training
 from rtradar.classify.outcomes import Outcome, load_outcome, outcome_of, save_outcome
+from rtradar.classify.pointnet import build_network
 from rtradar.classify.prepare import stacked_for
 from rtradar.classify.recipes import Recipe
-from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples
 from rtradar.clouds.collection import Collection
@@ -89,25 +89,24 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
     Only where the clouds are and by which versions they are learnt from may differ.
     """
     path = out / PLAN
+    with _writing_to(out):  # a name may be too long, for one
+        there = os.path.lexists(path)
+        found = sorted(out.glob("training-*"))
+    if not there and found:
+        raise InputError(
+            f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; "
+            "give another folder (--out)"
+        )
+    if not there:
+        return
     try:
-        if not os.path.lexists(path):
-            if found := sorted(out.glob("training-*")):
-                raise InputError(
-                    f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; "
-                    "give another folder (--out)"
-                )
-            return
-    except OSError as error:  # such as a name that is too long
-        raise _unwritable(out, error) from None
-    try:
-        there = read_json(path)
-        free = {"data", "made_from"} | ({"made"} - there.keys())
-        others = [name for name in plan if name not in free and there.get(name) != plan[name]]
+        known = read_json(path)
+        free = {"data", "made_from"} | ({"made"} - known.keys())
+        others = [name for name in plan if name not in free and known.get(name) != plan[name]]
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
-    if others:
-        name = others[0]
-        was, now = _difference(there.get(name), plan[name])
+    for name in others:
+        was, now = _difference(known.get(name), plan[name])
         raise InputError(
             f"'{out}' holds other trainings ({name}: {was}, not {now}); give another folder (--out)"
         )
@@ -115,10 +114,8 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
 
 def write_plan(out: Path, plan: dict[str, Any]) -> None:
     """Write the plan into the folder, which is made if it does not exist."""
-    try:
+    with _writing_to(out):
         out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _unwritable(out, error) from None
     with atomic_file(out / PLAN) as file:
         file.write((json.dumps(plan, indent=1) + "\n").encode())
 
@@ -143,10 +140,14 @@ def read_plan(folder: Path) -> dict[str, Any]:
         raise InputError(f"'{folder / PLAN}' is damaged; train into another folder") from None
 
 
-def _unwritable(out: Path, error: OSError) -> InputError:
-    return InputError(
-        f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
-    )
+@contextmanager
+def _writing_to(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+        ) from None
 
 
 def _difference(was: Any, now: Any) -> tuple[Any, Any]:

@@ -6,13 +6,12 @@ The state is kept in a checkpoint, which is read without running any code that i
 from __future__ import annotations
 
 import io
-import os
 import time
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -20,11 +19,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
+from rtradar.classify.pointnet import build_network
 from rtradar.classify.prepare import for_network
 from rtradar.classify.recipes import Precision, Recipe
-from rtradar.classify.small_networks import build_network
 from rtradar.errors import BackendError, InputError
-from rtradar.system.files import atomic_file, open_regular
+from rtradar.system.files import atomic_file, read_bytes
 from rtradar.system.seeds import stream
 
 SKEWNESS_WEIGHT = 1e-3
@@ -293,36 +292,24 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """Read a checkpoint of tensors and plain values; InputError if it is damaged or holds more."""
     hint = "remove it to train anew, or give another folder"
     try:
-        with open_regular(path) as file:
-            if os.fstat(file.fileno()).st_size > _MAX_BYTES:
-                raise InputError(
-                    f"'{path}' is larger than the {_MAX_BYTES / 1e6:.0f} MB that are allowed; "
-                    f"{hint}"
-                )
-            _check_archive(file)
-            file.seek(0)
-            content = torch.load(file, map_location="cpu", weights_only=True)
-    except InputError:
-        raise
+        content = io.BytesIO(read_bytes(path, _MAX_BYTES))
+        with zipfile.ZipFile(content) as archive:
+            # The content of a compressed archive could exceed any limit.
+            if any(one.compress_type != zipfile.ZIP_STORED for one in archive.infolist()):
+                raise ValueError("it is compressed")
+        content.seek(0)
+        state = torch.load(content, map_location="cpu", weights_only=True)
     except OSError as error:
         raise InputError(f"cannot read '{path}': {error.strerror}; {hint}") from None
     except Exception as error:  # torch lets any error of its archive reader and unpickler through
-        text = str(error).strip()
-        why = text.splitlines()[0][:80] if text else type(error).__name__
+        why = (str(error).strip() or type(error).__name__).splitlines()[0][:80]
         raise InputError(
             f"'{path}' is no checkpoint that can be read safely, or is damaged ({why}); {hint}"
         ) from None
     keys, types = Checkpoint._fields, (dict, dict, int, list)
-    fits = isinstance(content, dict) and set(content) == set(keys)
-    if not fits or not all(map(isinstance, map(content.get, keys), types)):
+    fits = isinstance(state, dict) and set(state) == set(keys)
+    if not fits or not all(map(isinstance, map(state.get, keys), types)):
         raise InputError(
             f"'{path}' is no checkpoint of rtradar: it must hold {', '.join(keys)}; {hint}"
         )
-    return Checkpoint(**content)
-
-
-def _check_archive(file: BinaryIO) -> None:
-    """Raise ValueError if the archive is compressed, as its content could then exceed any limit."""
-    with zipfile.ZipFile(file) as archive:
-        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
-            raise ValueError("it is compressed")
+    return Checkpoint(**state)

@@ -14,9 +14,8 @@ from rtradar.classify.splits import make_splits
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.recognition.description import OUTLINE, describe
+from rtradar.recognition.description import OUTLINE, cut_windows, describe
 from rtradar.recognition.recogniser import OTHER, Recogniser
-from rtradar.recognition.windows import cut_windows
 from rtradar.system.seeds import word
 
 ANSWERS = {
@@ -103,22 +102,21 @@ def arrays_of(forest: ExtraTreesClassifier) -> dict[str, NDArray[Any]]:
     sizes = [tree.node_count for tree in trees]
     roots = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     chances = np.concatenate([tree.value[:, 0] for tree in trees])
+    below, above = (
+        np.concatenate(
+            [
+                np.maximum(getattr(tree, side), 0) + root
+                for tree, root in zip(trees, roots, strict=True)
+            ]
+        )
+        for side in ("children_left", "children_right")
+    )
     return {
         "roots": roots,
         "feature": np.concatenate([np.maximum(tree.feature, -1) for tree in trees]),
         "threshold": np.concatenate([tree.threshold for tree in trees]),
-        "below": np.concatenate(
-            [
-                np.maximum(tree.children_left, 0) + root
-                for tree, root in zip(trees, roots, strict=True)
-            ]
-        ),
-        "above": np.concatenate(
-            [
-                np.maximum(tree.children_right, 0) + root
-                for tree, root in zip(trees, roots, strict=True)
-            ]
-        ),
+        "below": below,
+        "above": above,
         "chances": chances / chances.sum(axis=1, keepdims=True),
     }
 

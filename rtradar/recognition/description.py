@@ -1,4 +1,4 @@
-"""What describes a window of an RDT cloud in numbers, of which none says when points lie in it.
+"""Windows of RDT clouds, and numbers that describe one, of which none says when points lie in it.
 
 There are three parts. The outline has the statistics of range and velocity and the course of
 velocity. The envelopes follow the fastest and the farthest points from slice to slice of the time,
@@ -9,6 +9,8 @@ nearer to the radar than the trunk, the hands of a jumping jack where they are a
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,29 @@ _VELOCITY_EDGES_MPS = (
 )  # fmt: skip
 """Edges of the cells of `occupancy`: of range from its median, and of velocity. They are closer
 where most points are."""
+
+
+WINDOW_S, HOP_S = 1.4, 0.35
+"""Length of a window of a cloud, and the largest step to the next [s].
+
+The clouds of a data set are of captures of 1.6 s. What lies within 0.1 s of their ends is left out,
+because the surface of which clouds are made is closed there."""
+
+EDGE_S = 0.1
+"""Time at each end of a capture that no window reaches [s], twice that of a frame."""
+
+
+def cut_windows(points: Array, length_s: float) -> list[Array]:
+    """Cut an RDT cloud (point, 3) of a capture of this length [s] into windows.
+
+    A shorter capture is one window. Windows may be empty.
+    """
+    first, last = EDGE_S, max(length_s - EDGE_S, EDGE_S)
+    rest = max(last - first - WINDOW_S, 0.0)
+    count = 1 + math.ceil(rest / HOP_S - 1e-6)
+    starts = first + (rest * np.arange(count) / (count - 1) if count > 1 else np.zeros(1))
+    times = points[:, 0]
+    return [points[(times >= start) & (times < start + WINDOW_S)] for start in starts]
 
 
 def describe(points: Array) -> Array:

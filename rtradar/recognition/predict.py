@@ -11,8 +11,8 @@ import numpy as np
 
 from rtradar.description import made_from
 from rtradar.errors import InputError
+from rtradar.recognition.description import EDGE_S, WINDOW_S, cut_windows
 from rtradar.recognition.recogniser import OTHER, WEIGHTS, Recogniser
-from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
 from rtradar.system.checks import printable
 from rtradar.system.files import read_arrays, read_json
 

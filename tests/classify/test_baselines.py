@@ -26,7 +26,7 @@ from rtradar.errors import InputError
 def study_of(clouds: Any) -> Study:
     """As if a network had answered at random."""
     _, truth = classes_of(clouds)
-    splits = make_splits(clouds, "folds", folds=3)
+    splits = make_splits(clouds, "folds", folds=3)[:1]
     outcomes: list[Outcome] = [
         outcome_of(clouds, split, values_of(clouds, "folds"), truth, np.eye(3)[truth[split.test]])
         for split in splits
@@ -50,10 +50,9 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
     mean = {name: summary(outcomes)["mean"] for name, outcomes in found.items()}
     assert mean["nearest centroid, RDT cloud"] > 0.9
     assert mean["random forest, RDT cloud"] == 1
-    # Three classes: chance is a third, and 36 answers are off by 0.16 in two of three standard
-    # deviations.
-    assert mean["random forest, metadata alone"] < 0.6
-    assert mean["random forest, spatial cloud"] < 0.6
+    # Three classes: chance is a third, and 12 answers are off by 0.27 in two standard deviations.
+    assert mean["random forest, metadata alone"] < 0.61
+    assert mean["random forest, spatial cloud"] < 0.61
 
 
 def test_one_axis_alone_tells_only_what_it_shows(made_up: Callable[..., Any]) -> None:

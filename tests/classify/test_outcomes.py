@@ -52,8 +52,8 @@ def test_right_answers_are_counted() -> None:
 def test_one_training_has_no_spread() -> None:
     assert summary([outcome([0], [0])])["spread"] is None
     assert accuracy_table([("a", [0.5], ""), ("b", [1.0, 0.5], "half")]).splitlines()[1:] == [
-        "a                50.0          50.0       -",
-        "b               100.0  50.0    75.0    35.4  half",
+        "a               50.0        50.0       -",
+        "b              100.0  50.0  75.0    35.4  half",
     ]
 
 

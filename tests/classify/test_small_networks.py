@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
+from rtradar.classify.pointnet import build_network
 from rtradar.classify.prepare import for_training
 from rtradar.classify.recipes import RECIPES
-from rtradar.classify.small_networks import build_network
 from rtradar.classify.splits import make_splits
 from rtradar.classify.training import Examples, predict, train_network
 

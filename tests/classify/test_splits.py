@@ -205,21 +205,6 @@ def test_a_leak_is_never_handed_out() -> None:
         check(Split("fold 1", np.array([0]), np.array([], dtype=np.int64)), np.arange(4), labels)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "folds", "said"),
-    [
-        ("folds", 1, "--folds 1"), ("folds", 999, "--folds 999"),
-        ("people", None, "split 'people' is unknown"),
-        ("across:colour", None, "no sample has 'colour'"),
-    ],
-)  # fmt: skip
-def test_splits_that_cannot_be_are_refused(
-    made_up: Callable[..., Any], scheme: str, folds: int | None, said: str
-) -> None:
-    with pytest.raises(InputError, match=said):
-        make_splits(made_up(), scheme, folds=folds)
-
-
 def test_one_source_cannot_be_split_by_source() -> None:
     row = {
         "recording": "a",

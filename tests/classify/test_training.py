@@ -67,6 +67,7 @@ def test_eight_clouds_are_learnt_by_heart(examples: Examples, recipe: Recipe) ->
 def test_a_training_that_was_stopped_ends_as_one_that_was_not(
     examples: Examples, recipe: Recipe, tmp_path: Path
 ) -> None:
+    examples = examples[np.arange(0, 12, 2)]
     whole, history = train_network(examples, examples, recipe, seed=3)
 
     def stop(epoch: int, row: Row) -> None:
@@ -177,11 +178,6 @@ def test_a_checkpoint_of_another_network_is_refused(examples: Examples, tmp_path
         train_network(examples, examples, PAPER.changed(points=8, epochs=1), checkpoint=path)
     with pytest.raises(InputError, match="1 epochs of another recipe"):
         train_network(examples, examples, TINY, checkpoint=path)
-
-
-def test_more_points_than_there_are_cannot_be_asked_for(examples: Examples) -> None:
-    with pytest.raises(InputError, match="--points 49: the clouds hold 48"):
-        train_network(examples, examples, LEAN.changed(points=49))
 
 
 def test_a_processor_without_bfloat16_is_not_asked_for_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,7 @@ from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.recognition import Recogniser, predict_run
-from rtradar.recognition.windows import EDGE_S, WINDOW_S, cut_windows
+from rtradar.recognition.description import EDGE_S, WINDOW_S, cut_windows
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:

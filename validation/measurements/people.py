@@ -35,9 +35,8 @@ from rtradar.classify.training import Examples, predict, train_network
 from rtradar.classify.weights import ANSWERS
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
-from rtradar.recognition.description import describe
+from rtradar.recognition.description import cut_windows, describe
 from rtradar.recognition.recogniser import OTHER
-from rtradar.recognition.windows import cut_windows
 
 
 class Merged(Collection):
