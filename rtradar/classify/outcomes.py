@@ -122,7 +122,9 @@ def load_outcome(path: Path) -> Outcome:
     try:
         outcome = Outcome(**read_json(path))
         count = len(outcome.truth)
-        arrays = {name: _array(name, getattr(outcome, name), count) for name in _KINDS}
+        arrays: dict[str, Any] = {
+            name: _array(name, getattr(outcome, name), count) for name in _KINDS
+        }
         texts = (outcome.name, outcome.trained_on)
         rows = [[row[name] for name in HISTORY] for row in outcome.history]
         # NaN and infinity are numbers, as a training may diverge.
