@@ -125,13 +125,15 @@ def load_outcome(path: Path) -> Outcome:
         arrays: dict[str, Any] = {
             name: _array(name, getattr(outcome, name), count) for name in _KINDS
         }
-        texts = (outcome.name, outcome.trained_on)
         rows = [[row[name] for name in HISTORY] for row in outcome.history]
-        # NaN and infinity are numbers, as a training may diverge.
-        numbers = np.array(rows).dtype.kind in "if"
-        if not all(isinstance(text, str) for text in texts) or not numbers:
-            raise ValueError
-        if type(outcome.history) is not list or any(len(row) > len(HISTORY) for row in rows):
+        whole = (
+            isinstance(outcome.name, str)
+            and isinstance(outcome.trained_on, str)
+            and isinstance(outcome.history, list)
+            and all(len(row) == len(HISTORY) for row in outcome.history)
+            and np.array(rows).dtype.kind in "if"  # NaN and infinity too: a training may diverge
+        )
+        if not whole:
             raise ValueError
         return replace(outcome, **arrays)
     except (OSError, ValueError, KeyError, TypeError, OverflowError):

@@ -48,6 +48,7 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         {"history": {}},
         {"history": [[]]},
         {"history": [{"rate": 1.0}]},
+        {"history": [{**EPOCH, "more": 1.0}]},
         {"history": [{**EPOCH, "seconds": "1"}]},
         {"history": [{**EPOCH, "seconds": 10**400}]},
         {"history": [{**EPOCH, "seconds": None}]},
