@@ -26,11 +26,12 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.angles import beam_power
-from rtradar.process.beams import cuts_through_highest, refine
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,
+    cuts_through_highest,
     range_walk,
+    refine,
     sine_grid,
     steering,
     steering_everywhere,
