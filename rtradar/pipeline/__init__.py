@@ -1,6 +1,7 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.compare import Comparison, compare, compare_recordings
+from rtradar.pipeline.compare import compare, compare_recordings
+from rtradar.pipeline.compared import Comparison
 from rtradar.pipeline.experiment import Experiment
 from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples

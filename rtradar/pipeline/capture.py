@@ -58,7 +58,6 @@ class Capture:
 
     people: tuple[Person, ...]
     scene: Scene
-    settings: RunSettings
     processing: Processing
     body: Body
     model: PeopleAndObjects
@@ -75,6 +74,11 @@ class Capture:
     def radar(self) -> Radar:
         """Radar at its position in the scene."""
         return self.processing.radar
+
+    @property
+    def settings(self) -> RunSettings:
+        """Settings of the run."""
+        return self.processing.settings
 
     @property
     def motion(self) -> str:

@@ -3,39 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.pipeline.compare import (
+from rtradar.pipeline.compared import (
+    MAP_PICTURES,
     MEASURES,
+    Compared,
     Comparison,
-    chamfer_bins,
     comparison_rows,
-    map_figures,
+    draw_maps_and_clouds,
+    figures_of,
     write_figures,
 )
 from rtradar.pipeline.output.view import run_maps, run_points, run_summary
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.radar import Radar
-from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit, thinned
-from rtradar.report.figures.fitting import above_floor
+from rtradar.report.figures.canvas import field_unit
 from rtradar.report.pages import comparison
 from rtradar.system.checks import printable
 from rtradar.system.output_folder import atomic_folder, check_whole
 
-_PICTURES = {
-    "Range-Doppler": "compare_range_doppler.png",
-    "Spectrogram": "compare_spectrogram.png",
-    "Range-Doppler-time clouds": "compare_cloud.png",
-}
-_OWN = ("compare.html", "compare.json", "compare.csv", *files_of_pictures(_PICTURES.values()))
+_OWN = ("compare.html", "compare.json", "compare.csv", *files_of_pictures(MAP_PICTURES.values()))
 _FILES = files_of_runs("compare.json", _OWN, ())
 _COMPARED = (
     "range_doppler_correlation", "range_doppler_mean_db", "range_doppler_rms_db", "detections",
@@ -47,32 +39,6 @@ _ROWS = (
     ("xyz_points", "Points in space", 0),
 )
 _AXES = ("range", "velocity", "spectrogram_velocity")
-
-
-@dataclass(frozen=True)
-class _Folder:
-    """What a folder holds."""
-
-    path: Path
-    summary: dict[str, Any]
-    radar: Radar
-    points: NDArray[np.float64]
-
-    @classmethod
-    def read(cls, path: Path) -> _Folder:
-        """Read a folder; InputError if it is none of `run` or `process_samples`, or damaged."""
-        check_whole(path)
-        summary, radar, _ = run_summary(path)
-        return cls(path, summary, radar, run_points(path))
-
-    @property
-    def unit(self) -> str:
-        """Unit of the samples."""
-        return str(self.summary["parameters"].get("unit", "m"))
-
-    def maps(self) -> AbstractContextManager[h5py.File]:
-        """Open the maps."""
-        return run_maps(self.path)
 
 
 def compare_folders(
@@ -109,7 +75,7 @@ def compare_folders(
         raise InputError(
             f"folders {', '.join(names) or '(none)'}; give two or more, each of another name"
         )
-    read = {name: _Folder.read(Path(path)) for name, path in zip(names, folders, strict=True)}
+    read = {name: _read(Path(path)) for name, path in zip(names, folders, strict=True)}
     reference = read[names[-1]]
     for folder in read.values():
         _check_axes(folder, reference)
@@ -118,11 +84,18 @@ def compare_folders(
     runs = {name: own for name, folder in read.items() if (own := folder.summary.get("run"))}
     summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
     with atomic_folder(Path(out), _FILES, overwrite=overwrite) as place:
-        pictures = _draw(read, place)
+        pictures = _draw(place, read)
         rows = comparison_rows(summary, _ROWS)
         comparison.write_folders(place / "compare.html", summary, rows, pictures)
         write_figures(place, summary, _FILES, _ROWS)
     return Comparison(summary, Path(out), _ROWS)
+
+
+def _read(folder: Path) -> Compared:
+    """Read a folder; InputError if it is none of `run` or `process_samples`, or damaged."""
+    check_whole(folder)
+    summary, radar, _ = run_summary(folder)
+    return Compared(folder, summary, radar, run_points(folder))
 
 
 def differing(runs: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -147,76 +120,45 @@ def _flat(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
             yield from _flat(own, where) if isinstance(own, dict) or tables else [(where, own)]
 
 
-def _check_axes(folder: _Folder, reference: _Folder) -> None:
+def _check_axes(folder: Compared, reference: Compared) -> None:
     """Raise InputError where maps cannot be laid on those of the reference."""
-    with folder.maps() as ours, reference.maps() as other:
+    with run_maps(folder.out) as ours, run_maps(reference.out) as other:
         for axis in _AXES:
             if axis not in ours or axis not in other:
-                raise InputError(f"'{folder.path}' or the reference has no maps over {axis}")
+                raise InputError(f"'{folder.out}' or the reference has no maps over {axis}")
             one, two = ours[axis][:], other[axis][:]
             if one.shape != two.shape or not np.allclose(one, two, rtol=1e-6):
                 says = (f"{len(one)} steps to {one[-1]:.6g}", f"{len(two)} to {two[-1]:.6g}")
                 raise InputError(
-                    f"'{folder.path}' has a {axis} axis of {says[0]}, '{reference.path}' of "
+                    f"'{folder.out}' has a {axis} axis of {says[0]}, '{reference.out}' of "
                     f"{says[1]}; make both with one radar"
                 )
         if not len(ours["time"]) or not len(ours["spectrogram_time"]):
-            raise InputError(f"'{folder.path}' holds no frame; give a longer capture")
+            raise InputError(f"'{folder.out}' holds no frame; give a longer capture")
 
 
-def _figures(folder: _Folder, reference: _Folder) -> dict[str, Any]:
+def _figures(folder: Compared, reference: Compared) -> dict[str, Any]:
     """Return the figures of one folder; differences of the reference from itself are zero."""
-    maps, its_maps = folder.path / "maps.h5", reference.path / "maps.h5"
-    summary = folder.summary
     return {
-        **map_figures(maps, its_maps, gain=folder.unit != reference.unit),
-        "rdt_chamfer_bins": chamfer_bins(folder.points, reference.points, reference.radar),
-        **{name: summary.get(name) for name in ("detections", "windows", "xyz_points")},
+        **figures_of(folder, reference),
+        **{name: folder.summary.get(name) for name in ("windows", "xyz_points")},
         "unit": folder.unit,
-        "parameters": summary["parameters"],
+        "parameters": folder.summary["parameters"],
     }
 
 
-def _draw(folders: Mapping[str, _Folder], place: Path) -> dict[str, Path]:
+def _draw(place: Path, folders: Mapping[str, Compared]) -> dict[str, Path]:
     """Draw the pictures, each map in decibels below its own maximum."""
-    drawn = {name: place / file for name, file in _PICTURES.items()}
-    levels, spectrograms, shown, strong = {}, {}, [], []
-    label, names = "", " and ".join(folders)
-    with next(iter(folders.values())).maps() as maps:
-        velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
-        radius = maps["range"][:]
-    columns, times = _shared_columns(folders)
-    for name, folder in folders.items():
-        with folder.maps() as maps:
-            frame = int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
-            power = maps["range_doppler"][frame]
-            unit = _relative(folder, power)
-            levels[name], label = unit.level(power), unit.label("all channels")
-            shown.append(above_floor(power))
-            power, times = thinned(maps["spectrogram"][:columns], times[:columns])
-            spectrograms[name] = _relative(folder, power).level(power.T)
-            strong.append(above_floor(power.T))
-    axes = (VELOCITY_LABEL, velocity), ("Range [m]", radius)
-    title = f"{names}, frame of most detections of each"
-    comparison.draw_maps(drawn["Range-Doppler"], levels, label, *axes, title, np.any(shown, axis=0))
-    axes = ("Time [s]", times), (VELOCITY_LABEL, slow)
-    comparison.draw_maps(
-        drawn["Spectrogram"], spectrograms, label, *axes, names, np.any(strong, axis=0)
-    )
-    clouds = {name: folder.points for name, folder in folders.items()}
-    comparison.draw_rdt_clouds(drawn["Range-Doppler-time clouds"], clouds, names)
-    return drawn
 
+    def levels(powers: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], str]:
+        units = {
+            name: field_unit(folders[name].radar, strongest_m2=float(power.max()), relative=True)
+            for name, power in powers.items()
+        }
+        found = {name: units[name].level(power) for name, power in powers.items()}
+        return found, next(iter(units.values())).label("all channels")
 
-def _shared_columns(folders: Mapping[str, _Folder]) -> tuple[int, NDArray[np.float64]]:
-    """Return how many columns all spectrograms have, and their times [s]."""
-    found = []
-    for folder in folders.values():
-        with folder.maps() as maps:
-            found.append(maps["spectrogram_time"][:])
-    shortest = min(found, key=len)
-    return len(shortest), shortest
-
-
-def _relative(folder: _Folder, power: NDArray[np.floating]) -> FieldUnit:
-    return field_unit(folder.radar, strongest_m2=float(power.max()), relative=True)
+    names = " and ".join(folders)
+    titles = f"{names}, frame of most detections of each", names, names
+    frames = [folder.best_frame() for folder in folders.values()]
+    return draw_maps_and_clouds(place, folders, frames, (levels, levels), titles)

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 import numpy as np
 
-from rtradar.body import Person
 from rtradar.errors import InputError
 from rtradar.pipeline.processing import RANGE_TIME_S
 from rtradar.process import angle_grid, measured_angles
 from rtradar.radar import Radar
-from rtradar.settings import RunSettings
 
 MEMORY_LIMIT_BYTES = 4_000_000_000
 """Largest size of what is held in memory, maps or IF samples [byte].
 
 It is that of maps of about three minutes, or IF samples of 15 s, of the radar ``paper-12ghz``.
 """
-
-IN_A_FOLDER = "give a folder, out=, and they are written there as they are computed"
-"""How the limit is passed for maps."""
 
 
 def refuse_large(what: str, n_bytes: float, instead: str) -> None:
@@ -33,17 +25,12 @@ def refuse_large(what: str, n_bytes: float, instead: str) -> None:
         )
 
 
-def refuse_large_maps(people: Sequence[Person], radar: Radar, settings: RunSettings) -> None:
-    """Raise an `InputError` if maps of this run are too large for memory."""
-    left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
-    asked = settings.duration_s
-    if not left and asked is None:
-        return  # refused where people are placed
-    interval_s = max(min(left) if asked is None else min(max(left, default=asked), asked), 0.0)
-    if math.isnan(interval_s):
-        return  # a start or duration that is none is refused where people are placed
-    n_bytes = bytes_of_maps(radar, radar.chirps_in(interval_s), sources=True)
-    refuse_large(f"maps of {interval_s:g} s of radar '{radar.name}'", n_bytes, IN_A_FOLDER)
+def refuse_large_maps(radar: Radar, n_chirps: int, *, sources: bool = False) -> None:
+    """Raise an `InputError` if maps of so many chirps are too large for memory."""
+    interval_s = radar.duration_of(n_chirps)
+    what = f"maps of {interval_s:.3g} s of radar '{radar.name}'"
+    instead = "give a folder, out=, and they are written there as they are computed"
+    refuse_large(what, bytes_of_maps(radar, n_chirps, sources=sources), instead)
 
 
 def bytes_of_maps(radar: Radar, n_chirps: float, *, sources: bool = False) -> float:

@@ -16,11 +16,12 @@ from rtradar.description import Movers, parts_of, read_run_file
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange import open_samples
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
 from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import stage_line
 from rtradar.process import clutter_removal, range_spectrum
-from rtradar.process.window_functions import weights
+from rtradar.process.window_functions import WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.common.poses import has_mesh
@@ -46,10 +47,17 @@ _CREST = 9.0
 
 
 @one_blas_thread()
-def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
+def prepare(
+    moving: Movers,
+    radar: Radar,
+    scene: Scene,
+    settings: RunSettings,
+    *,
+    in_memory: bool = False,
+) -> Capture:
     """Place people before a radar and settle everything that the first echo needs.
 
-    Errors are those of `rtradar.run`.
+    Errors are those of `rtradar.run`. Maps that would be too large ``in_memory`` are refused.
     """
     scene, everyone = people_in(scene, moving)
     _refuse_together(radar, scene, settings)
@@ -59,8 +67,10 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
         body = body_of_people(everyone, settings)
         radar = scene.place(radar)
         processing = replace(processing, radar=radar)
-    processing = with_background(processing, settings)
+    processing = with_background(processing)
     n_chirps, frame_starts = _frames(radar, body)
+    if in_memory:
+        refuse_large_maps(radar, n_chirps, sources=True)
     # What they return at this level, over every path, and how strong they are without the room.
     with processing.stages.time("survey"):
         model = _echo_model(radar, body, scene, settings)
@@ -78,12 +88,19 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
             room = prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
             summed = room.summed
     # What else the receiver does to the samples, by the strongest that moves.
-    movers = _movers(budget, model, radar, n_chirps) if radar.receiver is not None else ()
-    receiver = _receiver(radar, movers, noise, room, n_chirps, settings)
+    receiver = None
+    if radar.receiver is not None:
+        receiver = ReceiverStage(
+            radar,
+            _expected(budget, model, radar, n_chirps, noise, processing.window_functions),
+            n_chirps=n_chirps,
+            seed=settings.seed,
+            room=room.clutter if room else None,
+            keep_all=settings.keep_all,
+        )
     return Capture(
         people=everyone,
         scene=scene,
-        settings=settings,
         processing=processing,
         body=body,
         model=model,
@@ -98,8 +115,9 @@ def prepare(moving: Movers, radar: Radar, scene: Scene, settings: RunSettings) -
     )
 
 
-def with_background(processing: Processing, settings: RunSettings) -> Processing:
-    """Return a processing that subtracts the background of the settings, where they name one."""
+def with_background(processing: Processing) -> Processing:
+    """Return a processing that subtracts the background of its settings, where they name one."""
+    settings = processing.settings
     if settings.background is None:
         return processing
     radar, windows, path = processing.radar, processing.window_functions, Path(settings.background)
@@ -253,11 +271,15 @@ def power_alone(
     return power_of_parts_alone(level, radar, body, radar.chirps_in(body.duration_s))
 
 
-def _movers(
-    budget: LinkBudget, model: PeopleAndObjects, radar: Radar, n_chirps: int
-) -> tuple[Mover, ...]:
-    """Return people, by the link budget and some echoes of everything, and each moving object."""
-    objects = model.movers(n_chirps)
+def _expected(
+    budget: LinkBudget,
+    model: PeopleAndObjects,
+    radar: Radar,
+    n_chirps: int,
+    noise: Noise,
+    windows: WindowFunctions,
+) -> Expected:
+    """Return what the receiver gets: people, each moving object, and the noise of a map's cell."""
     # Which paths of a room need a model of their own is not yet known.
     chirps, room = np.arange(2 * radar.n_tx), model.room
     echoes = model.echoes(chirps) if room is None else room.optical_echoes(chirps)
@@ -265,32 +287,10 @@ def _movers(
     delays = mean_delays(replace(echoes, amplitude=np.where(own, echoes.amplitude, 0)))
     power = sum(budget.person_power)
     people = Mover(power, _CREST * power, float(delays.mean()))
-    return people, *(Mover(largest, largest, delay_s) for largest, delay_s in objects)
-
-
-def _receiver(
-    radar: Radar,
-    movers: tuple[Mover, ...],
-    noise: Noise,
-    room: PreparedRoom | None,
-    n_chirps: int,
-    settings: RunSettings,
-) -> ReceiverStage | None:
-    """Return what the receiver adds, by what moves and the noise of a map's cell."""
-    if radar.receiver is None:
-        return None
-    gain = 1.0
-    lengths = radar.samples_per_chirp, radar.cycles_per_frame
-    for window, n in zip((settings.range_window, settings.doppler_window), lengths, strict=True):
-        gain *= float((weights(window, n) ** 2).sum())
-    return ReceiverStage(
-        radar,
-        Expected(movers, noise.power, noise.power * gain),
-        n_chirps=n_chirps,
-        seed=settings.seed,
-        room=room.clutter if room else None,
-        keep_all=settings.keep_all,
-    )
+    objects = (Mover(largest, largest, delay_s) for largest, delay_s in model.movers(n_chirps))
+    gain = float((weights(windows.range, radar.samples_per_chirp) ** 2).sum())
+    gain *= float((weights(windows.doppler, radar.cycles_per_frame) ** 2).sum())
+    return Expected((people, *objects), noise.power, noise.power * gain)
 
 
 def _noise(radar: Radar, budget: LinkBudget, settings: RunSettings) -> Noise:

@@ -30,7 +30,7 @@ from rtradar.process import (
     window_cycles,
 )
 from rtradar.process.side_lobes import RangeSideLobes, SeenRanges
-from rtradar.process.spectrogram import OVERLAP, SlidingSpectrogram
+from rtradar.process.spectrogram import SlidingSpectrogram
 from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
@@ -75,24 +75,21 @@ class Processing:
     """How range spectra of one capture are processed, with the radar at its position in the scene.
 
     ``detect`` marks the cells of a frame, ``removal`` removes static clutter before Doppler,
-    ``seed`` is that of the sampling of clouds, ``stages`` record the time, and ``unit`` is that of
-    the samples. ``spectrogram_window_s`` and ``spectrogram_overlap`` are those of `RunSettings`.
+    ``stages`` record the time, and ``unit`` is that of the samples.
     """
 
     radar: Radar
+    settings: RunSettings
     detect: Detect
     removal: ClutterRemoval
-    window_functions: WindowFunctions = DEFAULT_WINDOWS
-    seed: int = 0
+    window_functions: WindowFunctions
     stages: Stages = field(default_factory=Stages)
     unit: str = "m"
-    spectrogram_window_s: float | None = None
-    spectrogram_overlap: float = OVERLAP
 
     @property
     def window_cycles(self) -> int:
         """Number of cycles in a window of the spectrogram."""
-        return window_cycles(self.radar, self.spectrogram_window_s)
+        return window_cycles(self.radar, self.settings.spectrogram_window_s)
 
     def spectrogram(self) -> SlidingSpectrogram:
         """Return what makes the spectrogram of the range spectra."""
@@ -100,7 +97,7 @@ class Processing:
             self.radar,
             removal=self.removal,
             window=self.window_cycles,
-            overlap=self.spectrogram_overlap,
+            overlap=self.settings.spectrogram_overlap,
             window_functions=self.window_functions,
         )
 
@@ -108,15 +105,9 @@ class Processing:
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
         """Build the processing that these settings name; InputError if a name is unknown."""
         window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
-        return cls(
-            radar,
-            _detect_of(settings, radar, window_functions),
-            clutter_removal(settings.clutter_removal, radar),
-            window_functions,
-            settings.seed,
-            spectrogram_window_s=settings.spectrogram_window_s,
-            spectrogram_overlap=settings.spectrogram_overlap,
-        )
+        detect = _detect_of(settings, radar, window_functions)
+        removal = clutter_removal(settings.clutter_removal, radar)
+        return cls(radar, settings, detect, removal, window_functions)
 
     def range_spectra(
         self, at_once: int
@@ -205,9 +196,9 @@ class CloudMaker:
         self._processing, radar, self._source_of = processing, processing.radar, source_of
         self._angles = angles and bool(measured_angles(radar))
         self._sliding = SlidingWindows(radar)
-        self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
+        self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.settings.seed)
         self._ranges = RangeSideLobes(processing.window_functions.range, radar.range_m)
-        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=8)
+        self._spatial = UniformSample(SPATIAL_POINTS, processing.settings.seed, columns=8)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
         self.max_chirps = step * max(1, int(_MAX_BYTES / step_bytes))

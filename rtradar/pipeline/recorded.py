@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.memory import IN_A_FOLDER, bytes_of_maps, refuse_large
+from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.pictures import draw_found
 from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
@@ -115,7 +115,7 @@ def process_samples(
     blocks = _Blocks(samples, radar, in_memory=out is None)
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
-    processing = with_background(replace(Processing.of(radar, settings), unit=unit), settings)
+    processing = with_background(replace(Processing.of(radar, settings), unit=unit))
     maps, file = None, BytesIO()
     if out is None:
         clouds = _stream(blocks, processing, file)
@@ -203,24 +203,22 @@ class _Blocks:
 
     def __iter__(self) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         most = block_chirps(self._radar) // chirps_together(self._radar)
-        held: list[NDArray[np.complex64]] = []
-        missing = most
+        held = np.empty((0, self._radar.n_rx, self._radar.samples_per_chirp), np.complex64)
         for piece in self._pieces:
-            begin = 0
-            while begin < len(piece):
-                part = _single(piece[begin : begin + missing])
-                held.append(part)
-                begin, missing = begin + len(part), missing - len(part)
-                if missing == 0:
-                    yield self._joined(held)
-                    held, missing = [], most
-        if most - missing >= self._cycle_rows:
-            yield self._joined(held)
+            for begin in range(0, len(piece), most):
+                # Copies, for the caller may fill the same array again.
+                with np.errstate(over="ignore"):
+                    part = np.array(piece[begin : begin + most], dtype=np.complex64)
+                held = np.concatenate([held, part]) if len(held) else part
+                if len(held) >= most:
+                    yield self._block(held[:most])
+                    held = held[most:]
+        whole = len(held) // self._cycle_rows * self._cycle_rows
+        if whole:
+            yield self._block(held[:whole])
         self._checked(self.n_chirps)
 
-    def _joined(self, held: list[NDArray[np.complex64]]) -> tuple[int, NDArray[np.complex64]]:
-        block = held[0] if len(held) == 1 else np.concatenate(held)
-        block = block[: len(block) // self._cycle_rows * self._cycle_rows]
+    def _block(self, block: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
         first, n_chirps = self.n_chirps, len(block) * chirps_together(self._radar)
         if not np.isfinite(block).all():
             where = first + int(np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))[0])
@@ -247,8 +245,7 @@ class _Blocks:
 
     def _check_size(self, n_chirps: int) -> None:
         if self._in_memory:
-            what = f"maps of {n_chirps} chirps of radar '{self._radar.name}'"
-            refuse_large(what, bytes_of_maps(self._radar, n_chirps), IN_A_FOLDER)
+            refuse_large_maps(self._radar, n_chirps)
 
 
 def _rows(samples: Any, radar: Radar) -> Any:
@@ -283,9 +280,3 @@ def _rows(samples: Any, radar: Radar) -> Any:
             f"(chirp, rx, sample) = (any, {end[0]}, {end[1]}){'' if sums else whole}"
         )
     return samples
-
-
-def _single(values: NDArray[Any]) -> NDArray[np.complex64]:
-    """Return a copy in single precision, for the caller may fill the same array again."""
-    with np.errstate(over="ignore"):
-        return np.array(values, dtype=np.complex64)

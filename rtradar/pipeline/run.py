@@ -17,7 +17,6 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
 from rtradar.pipeline.output.pictures import draw_pictures
@@ -115,9 +114,8 @@ def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSett
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
-    refuse_large_maps(people_in(scene, motion)[1], radar, settings)
     started, rays_before = _start()
-    capture = prepare(motion, radar, scene, settings)
+    capture = prepare(motion, radar, scene, settings, in_memory=True)
     file = BytesIO()
     clouds, table = _stream(capture, file)
     summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
@@ -127,17 +125,9 @@ def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSett
         truth = read_truth(file)
     described = capture.described()
     summary["run"] = in_words(described)
-    return Result(
-        points=clouds.rdt.points,
-        spatial=clouds.spatial,
-        summary=finished(summary | cost(capture.processing, capture.n_chirps, started)),
-        radar=capture.radar,
-        link_budget=capture.link_budget,
-        experiment=Experiment(described),
-        _in_memory=maps,
-        _truth=truth,
-        _table=table,
-    )
+    summary = finished(summary | cost(capture.processing, capture.n_chirps, started))
+    kept = {"_in_memory": maps, "_truth": truth, "_table": table}
+    return _result(capture, clouds, summary, described, **kept)
 
 
 def run_into(
@@ -164,7 +154,6 @@ def run_into(
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
         clouds, table = _stream(capture, folder / "maps.h5", kept)
-        points = clouds.rdt.points
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
         drawn: dict[str, Path] = {}
@@ -184,7 +173,7 @@ def run_into(
                 radar=capture.radar,
                 summary=summary,
                 pictures=drawn,
-                rdt_points=points,
+                rdt_points=clouds.rdt.points,
                 spatial=clouds.spatial,
                 run_view=run_view_of(
                     folder,
@@ -196,15 +185,19 @@ def run_into(
             )
         summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
         summary = finished(summary, folder)
-    return Result(
-        points=points,
-        spatial=clouds.spatial,
-        summary=summary,
-        radar=capture.radar,
-        link_budget=capture.link_budget,
-        out=out.absolute(),
-        experiment=Experiment(described),
-    )
+    return _result(capture, clouds, summary, described, out=out.absolute())
+
+
+def _result(
+    capture: Capture,
+    clouds: Clouds,
+    summary: dict[str, Any],
+    described: dict[str, Any],
+    **where: Any,
+) -> Result:
+    """Return the result of a capture, whose maps are ``where`` it says."""
+    found = clouds.rdt.points, clouds.spatial, summary, capture.radar, capture.link_budget
+    return Result(*found, experiment=Experiment(described), **where)
 
 
 def _start() -> tuple[Moment, int]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from rtradar.cards import text_table
 from rtradar.errors import InputError
-from rtradar.pipeline.compare import chamfer_bins
+from rtradar.pipeline.compared import chamfer_bins, write_tables
 from rtradar.pipeline.experiment import Experiment
 from rtradar.pipeline.result import Result
 from rtradar.system.checks import check_path
-from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles, atomic_folder, one_of
 
 FIGURES = {
@@ -56,11 +55,7 @@ class Sweep:
             [*map(str, run["values"]), *(_short(run["figures"][name]) for name in FIGURES)]
             for run in self.summary["runs"]
         ]
-        widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
-        return "\n".join(
-            "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-            for row in (head, *rows)
-        )
+        return text_table([head, *rows])
 
 
 def sweep(
@@ -132,26 +127,20 @@ def sweep(
             (run["folder"], *run["values"], *(run["figures"][name] for name in FIGURES))
             for run in runs
         ]
-        text = csv_text(("folder", *keys, *FIGURES), rows)
-        (written / "sweep.csv").write_text(text, encoding="utf-8")
         _draw(written / "sweep.png", summary)
-        summary["files"] = _FILES.list_of(written)
-        said = json.dumps(summary, indent=2, allow_nan=False) + "\n"
-        (written / "sweep.json").write_text(said, encoding="utf-8")
+        write_tables(written, summary, _FILES, ("folder", *keys, *FIGURES), rows)
     return Sweep(summary, place)
 
 
 def _figures(result: Result, first: Result) -> dict[str, float | None]:
     summary, source = result.summary, result.spatial.source
     echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
-    some = source is not None and len(source)
+    room = summary.get("room", {}).get("clutter", {})
     return {
         "snr_db": float(10 * np.log10(echo / noise)) if echo > 0 and noise > 0 else None,
-        "signal_to_clutter_db": summary.get("room", {})
-        .get("clutter", {})
-        .get("signal_to_clutter_db"),
+        "signal_to_clutter_db": room.get("signal_to_clutter_db"),
         "detections": summary["detections"],
-        "of_room": float((source == -1).mean()) if some and source is not None else None,
+        "of_room": None if source is None or not len(source) else float((source == -1).mean()),
         "cloud_bins": chamfer_bins(result.points, first.points, result.radar),
     }
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtradar.pipeline.compare import above_noise, chamfer, level_agreement
+from rtradar.pipeline.compared import above_noise, chamfer, level_agreement
 
 EVERYWHERE = np.ones(4, dtype=bool)
 

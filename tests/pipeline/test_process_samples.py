@@ -161,7 +161,7 @@ def test_maps_too_large_for_memory_are_refused(
 ) -> None:
     monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e5)
     for given in (samples, iter([samples])):
-        with pytest.raises(InputError, match=r"maps of .* chirps of radar 'small' would take"):
+        with pytest.raises(InputError, match=r"maps of .* s of radar 'small' would take"):
             rt.process_samples(given, small)
 
 

@@ -23,7 +23,7 @@ RADAR = Radar(
 
 
 @pytest.mark.parametrize("radar", [RADAR, dataclasses.replace(RADAR, tx_z=0, rx_z=0)])
-@pytest.mark.parametrize("n_cells", [0, 6, 7, 8, 30])
+@pytest.mark.parametrize("n_cells", [0, 7, 30])
 def test_cells_a_few_at_a_time(monkeypatch: pytest.MonkeyPatch, radar: Radar, n_cells: int) -> None:
     rng = np.random.default_rng(n_cells)
     shape = radar.cycles_per_frame, radar.n_tx, radar.n_rx, radar.samples_per_chirp

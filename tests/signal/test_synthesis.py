@@ -132,13 +132,6 @@ def test_any_number_of_samples(samples: int, nodes: int) -> None:
     assert relative_error(ours, plain_sum(echoes, radar)) < TOLERANCE
 
 
-def test_one_chirp_one_receiver_one_echo() -> None:
-    echoes = random_echoes(LONE, chirps=1, count=1)
-    ours = synthesize_block(echoes, LONE)
-    assert ours.shape == (1, 1, 256)
-    assert relative_error(ours, plain_sum(echoes, LONE)) < TOLERANCE
-
-
 @pytest.mark.parametrize(("chirps", "count"), [(0, 2), (4, 0), (0, 0)])
 def test_nothing_gives_silence(chirps: int, count: int) -> None:
     x = synthesize_block(random_echoes(SMALL, chirps, count), SMALL)
@@ -245,41 +238,7 @@ def test_receding_is_a_positive_doppler_frequency(velocity: float) -> None:
     assert np.sign(spectra.velocity[peak]) == np.sign(velocity)
 
 
-def test_farther_is_a_higher_beat() -> None:
-    x = synthesize_block(make_echoes([[[2 * 100 * LONE.range_bin_m]]], [[[[1.0]]]]), LONE)
-    assert np.abs(np.fft.fft(x[0, 0])).argmax() == 100
-
-
 # -- laws ------------------------------------------------------------------------------------------
-
-
-@given(
-    counts=st.tuples(st.integers(0, 4), st.integers(0, 4)),
-    nodes=st.sampled_from([1, 3]),
-    seed=st.integers(0, 99),
-    factor=st.complex_numbers(max_magnitude=100, allow_nan=False, allow_infinity=False),
-)
-@settings(max_examples=30)
-def test_echoes_add_up(counts: tuple[int, int], nodes: int, seed: int, factor: complex) -> None:
-    first = random_echoes(SMALL, 4, counts[0], nodes=nodes, seed=seed)
-    second = random_echoes(SMALL, 4, counts[1], nodes=nodes, seed=seed + 100)
-    scaled = dataclasses.replace(second, amplitude=factor * second.amplitude)
-    both = synthesize_block(together(first, scaled), SMALL)
-    apart = synthesize_block(first, SMALL) + factor * synthesize_block(second, SMALL)
-    np.testing.assert_allclose(
-        both, apart, rtol=0, atol=1e-13 * (1 + abs(factor)) * 40
-    )  # rounding of eight tones
-
-
-@given(offset=st.floats(-7, 7), seed=st.integers(0, 99))
-@settings(max_examples=20)
-def test_a_phase_of_all_amplitudes_is_a_phase_of_the_if(offset: float, seed: int) -> None:
-    echoes = random_echoes(SMALL, 2, 3, nodes=3, seed=seed)
-    turned = dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(1j * offset))
-    expected = synthesize_block(echoes, SMALL) * np.exp(1j * offset)
-    np.testing.assert_allclose(
-        synthesize_block(turned, SMALL), expected, rtol=0, atol=1e-12
-    )  # rounding of float64
 
 
 @given(cuts=st.lists(st.integers(0, 30), max_size=4))
@@ -305,20 +264,6 @@ def test_hidden_echoes_add_nothing() -> None:
     np.testing.assert_array_equal(
         synthesize_block(together(echoes, hidden), SMALL), synthesize_block(echoes, SMALL)
     )
-
-
-@pytest.mark.parametrize("nodes", [3, 5])
-def test_constant_echoes_among_others_are_what_they_are_alone(nodes: int) -> None:
-    varying, constant = random_echoes(SMALL, 6, 3, nodes=nodes), random_echoes(SMALL, 6, 2, seed=1)
-    everywhere = dataclasses.replace(
-        constant,
-        amplitude=np.repeat(constant.amplitude, nodes, axis=0),
-        frequency=varying.frequency,
-    )
-    alone = synthesize_block(varying, SMALL) + synthesize_block(constant, SMALL)
-    assert (
-        relative_error(synthesize_block(together(varying, everywhere), SMALL), alone) < 1e-12
-    )  # rounding
 
 
 def test_an_amplitude_that_vanishes_at_one_node_is_not_hidden() -> None:

@@ -26,7 +26,7 @@ import numpy as np
 from detection_score import DetectionScore, cell_noise_power, score, target_cells
 
 import rtradar as rt
-from rtradar.pipeline.compare import chamfer
+from rtradar.pipeline.compared import chamfer
 from rtradar.process import CLUTTER_REMOVALS
 from rtradar.validate.rows import Row, main, reported
 

@@ -30,7 +30,7 @@ import rtradar as rt
 from rtradar.motion.formats.c3d import LONGEST_GAP_S, bridged, read_markers
 from rtradar.motion.formats.markers import NEEDED
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.pipeline.compare import chamfer
+from rtradar.pipeline.compared import chamfer
 from rtradar.validate.rows import Row, judged, main, reported
 
 LIMIT_CM = 6.0
