@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,17 +10,21 @@ from numpy.typing import NDArray
 
 from rtradar.process.spectra import checked_chirps
 from rtradar.radar import Radar
+from rtradar.system.threads import thread_map
 
 _Frame = tuple[int, int, NDArray[np.complex64]]
 """Index, first cycle and cube of a frame."""
+
+_CHIRPS_AT_ONCE = 256
+"""Chirps that one task of a thread copies: 4 MB of 8 receivers and 256 samples."""
 
 
 class SlidingWindows:
     """The frames of a stream of chirps, however the stream is cut into blocks.
 
-    The frames are those of `Radar.window_starts` for as many chirps as were pushed. At most two and
-    a half frames are in memory, whatever the size of the blocks: one that is given, and the chirps
-    that later ones need.
+    The frames are those of `Radar.window_starts` for as many chirps as were pushed. The buffer
+    holds one and a quarter frames, whatever the size of the blocks: with the quarter, what is kept
+    moves to its front at most once for every quarter of a frame of new chirps.
 
     Parameters
     ----------
@@ -36,11 +39,12 @@ class SlidingWindows:
 
     def __init__(self, radar: Radar) -> None:
         self._radar = radar
-        shape = (radar.chirps_per_frame, radar.n_rx, radar.samples_per_chirp)
-        self._frame = np.empty(shape, np.complex64)
-        self._at_once = -(-radar.chirps_per_frame // 4)
-        # Chirps that are needed, in pieces, with the number of the first of each.
-        self._held: deque[tuple[int, NDArray[np.complex64]]] = deque()
+        frame = radar.chirps_per_frame
+        chirps = frame + max(2 * radar.n_tx, frame // 4)
+        shape = (chirps, radar.n_rx, radar.samples_per_chirp)
+        self._buffer = np.empty(shape, np.complex64)
+        self._first = 0  # chirp at the front of the buffer
+        self._held = 0  # chirps in the buffer
         self._candidate = 0  # frames are counted by multiples of the hop ...
         self._index = 0  # ... of which those that round to the same cycle are one frame
         self._last_start = -1
@@ -63,7 +67,7 @@ class SlidingWindows:
         start_cycle : int
             First TDM cycle of the frame.
         cube : (cycle, tx, rx, range) complex64
-            Read-only array, valid until the next step of the iteration.
+            Read-only view of the buffer, valid until the next step of the iteration.
 
         Raises
         ------
@@ -79,29 +83,39 @@ class SlidingWindows:
         return self._frames(block)
 
     def _frames(self, block: NDArray[np.generic]) -> Iterator[_Frame]:
-        for begin in range(0, len(block), self._at_once):
-            piece = block[begin : begin + self._at_once]
-            self._held.append((self.n_chirps, np.array(piece, np.complex64)))
-            self.n_chirps += len(piece)
+        taken = 0
+        while taken < len(block):
+            taken += self._take(block[taken:])
             while (start := self._next_start()) is not None:
+                offset = start * self._radar.n_tx - self._first
+                view = self._buffer[offset : offset + self._radar.chirps_per_frame]
+                cube = view.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *view.shape[1:])
+                cube.flags.writeable = False
+                index = self._index
                 self._index += 1
-                yield self._index - 1, start, self._cube(start)
-            # No later frame needs a chirp before this one.
-            wanted = self._start_of(self._candidate) * self._radar.n_tx
-            while self._held and self._held[0][0] + len(self._held[0][1]) <= wanted:
-                self._held.popleft()
+                yield index, start, cube
         self._busy = False
 
-    def _cube(self, start: int) -> NDArray[np.complex64]:
-        """Copy the chirps of a frame beside each other, (cycle, tx, rx, range)."""
-        begin = start * self._radar.n_tx
-        for number, piece in self._held:
-            first, last = max(number, begin), min(number + len(piece), begin + len(self._frame))
-            if first < last:
-                self._frame[first - begin : last - begin] = piece[first - number : last - number]
-        cube = self._frame.reshape(-1, self._radar.n_tx, *self._frame.shape[1:])
-        cube.flags.writeable = False
-        return cube
+    def _take(self, block: NDArray[np.generic]) -> int:
+        """Copy what fits of the block behind what is still needed; how many chirps it took."""
+        # No later frame needs a chirp before this one.
+        wanted = self._start_of(self._candidate) * self._radar.n_tx
+        gone = min(max(wanted - self._first, 0), self._held)
+        room = len(self._buffer) - self._held
+        if self._held == gone:
+            self._first, self._held = self._first + gone, 0
+        elif room == 0:
+            kept = self._held - gone
+            # At most as many at once as it moves, for NumPy copies overlapping arrays twice.
+            for begin in range(0, kept, gone):
+                end = min(begin + gone, kept)
+                _copy(self._buffer[begin + gone : end + gone], self._buffer[begin:end])
+            self._first, self._held = self._first + gone, kept
+        count = min(len(self._buffer) - self._held, len(block))
+        _copy(block[:count], self._buffer[self._held : self._held + count])
+        self._held += count
+        self.n_chirps += count
+        return count
 
     def _start_of(self, candidate: int) -> int:
         return round(candidate * self._radar.hop_cycles)
@@ -116,3 +130,10 @@ class SlidingWindows:
                 self._last_start = start
                 return start
         return None
+
+
+def _copy(chirps: NDArray[np.generic], to: NDArray[np.complex64]) -> None:
+    def some(first: int) -> None:
+        to[first : first + _CHIRPS_AT_ONCE] = chirps[first : first + _CHIRPS_AT_ONCE]
+
+    thread_map(some, range(0, len(chirps), _CHIRPS_AT_ONCE))
