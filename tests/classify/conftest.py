@@ -8,12 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
 from rtradar.clouds.collection import Collection
 from rtradar.clouds.sample_files import Sample, write_index, write_sample
 
 LABELS = ("kick", "punch", "walk")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread() -> None:
+    """Train in one thread: several wait for each other, awake, longer than these networks take."""
+    torch.set_num_threads(1)
 
 
 class MadeUpClouds(Collection):

@@ -28,7 +28,8 @@ TINY = ["--points", "24", "--epochs", "2", "--folds", "2"]
 
 
 def rtradar(*words: object) -> int:
-    return main([str(word) for word in words])
+    """Run the command of some words, or texts of several."""
+    return main([part for word in words for part in str(word).split()])
 
 
 @pytest.fixture(scope="module")
@@ -43,37 +44,12 @@ def test_a_study_is_trained_and_evaluated(
     collection: Path, trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     paper = tmp_path / "paper"
-    assert (
-        rtradar(
-            "train",
-            collection,
-            "--out",
-            paper,
-            "--recipe",
-            "paper",
-            *TINY,
-            "--split",
-            "subject",
-            "--fold",
-            "2",
-        )
-        == 0
-    )
+    words = f"train {collection} --out {paper} --recipe paper --split subject --fold 2"
+    assert rtradar(words, *TINY) == 0
     assert "1 of 2 trained" in capsys.readouterr().out
     out = tmp_path / "evaluated"
-    assert (
-        rtradar(
-            "evaluate",
-            trained,
-            paper,
-            "--baselines",
-            "--out",
-            out,
-            "--json",
-            tmp_path / "numbers.json",
-        )
-        == 0
-    )
+    words = f"evaluate {trained} {paper} --baselines --out {out} --json {tmp_path / 'numbers.json'}"
+    assert rtradar(words) == 0
     said = capsys.readouterr().out
     assert "lean, 24 points" in said
     assert "1 of 2 trained" in said
@@ -84,13 +60,8 @@ def test_a_study_is_trained_and_evaluated(
     lean = content["groups"][0]
     assert lean["summary"]["test_clouds"] == 36  # each cloud once
     assert sum(map(sum, lean["confusion"])) == 36
-    pictures = {
-        "accuracy.png",
-        "confusion-1.png",
-        "confusion-2.png",
-        "learning-1.png",
-        "learning-2.png",
-    }
+    pictures = {f"{kind}-{number}.png" for kind in ("confusion", "learning") for number in (1, 2)}
+    pictures |= {"accuracy.png"}
     tables = {"evaluation.json", "table.txt", "trainings.csv", "history.csv"}
     assert {path.name for path in out.iterdir()} == pictures | tables
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)

@@ -47,7 +47,7 @@ def weights(network: torch.nn.Module) -> torch.Tensor:
 @pytest.mark.parametrize(
     "recipe",
     [
-        LEAN.changed(points=48, batch=4, epochs=24, augmentation="none", dropout=0.0),
+        LEAN.changed(points=48, batch=4, epochs=14, augmentation="none", dropout=0.0),
         PAPER.changed(points=48, batch=8, epochs=12, rate=1e-3, dropout=0.0),
     ],
     ids=["lean", "paper"],
