@@ -13,7 +13,7 @@ from rtradar.description import made_from
 from rtradar.errors import InputError
 from rtradar.recognition.description import EDGE_S, WINDOW_S, cut_windows
 from rtradar.recognition.recogniser import OTHER, WEIGHTS, Recogniser
-from rtradar.system.checks import printable
+from rtradar.system.checks import is_real, printable
 from rtradar.system.files import read_arrays, read_json
 
 _TOLERANCE = 0.2  # relative difference of a radar's resolution that is not worth a warning
@@ -85,17 +85,15 @@ def _read(folder: Path) -> tuple[np.ndarray[Any, np.dtype[np.float64]], dict[str
     try:
         summary = read_json(folder / "summary.json")
         points = np.asarray(read_arrays(folder / "cloud_rdt.npz")["points"], dtype=np.float64)
+        known = isinstance(summary["parameters"], dict) and is_real(summary["capture_s"])
+        cloud = points.ndim == 2 and points.shape[1] == 3 and np.isfinite(points).all()
+        if not known or not cloud or not 0 < summary["capture_s"] < 1e6:
+            raise ValueError
     except OSError as error:
         name = Path(error.filename or folder).name
         raise InputError(f"'{folder}' holds no run ({name}: {error.strerror}); {_NEEDED}") from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"a file of '{folder}' is damaged; make the run anew") from None
-    whole = isinstance(summary, dict) and isinstance(summary.get("parameters"), dict)
-    capture_s = summary.get("capture_s") if whole else None
-    if not isinstance(capture_s, float | int) or not 0 < capture_s < 1e6:
-        raise InputError(f"'{folder / 'summary.json'}' is damaged; make the run anew")
-    if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
-        raise InputError(f"'{folder / 'cloud_rdt.npz'}' is damaged; make the run anew")
     if not len(points):
         raise InputError(f"the cloud of '{folder}' is empty; make the run with a higher SNR")
     return points, summary
