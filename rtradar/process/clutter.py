@@ -261,14 +261,13 @@ class _Mti(ClutterRemoval):
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.zeros_like(cycles)
         known = np.concatenate([self._held, cycles])
-        numbers = np.arange(self._cycles, self._cycles + len(cycles))
-        if self._radar.in_frames:
-            # Over a gap between frames nothing is the difference of two cycles.
-            numbers %= self._radar.cycles_per_frame
-        some = np.flatnonzero(numbers >= self._order)
         # Little changes from cycle to cycle, so differences of differences hardly round.
         differences = np.diff(known, n=self._order, axis=0) * known.real.dtype.type(self._gain)
-        out[some] = differences[some + len(self._held) - self._order]
+        out[len(out) - len(differences) :] = differences
+        if self._radar.in_frames:
+            # Over a gap between frames nothing is the difference of two cycles.
+            numbers = np.arange(self._cycles, self._cycles + len(cycles))
+            out[numbers % self._radar.cycles_per_frame < self._order] = 0
         self._cycles += len(cycles)
         self._held = known[-self._order :].copy()  # a view would keep the whole block
         return out

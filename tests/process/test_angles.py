@@ -94,7 +94,8 @@ def test_a_point_at_four_metres(direction: tuple[float, float], speed: float) ->
 
 @pytest.mark.parametrize(("direction", "speed"), [((-14.0, 25.0), -3.0), ((60.0, 0.0), 2.0)])
 def test_a_point_at_77_ghz(direction: tuple[float, float], speed: float) -> None:
-    found = np.degrees(angle(echo(HIGH, place_of(4.0, *direction), speed), HIGH, 4.0, speed))
+    radar = dataclasses.replace(HIGH, frame_duration_s=0.02)
+    found = np.degrees(angle(echo(radar, place_of(4.0, *direction), speed), radar, 4.0, speed))
     # Measured 0.01 at -14 degrees, 0.13 at 60, where half a degree of angle is a quarter of a
     # degree of its sine.
     np.testing.assert_allclose(found, direction, atol=0.2)
