@@ -288,8 +288,8 @@ def _figures(result: Result, occluded: _Occluded, reference: Result) -> dict[str
     summary, stages = result.summary, result.summary["stages"]
     budgets = _budget(result), _budget(reference)
     least = np.finfo(np.float64).tiny
-    levels = (10 * np.log10(np.maximum(one.power_at.sum(axis=1), least)) for one in budgets)
-    power = next(levels) - next(levels)
+    ours, its = (10 * np.log10(np.maximum(one.power_at.sum(axis=1), least)) for one in budgets)
+    power = ours - its
     with np.errstate(divide="ignore", invalid="ignore"):
         norm = np.linalg.norm(budgets[1].field_at)
         error = np.linalg.norm(budgets[0].field_at - budgets[1].field_at) / norm
