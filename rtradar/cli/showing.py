@@ -86,7 +86,8 @@ def _detectors() -> Described:
 
 
 def _activities() -> Described:
-    from rtradar.motion.synthetic import ACTIVITIES, STYLES
+    from rtradar.motion.synthetic import ACTIVITIES
+    from rtradar.motion.synthetic.figure import STYLES
 
     for name, function in ACTIVITIES.items():
         first = (inspect.getdoc(function) or "").partition("\n\n")[0]
