@@ -32,6 +32,8 @@ from rtradar.system.registries import check_activity
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
 
+__all__ = ["ACTIVITIES", "ACTORS", "STYLES", "Traits", "synthetic_motion"]
+
 ACTORS = 3
 """Version of the actors, raised whenever one of them moves otherwise than before."""
 

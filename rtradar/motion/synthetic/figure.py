@@ -64,7 +64,12 @@ def table_of(name: str) -> dict[str, Any]:
 
 
 STYLES: Mapping[str, tuple[str, ...]] = {
-    activity: tuple(styles) for activity, styles in table_of("styles").items()
+    "walk": ("normal", "antalgic", "stiff_legged", "lurch", "steppage", "trendelenburg"),
+    "kick": ("front", "side", "roundhouse", "spin", "ball"),
+    "wave": ("one_hand", "two_hands"),
+    "fall": ("backward", "forward"),
+    "punch": ("jab", "cross", "hook", "uppercut", "lunge"),
+    "boxing": ("outfighter", "infighter", "steady"),
 }
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 

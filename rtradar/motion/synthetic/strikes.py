@@ -9,8 +9,8 @@ each subject (``traits.toml``), what differs between strikes of one person for e
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
+from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -32,16 +32,14 @@ _BOXERS = (0.25, 0.25, 0.5)
 """Probabilities of the styles; the people of Berkeley MHAD, asked to box, do so steadily."""
 
 
-def _kinds(activity: str) -> Mapping[str, SimpleNamespace]:
-    """All kinds of kicks, or of punches."""
-    return {style: SimpleNamespace(**table_of(f"{activity}_{style}")) for style in STYLES[activity]}
+@cache
+def _kind(activity: str, style: str) -> SimpleNamespace:
+    """How a kind of kick or punch goes."""
+    return SimpleNamespace(**table_of(f"{activity}_{style}"))
 
 
-KICKS, PUNCHES = _kinds("kick"), _kinds("punch")
-
-
-def _only(style: str, kinds: Mapping[str, SimpleNamespace]) -> Array:
-    return np.array([float(kind == style) for kind in kinds])
+def _only(activity: str, style: str) -> Array:
+    return np.array([float(kind == style) for kind in STYLES[activity]])
 
 
 # -- kicks -----------------------------------------------------------------------------------------
@@ -61,12 +59,14 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     # Each has one or two favourites; spins are rare.
     rng = np.random.default_rng([subject.manner, 1])
     shares = (
-        _only(subject.style, KICKS) if subject.style else rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
+        _only("kick", subject.style)
+        if subject.style
+        else rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
     )
     fighter = Fighter(subject, stance, own)
     leg, t = subject.side, -1.6 * subject.phase
     while t < duration_s + 0.5:
-        kind = KICKS[STYLES["kick"][int(fighter.rng.choice(len(KICKS), p=shares))]]
+        kind = _kind("kick", STYLES["kick"][int(fighter.rng.choice(len(shares), p=shares))])
         t = _kick(fighter, kind, leg, t)
         t += fighter.between(0.03, own.rest) / subject.tempo
         if fighter.rng.random() < own.alternating:
@@ -203,8 +203,8 @@ def _habits(subject: Subject, *, boxing: bool) -> SimpleNamespace:
         style = STYLES["boxing"][int(rng.choice(len(_BOXERS), p=_BOXERS))]
     own = subject.traits(f"boxing_{style}" if boxing else "punch")
     own.shares = (
-        _only(style, PUNCHES)
-        if style in PUNCHES
+        _only("punch", style)
+        if style in STYLES["punch"]
         else rng.dirichlet(np.array(own.favourites) + 1e-3)
     )
     own.in_turn = style == "steady"
@@ -240,9 +240,10 @@ def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> Poses
             t = max(t, _step_in(fighter, t, middle_x, middle_y))
         hand = subject.side if rng.random() < 0.55 else subject.other
         for _ in range(int(rng.integers(1, own.most + 1))):
-            kind = PUNCHES[STYLES["punch"][int(rng.choice(len(PUNCHES), p=own.shares))]]
+            style = STYLES["punch"][int(rng.choice(len(own.shares), p=own.shares))]
+            kind = _kind("punch", style)
             if kind.hand != "either" and own.in_turn:
-                kind = PUNCHES["jab" if hand == fighter.lead else "cross"]
+                kind = _kind("punch", "jab" if hand == fighter.lead else "cross")
             elif kind.hand != "either":
                 hand = fighter.lead if kind.hand == "front" else fighter.rear
             t = _punch(fighter, kind, hand, t)
