@@ -130,7 +130,7 @@ def test_nodes_stand_where_the_joints_are(tmp_path: Path, joints: dict[str, str]
     assert motion.girth * 1.75 == pytest.approx(1.63, abs=0.02)  # the height of the head's top
 
 
-@pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z", None])
+@pytest.mark.parametrize("up", ["x", "-z", None])
 def test_any_axis_may_be_up_and_left_stays_left(tmp_path: Path, up: str | None) -> None:
     axes = np.roll(np.eye(3), "xyz".index(up[-1]) - 2 if up else 2, axis=0)
     axes = axes @ np.diag([1.0, -1.0, -1.0]) if up and up[0] == "-" else axes
