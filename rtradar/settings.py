@@ -168,7 +168,7 @@ class RunSettings:
     spreading: bool = True
     model_options: Mapping[str, Any] | None = field(default_factory=dict)
     clutter_removal: Annotated[str, Limits(allowed=("none", "mean", "exponential", "mti"))] = "none"
-    background: str | None = None
+    background: Annotated[str | None, Limits(any_text=True)] = None
     body_material: Annotated[str, Limits(allowed=("perfect-conductor", "skin"))] = (
         "perfect-conductor"
     )

@@ -52,6 +52,7 @@ def test_settings_cannot_be_changed_and_keep_a_copy_of_the_model_options() -> No
     settings = RunSettings(model_options=options)
     options["shadow_rays"] = 1
     assert settings.model_options == {"shadow_rays": 256}
+    assert RunSettings(background="any\nname \udcff").background == "any\nname \udcff"
     with pytest.raises(dataclasses.FrozenInstanceError):
         settings.pfa = 0.5
 

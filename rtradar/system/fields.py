@@ -43,6 +43,8 @@ class Limits:
         What a text may be; anything of one line if left out.
     may_be_empty : bool
         Whether a text may be empty.
+    any_text : bool
+        Whether a text may have letters that are not printable, as paths may.
     rising : bool
         Whether the entries of a list may not fall.
     """
@@ -53,6 +55,7 @@ class Limits:
     counts: tuple[int, int] = (0, 2**31)
     allowed: tuple[str, ...] = ()
     may_be_empty: bool = False
+    any_text: bool = False
     rising: bool = False
 
 
@@ -75,7 +78,7 @@ class Rule(NamedTuple):
             return self.read(value)
         except InputError as error:  # of a table in it
             raise InputError(f"{where}{key}: {error}") from None
-        except ValueError:
+        except (ValueError, OverflowError):
             hint = self._in_units(key, value)
             raise InputError(f"{where}{key} = {brief(value)}; {self.wanted}{hint}") from None
 
@@ -195,7 +198,7 @@ def _rule(hint: Any, limits: Limits | None = None) -> Rule:
         found = _where(
             lambda value: (
                 isinstance(value, str)
-                and value.isprintable()
+                and (value.isprintable() or bounds.any_text)
                 and (bounds.may_be_empty or bool(value.strip()))
             ),
             "it must be a string of one line, not empty",

@@ -105,7 +105,7 @@ def test_values_get_their_types() -> None:
         ("turn_deg", 361, "it must be a number from -360 to 360"),
         ("times", [1, "2"], "it must be a list of numbers"),
         *(("pairs", value, "it must be pairs") for value in ((), [["a", 0.5]], [["a", 1]] * 3)),
-        *(("level", value, "it must be a level") for value in (-1, "on", None)),
+        *(("level", value, "it must be a level") for value in (-1, "on", None, 10**400)),
         ("inner", 3, "it must be a table of the fields of Inner"),
         ("inner", {"length_m": 6}, "length_m = 6; it must be a number from 0 to 5"),
         ("inner", {"lenght_m": 1}, r"unknown key .lenght_m. \(did you mean length_m"),
