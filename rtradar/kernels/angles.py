@@ -1,7 +1,8 @@
-"""Power of the beams of a line of antennas."""
+"""Beams of a line of antennas: their power, its maxima, and maps of it."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -52,3 +53,59 @@ def beam_power(begin, end, values, still, place, channels, steering, power):
                 run_imaginary[i] += value.real * w.imag + value.imag * w.real
         for sine in range(n_sines):
             power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2
+
+
+@compiled()
+def highest_maxima(power, below, above, index, count):
+    """Fill index (cell, peak) with the maxima of power (cell, sine), and count (cell,) of them.
+
+    The strongest comes first, and again where there are no more. A maximum counts if it is at least
+    ``below`` times the highest, and unless it is the highest, if more than half of the spectrum is
+    at least ``above`` times weaker.
+    """
+    sines, peaks = power.shape[1], index.shape[1]
+    for cell in range(len(power)):
+        own, best, found = power[cell], index[cell], 0
+        top = 0
+        for sine in range(1, sines):
+            if own[sine] > own[top]:
+                top = sine
+        highest = own[top]
+        best[:] = top
+        for sine in range(sines):
+            value = own[sine]
+            rises = sine == 0 or value > own[sine - 1]
+            falls = sine == sines - 1 or value >= own[sine + 1]
+            if not (value > 0 and value >= highest * below and rises and falls):
+                continue
+            if value < highest:
+                lower = 0
+                for other in range(sines):
+                    lower += own[other] * above <= value
+                if 2 * lower <= sines:
+                    continue
+            # Insert it among those found, the strongest first.
+            place = found
+            while place > 0 and value > own[best[place - 1]]:
+                place -= 1
+            if place < peaks:
+                for later in range(peaks - 1, place, -1):
+                    best[later] = best[later - 1]
+                best[place] = sine
+                found = min(found + 1, peaks)
+        for none in range(found, peaks):
+            best[none] = best[0]
+        count[cell] = found
+
+
+@compiled()
+def add_interpolated(power, sines, first, step, bins, total):
+    """Add power (cell, sine), read at sines (cell, angle) on its uniform grid, to (bin, angle)."""
+    last = power.shape[1] - 2
+    for cell in range(len(power)):
+        for angle in range(sines.shape[1]):
+            place = (sines[cell, angle] - first) / step
+            left = min(max(math.floor(place), 0), last)
+            part = place - left
+            read = (1 - part) * power[cell, left] + part * power[cell, left + 1]
+            total[bins[cell], angle] += read

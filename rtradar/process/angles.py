@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.angles import beam_power
+from rtradar.kernels.angles import add_interpolated, beam_power, highest_maxima
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,
@@ -288,22 +288,11 @@ class Peaks:
 
 def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     """Up to `MOST_PEAKS` maxima of each spectrum (cell, sine), neither side lobes nor noise."""
-    below, above = (np.float32(10 ** (db / 10)) for db in (-BELOW_HIGHEST_DB, ABOVE_MEDIAN_DB))
-    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
-    highest = power.max(axis=1, keepdims=True)
-    peak = (power > padded[:, :-2]) & (power >= padded[:, 2:])
-    peak &= (power > 0) & (power >= highest * below)
-    # All but the highest are side lobes or noise unless most of the spectrum is far below them.
-    cell, place = np.nonzero(peak & (power < highest))
-    lower = (power[cell] * above <= power[cell, place][:, None]).sum(axis=1)
-    peak[cell, place] = 2 * lower > power.shape[1]
-    left, every = np.where(peak, power, np.float32(0)), np.arange(len(power))
     index = np.empty((len(power), MOST_PEAKS), dtype=np.int64)
-    for number in range(MOST_PEAKS):
-        index[:, number] = left.argmax(axis=1)
-        left[every, index[:, number]] = 0
-    real = np.arange(MOST_PEAKS) < peak.sum(axis=1)[:, None]
-    index = np.where(real, index, index[:, :1])
+    count = np.empty(len(power), dtype=np.int64)
+    below, above = (np.float32(10 ** (db / 10)) for db in (-BELOW_HIGHEST_DB, ABOVE_MEDIAN_DB))
+    highest_maxima(power, below, above, index, count)
+    real = np.arange(MOST_PEAKS) < count[:, None]
     return Peaks(*refine(sines, power, index), real)
 
 
@@ -386,10 +375,9 @@ def _map(spectra: AngleSpectra, line: str, sines: _Reals, radar: Radar) -> _Real
             f"line of at least 2 channels along {line}; give it one"
         )
     total = np.zeros((radar.samples_per_chirp, sines.shape[-1]))
+    # What may not be written to is another type to Numba, for which it would compile all again.
+    own = np.array(np.broadcast_to(sines, (len(power), sines.shape[-1])), order="C")
+    bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
     grid = spectra.sines
-    place = (sines - grid[0]) / (grid[1] - grid[0])
-    left = np.clip(np.floor(place).astype(np.int64), 0, power.shape[1] - 2)
-    cell, part = np.arange(len(power))[:, None], place - left
-    read = (1 - part) * power[cell, left] + part * power[cell, left + 1]
-    np.add.at(total, np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64), read)
+    add_interpolated(power, own, grid[0], grid[1] - grid[0], bins, total)
     return total

@@ -203,14 +203,16 @@ def _checked(
 
 def _count_below(
     cells: NDArray[np.floating], thresholds: NDArray[np.floating], guard: int, outer: int
-) -> NDArray[np.int32]:
+) -> NDArray[np.unsignedinteger]:
     """Number of training cells that lie below the threshold of each cell (range, velocity)."""
     rows, columns = cells.shape
-    count = np.zeros(cells.shape, dtype=np.int32)
-    padded = np.pad(cells, outer, constant_values=np.inf)
+    count = np.zeros(cells.shape, dtype=np.min_scalar_type((2 * outer + 1) ** 2))
+    below, padded = np.empty(cells.shape, np.bool_), np.pad(cells, outer, constant_values=np.inf)
     for down, right in np.ndindex(2 * outer + 1, 2 * outer + 1):
         if max(abs(down - outer), abs(right - outer)) > guard:
-            count += padded[down : down + rows, right : right + columns] < thresholds
+            neighbours = padded[down : down + rows, right : right + columns]
+            np.less(neighbours, thresholds, out=below)
+            count += below.view(np.uint8)
     return count
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.fft
 
 from references.cases import Pair, filled, kernel_case, samples
-from rtradar.kernels.angles import Steering, beam_power
+from rtradar.kernels.angles import Steering, add_interpolated, beam_power, highest_maxima
 from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
 
 # -- expected echoes -------------------------------------------------------------------------------
@@ -94,3 +94,43 @@ def _beam_power() -> Pair:
     steering = Steering(samples(8, 48, 86), np.array(runs), 96 * np.arange(9))
     given, out = (values, still, place, np.arange(0, 96, 2), steering), np.empty((21, 86), "f4")
     return filled(beam_power, 0, 21, *given, out=(out,)), beam_power_reference(*given)
+
+
+def highest_maxima_reference(power, below, above, peaks):
+    """Index and count of `highest_maxima`, by NumPy."""
+    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
+    good = (power > padded[:, :-2]) & (power >= padded[:, 2:]) & (power > 0)
+    highest = power.max(axis=1, keepdims=True)
+    good &= power >= highest * below
+    lower = (power[:, None] * above <= power[:, :, None]).sum(axis=2)
+    good &= (power == highest) | (2 * lower > power.shape[1])
+    count = np.minimum(good.sum(axis=1), peaks)
+    order = np.argsort(np.where(good, -power, np.inf), axis=1, kind="stable")[:, :peaks]
+    index = np.where(np.arange(peaks) < count[:, None], order, order[:, :1])
+    return np.where(count[:, None] > 0, index, power.argmax(axis=1)[:, None]), count
+
+
+@kernel_case(highest_maxima, 0)
+def _maxima() -> Pair:
+    power = np.random.default_rng(0).exponential(size=(150, 200)).astype(np.float32) ** 4
+    given, out = (power, np.float32(0.25), np.float32(12)), (np.empty((150, 3), int),)
+    found = filled(highest_maxima, *given, out=(*out, np.empty(150, int)))
+    return found, highest_maxima_reference(*given, 3)
+
+
+def add_interpolated_reference(power, sines, first, step, bins, shape):
+    """The map (bin, angle) that `add_interpolated` adds, by NumPy."""
+    total = np.zeros(shape)
+    grid = first + step * np.arange(power.shape[1])
+    read = [np.interp(own, grid, values) for own, values in zip(sines, power, strict=True)]
+    np.add.at(total, bins, read)
+    return total
+
+
+@kernel_case(add_interpolated, 1e-6)
+def _interpolated() -> Pair:
+    rng, first, step = np.random.default_rng(0), -0.9, 1.8 / 199
+    power, sines = rng.exponential(size=(500, 200)).astype("f4"), rng.uniform(-1, 1, (500, 200))
+    given, out = (power, sines.clip(-0.9, 0.9), first, step, rng.integers(0, 128, 500)), (128, 200)
+    found = filled(add_interpolated, *given, out=(np.empty(out),), adds=True)
+    return found, add_interpolated_reference(*given, out)
