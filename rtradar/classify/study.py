@@ -10,8 +10,8 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,15 +89,12 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
     Only where the clouds are and by which versions they are learnt from may differ.
     """
     path = out / PLAN
-    with _writing_to(out):  # a name may be too long, for one
-        there = os.path.lexists(path)
-        found = sorted(out.glob("training-*"))
-    if not there and found:
-        raise InputError(
-            f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; "
-            "give another folder (--out)"
-        )
-    if not there:
+    if not os.path.lexists(path):
+        if os.path.isdir(out) and (found := sorted(out.glob("training-*"))):
+            raise InputError(
+                f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; "
+                "give another folder (--out)"
+            )
         return
     try:
         known = read_json(path)
@@ -114,8 +111,12 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
 
 def write_plan(out: Path, plan: dict[str, Any]) -> None:
     """Write the plan into the folder, which is made if it does not exist."""
-    with _writing_to(out):
+    try:
         out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:  # such as a name that is too long
+        raise InputError(
+            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+        ) from None
     with atomic_file(out / PLAN) as file:
         file.write((json.dumps(plan, indent=1) + "\n").encode())
 
@@ -138,16 +139,6 @@ def read_plan(folder: Path) -> dict[str, Any]:
         ) from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"'{folder / PLAN}' is damaged; train into another folder") from None
-
-
-@contextmanager
-def _writing_to(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise InputError(
-            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
-        ) from None
 
 
 def _difference(was: Any, now: Any) -> tuple[Any, Any]:
@@ -213,7 +204,7 @@ def train_study(
     }
     check_plan(out, plan)
     values = values_of(clouds, split)
-    missing = [n for n in numbers if not (training_folder(out, n) / _OUTCOME).exists()]
+    missing = [n for n in numbers if not os.path.exists(training_folder(out, n) / _OUTCOME)]
     if missing:
         examples = Examples(stacked_for(clouds, recipe, seed=seed), torch.from_numpy(truth), names)
         training.check_points(examples, recipe)
