@@ -86,7 +86,8 @@ OF_RECORDINGS = {
     "skeleton": "the `.asf` of an `.amc`",
     **READ_AS,
     "seed": "number of the subject of a synthetic actor; 0",
-    "duration_s": "how long a synthetic actor moves [s]; 10",
+    "duration_s": "duration of a recording from `start_s` on [s], to its end if left out; how long "
+    "a synthetic actor moves [s], 10 if left out",
 }
 """Keys of a person in a scene file that find their motion."""
 

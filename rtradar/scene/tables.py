@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -34,7 +35,7 @@ _OF_PEOPLE = (
 _OF_PEOPLE += " seed duration_s traits"
 """Keys that a person may have beside ``motion``."""
 
-_OF_ACTORS = ("seed", "duration_s", "traits")
+_OF_ACTORS = ("seed", "traits")
 _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 """How long a synthetic actor moves by default, and at most [s]."""
 
@@ -223,7 +224,7 @@ def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
         own = {
             key: value
             for key, value in entry.items()
-            if key not in ("motion", "skeleton", *SAID, *_OF_ACTORS)
+            if key not in ("motion", "skeleton", "duration_s", *SAID, *_OF_ACTORS)
         }
         with prefixed(where):
             found.append(Person(_motion(entry, folder), **own))
@@ -257,4 +258,13 @@ def _motion(entry: Table, folder: Path) -> Motion:
         if key in entry
     }
     said = said_of("people", entry)
-    return load_motion(paths["motion"], skeleton=paths.get("skeleton"), **said)
+    recording = load_motion(paths["motion"], skeleton=paths.get("skeleton"), **said)
+    if "duration_s" not in entry:
+        return recording
+    start_s = read_value(float, "person: ", "start_s", entry.get("start_s", 0.0))
+    left_s = max(recording.duration_s - start_s, 0.0)
+    duration_s = check_number("person", "duration_s", entry["duration_s"], 0.0, left_s)
+    ended = dataclasses.replace(recording, length_s=start_s + duration_s)
+    assert recording.source is not None  # it was read from a file
+    keys = {**recording.source.keys, "duration_s": duration_s}
+    return ended.made_from(recording.source._replace(keys=keys))

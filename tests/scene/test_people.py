@@ -7,6 +7,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import InputError
+from rtradar.motion.formats.saved import save_motion
 
 PERSON = """
 [[people]]
@@ -47,6 +48,17 @@ def test_recordings_lie_beside_the_scene(tmp_path: Path, mocap: Path) -> None:
     assert load(tmp_path, text.format(recording)).people[0].motion.duration_s > 1
     with pytest.raises(InputError, match="leaves the folder"):
         load(tmp_path, text.format("../" + recording))
+
+
+def test_of_a_recording_a_part_may_be_taken(tmp_path: Path) -> None:
+    save_motion(tmp_path / "a.motion", rt.synthetic_motion("walk", duration_s=2.0))
+    text = '[[people]]\nmotion = "a.motion"\nstart_s = 0.5\nduration_s = {}'
+    (person,) = load(tmp_path, text.format(0.25)).people
+    assert (person.start_s, person.motion.duration_s) == (0.5, 0.75)
+    assert person.motion.source is not None
+    assert person.motion.source.keys["duration_s"] == 0.25
+    with pytest.raises(InputError, match=r"duration_s = 1.6; it must be a number from 0 to 1.5"):
+        load(tmp_path, text.format(1.6))
 
 
 @pytest.mark.parametrize(
