@@ -16,7 +16,8 @@ from rtradar.clouds import Collection, Sample
 from rtradar.clouds.sample_files import write_index, write_sample
 from rtradar.scene import Furniture, material
 
-HOSTILE = "</td><script>alert(1)</script>&\"'\n\x00"
+ONE_LINE = "</td><script>alert(1)</script>&\"'"
+HOSTILE = ONE_LINE + "\n\x00"
 
 
 def test_a_card_is_well_formed_and_escapes_what_it_is_given() -> None:
@@ -85,7 +86,7 @@ def _things(folder: Path) -> dict[str, object]:
         "radar": rt.Radar(name="<b>", transmit_power_dbm=12, tx_antenna=antenna),
         "one channel": rt.Radar(name="x", tx_y=1, tx_z=0, rx_y=1, rx_z=0, multiplexing="ddm"),
         "motion": dataclasses.replace(motion, name=HOSTILE),
-        "scene": rt.Scene(name=HOSTILE, description=HOSTILE, furniture=chairs),
+        "scene": rt.Scene(name=ONE_LINE, description=ONE_LINE, furniture=chairs),
         "room": rt.Scene.load("living-room"),
         "free space": rt.Scene(),
         "collection": _collection(folder),

@@ -314,7 +314,7 @@ def test_real_skeleton_with_a_bone_of_no_length(
     (tmp_path / "flat.asf").write_text(
         skeleton[: bone.start(1)] + "0.0" + skeleton[bone.end(1) :], encoding="latin-1"
     )
-    motion = mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc"
+    motion = shutil.copy(mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", tmp_path)
     assert run(motion, "--skeleton", tmp_path / "flat.asf", "--out", tmp_path / "out") == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
