@@ -349,6 +349,7 @@ def imported(code: str) -> list[str]:
     return list(ast.literal_eval(done.stdout.splitlines()[-1]))
 
 
+@pytest.mark.slow
 def test_analytic_traces_nothing_and_loads_no_tracer() -> None:
     code = (
         "import rtradar as rt\n"

@@ -74,6 +74,7 @@ def python(folder: Path, script: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_tables_environment_and_allocator_are_as_before(tmp_path: Path) -> None:
     python(tmp_path, LOOKS)
 

@@ -109,6 +109,7 @@ def test_compiling_without_a_cache_is_told_once(read_only: Command) -> None:
     assert "NUMBA_CACHE_DIR" in line
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_named_serves(read_only: Command, tmp_path: Path) -> None:
     done = read_only("compiles_two.py", NUMBA_CACHE_DIR=str(tmp_path / "work" / "cache"))
     assert (done.stdout.splitlines()[-2:], done.stderr) == (["2 3.0 0", "2 3.0 2"], "")

@@ -31,6 +31,7 @@ def section(mesh, vertices, first, second):
     return vertices[:, np.intersect1d(*corners)].mean(axis=1)
 
 
+@pytest.mark.slow
 @needs_anny
 def test_the_mesh_is_one_closed_surface_at_any_time(person):
     for divisions in (0, 1):

@@ -189,6 +189,7 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     assert list(out.iterdir()) == [unfinished]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="forks")
 def test_half_samples_of_own_workers_go_as_the_process_has_to_end(
     tmp_path: Path, small_file: Path
@@ -343,6 +344,7 @@ def test_a_scheduler_that_is_lost_is_said_in_one_line(tmp_path: Path) -> None:
         scheduler.wait()
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
     """Workers import the script, and would build there once more."""
     spec = '[windows]\nduration_s = 0.2\n[each]\nradar = ["paper-12ghz"]\nscene = ["free-space"]\n'

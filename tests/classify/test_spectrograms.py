@@ -85,6 +85,7 @@ def test_a_drift_and_a_tempo_move_a_line_of_an_image() -> None:
     assert found.std() > 0.3
 
 
+@pytest.mark.slow
 def test_when_something_happens_does_not_matter_and_images_are_learnt() -> None:
     torch.manual_seed(0)
     classes = torch.arange(32) % 2

@@ -93,7 +93,9 @@ def test_a_run_of_the_command_line_is_repeated_from_elsewhere(
 
 def test_what_no_file_holds_is_kept_beside_the_run(tmp_path: Path) -> None:
     motion = rt.synthetic_motion("walk", seed=2, duration_s=0.4).scaled(0.9)
-    fan = rt.Object("fan", "fan", "metal", position_m=(1, 1, 1), motion=rt.Turning(rate_hz=5))
+    fan = rt.Object(
+        "plate", "trihedral", "metal", position_m=(1, 1, 1), motion=rt.Turning(rate_hz=5)
+    )
     person = rt.Person(motion, (0.2, 0.1), breathing=rt.Breathing(3, 0.3))
     first = rt.run([person, fan], RADAR, out=tmp_path / "first", snr_db=np.inf, **QUICK)
     assert (tmp_path / "first" / "person-1.motion").is_file()
@@ -170,6 +172,7 @@ def test_flags_and_keys_replace_what_the_run_file_says(tmp_path: Path) -> None:
     assert room["left"] == room["walls"] | {"material": "concrete"}
 
 
+@pytest.mark.slow
 def test_the_runs_of_a_comparison_can_be_repeated(recording: Path, tmp_path: Path) -> None:
     levels = ("analytic-paper", "analytic")
     walk, own = recording / "walk.npz", {"duration_s": 0.1}

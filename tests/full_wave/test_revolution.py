@@ -62,6 +62,7 @@ def test_a_penetrable_sphere_scatters_as_the_series_of_mie_says(permittivity: co
         np.testing.assert_allclose(np.abs(length), expected, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_conductor_scatters_all_that_it_takes_from_the_wave() -> None:
     pair = BodiesOfRevolution((Spheroid(0.003, 0.004), Spheroid(0.004, 0.004, 0.01)), FREQUENCY_HZ)
     cosine, weight = np.polynomial.legendre.leggauss(12)

@@ -45,7 +45,9 @@ def test_what_is_inlined_is_called_by_python_and_by_compiled_functions() -> None
     assert half(3.0) == compiled()(lambda number: half(number))(3.0) == 1.5
 
 
-@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
+@pytest.mark.parametrize(
+    "kind", [pytest.param(np.complex64, marks=pytest.mark.slow), np.complex128]
+)
 def test_how_a_product_rounds_does_not_depend_on_what_was_compiled_before(
     kind: type[np.complexfloating],
 ) -> None:

@@ -56,6 +56,7 @@ def test_a_person_who_stands_stays_and_the_mean_removes_them(
     assert removed < 0.01 * expected
 
 
+@pytest.mark.slow
 def test_a_run_again_and_its_kept_samples_are_the_same_background(
     beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path
 ) -> None:

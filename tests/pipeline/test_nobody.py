@@ -57,6 +57,7 @@ def test_noise_of_nobody_is_held_against_one_square_metre(small: rt.Radar) -> No
     assert np.mean(np.abs(capture.samples) ** 2) == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_folder_of_nobody_can_be_shown_and_run_again(
     small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

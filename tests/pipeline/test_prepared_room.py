@@ -54,6 +54,7 @@ def room(tmp_path: Path) -> rt.Scene:
     return rt.Scene.load(tmp_path / "room.toml")
 
 
+@pytest.mark.slow
 def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
     tmp_path: Path, room: rt.Scene
 ) -> None:

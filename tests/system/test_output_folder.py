@@ -462,6 +462,7 @@ def command(tmp_path: Path, text: str, *words: str) -> tuple[list[str], dict[str
     }
 
 
+@pytest.mark.slow
 @POSIX
 def test_two_processes_that_end_at_once_leave_what_is_of_one(tmp_path: Path) -> None:
     out = tmp_path / "out"

@@ -265,6 +265,7 @@ def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: 
     assert probe.probe_backend("scalar_rgb", Library(str(file), "environment")).good
 
 
+@pytest.mark.slow
 def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
     """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
     libraries = [library for library in llvm.candidates() if library.version]

@@ -317,6 +317,7 @@ for script in map(Path, sys.argv[1:]):
 """
 
 
+@pytest.mark.slow
 def test_every_script_can_be_imported() -> None:
     # Type checks leave them out, and most run only where everything is validated.
     scripts = [str(claim.script) for claim in validate.claims(validate.validation_folder())]

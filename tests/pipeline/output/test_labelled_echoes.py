@@ -83,6 +83,7 @@ def test_two_levels_are_compared_part_by_part(tmp_path: Path) -> None:
     assert np.abs(other["length_difference_m"].values[both]).max() < 0.02
 
 
+@pytest.mark.slow
 def test_several_recordings_have_no_echoes_of_their_own(small: rt.Radar, tmp_path: Path) -> None:
     several = rt.pipeline.compare_recordings(
         [KICK, rt.synthetic_motion("walk", duration_s=0.5)],

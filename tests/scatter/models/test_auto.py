@@ -102,7 +102,7 @@ def test_the_estimate_falls_with_frequency_and_rises_as_parts_shrink() -> None:
         (0.1, "physical-optics", None),
         (0.01, "reference", None),
         (0.5, "specular", "living-room"),
-        (0.1, "physical-optics", "living-room"),
+        pytest.param(0.1, "physical-optics", "living-room", marks=pytest.mark.slow),
     ],
 )
 def test_its_echoes_are_those_of_the_level(

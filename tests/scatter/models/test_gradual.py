@@ -102,6 +102,7 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
     assert np.abs(got - exact).max() < 0.04
 
 
+@pytest.mark.slow
 def test_an_edge_that_wanders_changes_the_share_without_jumps() -> None:
     # Steps of 2e-3, where the edge is in sight, at its corner and where it vanishes.
     u = (np.array([-0.8, 0.0, 0.6])[:, None] + np.linspace(-0.02, 0.02, 21)).ravel()
@@ -148,6 +149,7 @@ def test_the_model_and_the_function_agree_phase_and_all(backend: Backend, edge: 
         np.testing.assert_allclose(received, field[0] * there_and_back, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_tx_and_rx_may_be_swapped_and_stand_far_apart(backend: Backend) -> None:
     target = target_of(Curtain(edge=0.01).at(np.zeros(1)))
     tx = ANTENNA + np.random.default_rng(0).normal(0, 0.1, (10, 3))

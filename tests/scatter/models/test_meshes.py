@@ -84,6 +84,7 @@ def test_keyframes_follow_what_is_summed_at_every_chirp():
     assert error < 10 ** (-2.5)
 
 
+@pytest.mark.slow
 @needs_anny
 def test_a_mesh_and_ellipsoids_far_apart_are_the_sum_of_each_alone():
     chirps = np.array([0, 800])
@@ -133,6 +134,7 @@ def test_four_fine_triangles_lie_over_each_coarse_one():
         assert np.linalg.norm(four[:, 3] - corners.mean(axis=1), axis=1).max() < 0.01
 
 
+@pytest.mark.slow
 @needs_anny
 @pytest.mark.parametrize("preset", ["paper-12ghz", "paper-77ghz"])
 def test_tubes_on_a_skin_are_as_large_as_asked_and_cover_it(preset):
