@@ -21,6 +21,7 @@ import xarray
 from rtradar.cli import main
 from rtradar.cli.values import setting
 from rtradar.errors import InputError
+from rtradar.pipeline.timing import NOT_TO_CLOUD
 
 SHORT = ["--duration", "0.2", "--snr-db", "20"]
 
@@ -95,6 +96,10 @@ def test_the_summary_says_what_was_done(walked: Path) -> None:
     assert summary["rdt_points"] == 3000
     assert summary["detections"] > 0
     assert summary["parameters"]["radar"]["start_frequency_hz"] == 12e9
+    stages = summary["stages"]
+    later = sum(stages.get(name, 0.0) for name in NOT_TO_CLOUD)
+    assert summary["cloud_s"] == pytest.approx(summary["wall_s"] - later, abs=1e-3)
+    assert 0 < summary["cloud_s"] < summary["wall_s"]
     assert summary["real_time_factor"] == pytest.approx(
         summary["wall_s"] / summary["capture_s"], rel=1e-3
     )

@@ -8,7 +8,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from rtradar.bench.runs import CHEAPEST, NOT_TO_CLOUD
+from rtradar.bench.runs import CHEAPEST
+from rtradar.pipeline.timing import NOT_TO_CLOUD
 from rtradar.system.figure_style import dress, new_figure, save_figure
 from rtradar.system.templates import aligned, templates
 

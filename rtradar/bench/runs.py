@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from tqdm import tqdm
 
+from rtradar.pipeline.timing import to_cloud_s
 from rtradar.system.files import temporary_folder
 from rtradar.validate import validation_folder
 
@@ -26,14 +27,6 @@ MOTION = "synthetic:walk"
 
 CHEAPEST = "analytic"
 """Model with which all others are compared."""
-
-OTHER_PRODUCTS = ("spectrogram", "angle", "sources")
-"""Stages of a run that the range-Doppler-time cloud does not need."""
-
-FILES = ("write", "pictures", "view", "report")
-"""Stages that write files: maps, clouds, pictures, snapshots to view and the page."""
-
-NOT_TO_CLOUD = (*OTHER_PRODUCTS, *FILES)
 
 ELSEWHERE = "elsewhere"
 """Time of a run outside all of its stages, such as copies into frames; it counts to the cloud."""
@@ -59,11 +52,6 @@ class RunError(RuntimeError):
 def spread(seconds: Sequence[float]) -> dict[str, float]:
     """Best and median of some measurements of one thing [s]."""
     return {"best": min(seconds), "median": median(seconds)}
-
-
-def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
-    """Time of a run that leads to the range-Doppler-time cloud [s]: all but `NOT_TO_CLOUD`."""
-    return wall_s - sum(stages.get(name, 0.0) for name in NOT_TO_CLOUD)
 
 
 def by_stage(runs: Sequence[Mapping[str, float]]) -> dict[str, dict[str, float]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -21,6 +21,9 @@ _LINES = {
     "report": "writing the report",
 }
 """Stages that have a line of their own on a terminal. Echoes and maps have a progress bar."""
+
+NOT_TO_CLOUD = ("spectrogram", "angle", "sources", "write", "pictures", "view", "report")
+"""Stages of a run that the range-Doppler-time cloud does not need: other products, and files."""
 
 _Item = TypeVar("_Item")
 
@@ -53,6 +56,24 @@ def stage_line(text: str) -> Iterator[None]:
     # A progress bar may have been here meanwhile.
     said = f"{text}: {time.perf_counter() - start:.1f} s"
     print(f"\r{said:60}", file=sys.stderr, flush=True)
+
+
+def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
+    """Return the time of a run from the motion to the range-Doppler-time cloud [s].
+
+    Parameters
+    ----------
+    stages : mapping
+        Time of each stage by its name [s].
+    wall_s : float
+        Time of the whole run, without compiling [s].
+
+    Returns
+    -------
+    float
+        Time of all stages but `NOT_TO_CLOUD` [s].
+    """
+    return wall_s - sum(stages.get(name, 0.0) for name in NOT_TO_CLOUD)
 
 
 class Stages:

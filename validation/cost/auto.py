@@ -33,9 +33,9 @@ from numpy.typing import NDArray
 from trade import seconds
 
 import rtradar as rt
-from rtradar.bench.runs import to_cloud_s
 from rtradar.body import Body
 from rtradar.motion import place
+from rtradar.pipeline.timing import to_cloud_s
 from rtradar.scatter import build_model
 from rtradar.scatter.models.auto import optics_error
 from rtradar.validate.rows import Row, judged, main, reported

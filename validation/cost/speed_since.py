@@ -27,7 +27,8 @@ from statistics import median
 
 from tqdm import tqdm
 
-from rtradar.bench.runs import paired_ratio, to_cloud_s
+from rtradar.bench.runs import paired_ratio
+from rtradar.pipeline.timing import to_cloud_s
 
 CASES = {
     "analytic": ("--fidelity", "analytic"),

@@ -15,7 +15,7 @@ from rtradar.description import versions
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.writer import RUN_FILES
 from rtradar.pipeline.processing import Clouds, Processing
-from rtradar.pipeline.timing import peak_memory_mb
+from rtradar.pipeline.timing import peak_memory_mb, to_cloud_s
 from rtradar.radar import Radar
 from rtradar.scatter import account_of
 from rtradar.scatter.multipath.path_summary import ghosts
@@ -39,9 +39,11 @@ def cost(processing: Processing, n_chirps: int, started: Moment) -> dict[str, An
     now = Moment.now()
     wall_s, warmup_s = now.work_s - started.work_s, now.warm_up_s - started.warm_up_s
     capture_s = processing.radar.duration_of(n_chirps)
+    stages = processing.stages.seconds
     return {
-        "stages": {name: round(spent, 4) for name, spent in processing.stages.seconds.items()},
+        "stages": {name: round(spent, 4) for name, spent in stages.items()},
         "wall_s": round(wall_s, 4),
+        "cloud_s": round(to_cloud_s(stages, wall_s), 4),
         "warmup_s": round(warmup_s, 4),
         "capture_s": capture_s,
         "real_time_factor": round(wall_s / capture_s, 4),
