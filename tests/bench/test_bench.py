@@ -20,9 +20,9 @@ from rtradar.bench.runs import (
     by_stage,
     paired_ratio,
     spread,
-    to_cloud_s,
 )
 from rtradar.cli import main
+from rtradar.pipeline.timing import to_cloud_s
 
 pytestmark = pytest.mark.drawn
 
