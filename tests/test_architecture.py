@@ -17,6 +17,7 @@ FLOWS = cache(DRAWN["flows"])  # grimp reads all modules for it
 DRAWN["drawing"].__globals__["flows"] = FLOWS
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_code() -> None:
     there = (ROOT / "docs" / "architecture.svg").read_text(encoding="utf-8")
     assert there == DRAWN["drawing"](), "draw it anew: python docs/draw_architecture.py"

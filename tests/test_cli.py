@@ -464,7 +464,10 @@ sys.exit(main(sys.argv[1:]))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
-@pytest.mark.parametrize("command", ["run", "export .nc", "export .mat"])
+@pytest.mark.parametrize(
+    "command",
+    ["run", *(pytest.param(f"export {kind}", marks=pytest.mark.slow) for kind in (".nc", ".mat"))],
+)
 def test_files_that_may_not_grow_are_told_in_one_line(
     walked: Path, tmp_path: Path, command: str
 ) -> None:

@@ -99,6 +99,7 @@ def read_only(tmp_path: Path) -> Command:
     return run
 
 
+@pytest.mark.slow
 def test_compiling_without_a_cache_is_told_once(read_only: Command) -> None:
     done = read_only("compiles_two.py")
     assert done.stdout.splitlines()[-2:] == ["2 3.0 0", "2 3.0 0"]

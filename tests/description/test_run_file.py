@@ -154,7 +154,7 @@ def test_flags_and_keys_replace_what_the_run_file_says(tmp_path: Path) -> None:
         [settings]
         fidelity = "analytic"
         snr_db = 10
-        duration_s = 0.1
+        duration_s = 0.05
         """
     )
     out, chosen = tmp_path / "out", ["radar.pitch_deg=-15", "people.0.heading_deg=90"]

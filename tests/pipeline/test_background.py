@@ -93,6 +93,7 @@ def test_the_run_file_names_the_background_and_notices_a_change(
     assert "has changed since" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_background_that_names_itself_is_that_of_its_samples(
     beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path
 ) -> None:

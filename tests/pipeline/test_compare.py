@@ -28,7 +28,7 @@ def compared(
         small,
         out=tmp_path_factory.mktemp("compare") / "out",
         fidelities=MODELS,
-        duration_s=0.3,
+        duration_s=0.15,
         start_s=0.4,
     )
 

@@ -172,6 +172,7 @@ def test_tx_and_rx_may_be_swapped_and_stand_far_apart(backend: Backend) -> None:
     assert 0 < abs(soft[0] - sharp[0]) < abs(sharp[0])
 
 
+@pytest.mark.slow
 def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     radar, body = small_radar(tx_y=2, rx_y=2), Curtain(speed=1.0)
     whole = gradual(radar, body, variant=backend.kind).echoes(np.arange(70, 150)).amplitude
