@@ -297,8 +297,10 @@ class RoomModel:
 
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
-        columns, echo = self._columns, np.array(self._columns.echo)
+        columns = self._columns
         at, blend, near, factors = self._between_keyframes(chirps)
+        # The first keyframes find which echoes slabs delay, so that columns are counted after them.
+        echo = np.array(columns.echo)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
             there, legs = self._images(at)

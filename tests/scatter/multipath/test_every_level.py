@@ -76,6 +76,18 @@ def test_skin_and_patterns_are_in_rooms_what_they_are_in_free_space(fidelity: st
     assert error_of_vacuum(fidelity, shaped, [103], "skin") < 1e-3
 
 
+@pytest.mark.parametrize("fidelity", ["analytic", "specular", "physical-optics"])
+def test_a_slab_delays_echoes_from_the_first_block_on(fidelity: str, wall: Make) -> None:
+    body = Body.from_motion(rt.synthetic_motion("walk", duration_s=0.1))
+    scene = Scene(walls=(wall("left", "plasterboard", 0.2),))
+    model: Any = build_model(fidelity, SMALL, body, scene=scene, **OPTIONS.get(fidelity, {}))
+    first, again = (model.echoes(np.array([103])) for _ in range(2))
+    over_the_wall = np.unique(first.part[first.bounces > 1], return_counts=True)[1]
+    assert over_the_wall.max() > 2  # there and back, each from both faces
+    for name in ("length", "amplitude", "part", "path"):
+        np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
+
+
 # -- one mirror ------------------------------------------------------------------------------------
 
 
