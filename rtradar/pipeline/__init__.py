@@ -3,7 +3,7 @@
 from rtradar.pipeline.compare import compare, compare_recordings
 from rtradar.pipeline.compared import Comparison
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.memory import MEMORY_LIMIT_BYTES
+from rtradar.pipeline.processing import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run

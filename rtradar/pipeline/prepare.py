@@ -16,9 +16,8 @@ from rtradar.description import Movers, parts_of, read_run_file
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange import open_samples
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.prepared_room import PreparedRoom, prepare_room
-from rtradar.pipeline.processing import Processing
+from rtradar.pipeline.processing import Processing, refuse_large_maps
 from rtradar.pipeline.timing import stage_line
 from rtradar.process import clutter_removal, range_spectrum
 from rtradar.process.window_functions import WindowFunctions, weights

@@ -1,4 +1,4 @@
-"""From range spectra, block by block, to detections, angles and clouds, in constant memory."""
+"""From range spectra, block by block, to detections, angles and clouds, and how large maps are."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, points_of_sines, spatial_points
 from rtradar.clouds.rdt import UniformSample
+from rtradar.errors import InputError
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,
     ClutterRemoval,
     SlidingWindows,
     WindowFunctions,
+    angle_grid,
     angle_spectra,
     build_detector,
     build_point_detector,
@@ -56,6 +58,12 @@ Detect = Callable[
 ]
 """Map (range, velocity) and cube (cycle, tx, rx, range) of a frame in; the mask of its detections
 out, and the sines (cell, 2) of their directions where the detector finds them."""
+
+MEMORY_LIMIT_BYTES = 4_000_000_000
+"""Largest size of what is held in memory, maps or IF samples [byte].
+
+It is that of maps of about three minutes, or IF samples of 15 s, of the radar ``paper-12ghz``.
+"""
 
 
 def _detect_of(settings: RunSettings, radar: Radar, window_functions: WindowFunctions) -> Detect:
@@ -279,3 +287,36 @@ def frame_angles(
         parts = [getattr(block, name) for block in blocks]
         joined[name] = None if parts[0] is None else np.concatenate(parts)
     return AngleSpectra(blocks[0].sines, **joined)
+
+
+def refuse_large(what: str, n_bytes: float, instead: str) -> None:
+    """Raise an `InputError` if something would take more than the limit of memory."""
+    if n_bytes > MEMORY_LIMIT_BYTES:
+        raise InputError(
+            f"{what} would take {n_bytes / 1e9:.1f} GB in memory, and at most "
+            f"{MEMORY_LIMIT_BYTES / 1e9:.1f} GB are allowed; {instead}"
+        )
+
+
+def refuse_large_maps(radar: Radar, n_chirps: int, *, sources: bool = False) -> None:
+    """Raise an `InputError` if maps of so many chirps are too large for memory."""
+    interval_s = radar.duration_of(n_chirps)
+    what = f"maps of {interval_s:.3g} s of radar '{radar.name}'"
+    instead = "give a folder, out=, and they are written there as they are computed"
+    refuse_large(what, bytes_of_maps(radar, n_chirps, sources=sources), instead)
+
+
+def bytes_of_maps(radar: Radar, n_chirps: float, *, sources: bool = False) -> float:
+    """Estimate the size of the maps of so many chirps [byte], without that of the spectrogram.
+
+    ``sources`` says whether there is a map of who returned each detection.
+    """
+    frames = max(n_chirps / radar.n_tx - radar.cycles_per_frame, 0) / radar.hop_cycles + 1
+    steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S + radar.in_frames * frames
+    power, mask = np.dtype(np.float32).itemsize, np.dtype(np.uint8).itemsize
+    if sources:
+        mask += np.dtype(np.int16).itemsize
+    a_range = radar.cycles_per_frame * (power + mask)
+    if angles := measured_angles(radar):
+        a_range += len(angles) * len(angle_grid(radar)) * power
+    return radar.samples_per_chirp * (frames * a_range + steps * power)

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from rtradar.description import Moving, given_parts
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.output.truth import chirps_between, labelled_echoes
 from rtradar.pipeline.prepare import prepare
-from rtradar.pipeline.processing import block_chirps
+from rtradar.pipeline.processing import block_chirps, refuse_large
 from rtradar.radar import Radar
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene

@@ -16,7 +16,7 @@ import xarray as xr
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.pipeline import memory
+from rtradar.pipeline import processing
 from rtradar.settings import RunOptions
 
 OPTIONS: RunOptions = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
@@ -113,9 +113,9 @@ def test_maps_too_large_for_memory_are_refused_before_any_work(
     kick: rt.Motion, small: rt.Radar, in_memory: rt.Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = sum(in_memory.maps[name].nbytes for name in in_memory.maps.data_vars)
-    known = memory.bytes_of_maps(small, in_memory.summary["chirps"], sources=True)
+    known = processing.bytes_of_maps(small, in_memory.summary["chirps"], sources=True)
     assert 0.8 * size < known < 1.2 * size
-    monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 100_000_000)
+    monkeypatch.setattr(processing, "MEMORY_LIMIT_BYTES", 100_000_000)
     # No array of so many frames is ever made.
     long = dataclasses.replace(kick, rate_hz=2e-2, first_frame_s=0.0, length_s=None)
     with pytest.raises(InputError, match=r"would take [\d.]+ GB .* 0\.1 GB are allowed; .* out="):
@@ -130,7 +130,7 @@ def test_a_radar_of_one_channel_has_no_angles_and_does_without(small: rt.Radar) 
     assert "no noise" in repr(result)
     assert "data:image/png" in result._repr_html_()
     size = sum(result.maps[name].nbytes for name in ("range_doppler", "detections", "range_time"))
-    assert memory.bytes_of_maps(radar, result.summary["chirps"]) == pytest.approx(size, rel=0.1)
+    assert processing.bytes_of_maps(radar, result.summary["chirps"]) == pytest.approx(size, rel=0.1)
 
 
 def test_a_start_that_is_no_number_is_refused(kick: rt.Motion, small: rt.Radar) -> None:

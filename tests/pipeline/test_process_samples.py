@@ -13,7 +13,7 @@ import xarray as xr
 
 import rtradar as rt
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.pipeline import memory
+from rtradar.pipeline import processing
 from rtradar.settings import SimulationOptions
 
 OPTIONS: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "seed": 3}
@@ -159,7 +159,7 @@ def test_options_of_another_function_are_refused(
 def test_maps_too_large_for_memory_are_refused(
     small: rt.Radar, samples: xr.DataArray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e5)
+    monkeypatch.setattr(processing, "MEMORY_LIMIT_BYTES", 1e5)
     for given in (samples, iter([samples])):
         with pytest.raises(InputError, match=r"maps of .* s of radar 'small' would take"):
             rt.process_samples(given, small)

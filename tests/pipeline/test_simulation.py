@@ -12,7 +12,7 @@ import zarr
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.pipeline import memory
+from rtradar.pipeline import processing
 from rtradar.settings import SimulationOptions
 
 OPTIONS: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "snr_db": 10.0}
@@ -48,7 +48,7 @@ def test_samples_have_the_times_and_transmitters_of_their_chirps(
 def test_samples_too_large_for_memory_are_refused_and_blocks_are_not(
     kick: rt.Motion, small: rt.Radar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1e5)
+    monkeypatch.setattr(processing, "MEMORY_LIMIT_BYTES", 1e5)
     capture = rt.simulate(kick, small, **OPTIONS)
     with pytest.raises(InputError, match=r"IF samples of 0.23 s .* block by block, blocks\(\), or"):
         _ = capture.samples

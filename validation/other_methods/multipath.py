@@ -564,7 +564,7 @@ def tolerance_rows(quick: bool) -> Iterator[Row]:
 
     Without a tolerance ghosts are found at every chirp, and so is the shadow in the clutter.
     """
-    duration_s = 0.1 if quick else 1.0
+    duration_s = 0.2 if quick else 1.0
     radar, room = rt.Radar.preset("paper-12ghz"), Scene.load("living-room")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2 if quick else 3.0)
 

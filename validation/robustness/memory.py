@@ -249,7 +249,7 @@ def measure(quick: bool) -> list[Row]:
                     says=says,
                 )
             )
-    rows += long_runs(*((4.0, 20.0) if quick else (30.0, 300.0)))
+    rows += long_runs(*((3.0, 15.0) if quick else (30.0, 300.0)))
     rows += starved(1.0 if quick else 3.0)
     rows += reading(*((30.0, 150.0) if quick else (60.0, 3600.0)))
     return rows

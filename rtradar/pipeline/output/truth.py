@@ -13,8 +13,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.memory import refuse_large
 from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.processing import refuse_large
 from rtradar.scatter.common.echo_sets import at_nodes
 
 if TYPE_CHECKING:

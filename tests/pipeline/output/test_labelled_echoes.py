@@ -62,7 +62,7 @@ def test_no_chirp_and_too_many_are_refused_in_one_line(monkeypatch: pytest.Monke
     capture = rt.simulate(KICK, RADAR, duration_s=0.2, fidelity="analytic")
     with pytest.raises(InputError, match=r"^[^\n]*no chirp is between start_s = 3\.0[^\n]*$"):
         capture.echoes(start_s=3.0)
-    monkeypatch.setattr("rtradar.pipeline.memory.MEMORY_LIMIT_BYTES", 1_000_000)
+    monkeypatch.setattr("rtradar.pipeline.processing.MEMORY_LIMIT_BYTES", 1_000_000)
     with pytest.raises(InputError, match=r"take them for a shorter time \(start_s, duration_s\)"):
         capture.echoes()
 
