@@ -31,10 +31,11 @@ def load(name: str) -> ModuleType:
 extremes = load("extremes")
 
 
+FAR = "radar and person 10 km from the origin of coordinates"
 CASES = [
-    pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.slow else [])
+    pytest.param(case, id=case.name, marks=[pytest.mark.slow] * (case.slow or case.name == FAR))
     for case in extremes.CASES
-]  # the slow one has a million triangles
+]  # the slow ones have a million triangles, or every level twice
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -76,6 +76,7 @@ def unsafe(source: str) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_no_source_can_load_a_pickle() -> None:
     assert len(SOURCES) > 100
     found = {

@@ -41,6 +41,7 @@ def study_of(clouds: Any) -> Study:
     return Study(Path("study"), plan, outcomes)
 
 
+@pytest.mark.slow
 def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
     made_up: Callable[..., Any],
 ) -> None:

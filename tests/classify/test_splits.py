@@ -114,6 +114,7 @@ def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
     assert recordings_of(Table(rows)).tolist() == np.unique(names, return_inverse=True)[1].tolist()
 
 
+@pytest.mark.slow
 @given(
     table=tables(),
     scheme=st.sampled_from(["folds", "recording", "subject", "recorded", "across:fidelity"]),

@@ -145,6 +145,7 @@ def test_a_run_lists_the_effects_of_its_receiver() -> None:
         rt.run(motion, its, spreading=False, **options)
 
 
+@pytest.mark.slow
 def test_an_object_that_moves_may_clip_the_converter() -> None:
     # A corner reflector on a cart 2 m ahead, and somebody far behind it, whose echoes are weak.
     fields = {"phase_noise_hz": (1e4, 1e6), "phase_noise_dbc_hz": (-80, -100)}
