@@ -283,7 +283,7 @@ def scene_keys() -> str:
             usual = "must be given" if key in needed and name in parameters else toml(default)
             own = found_in(limits.get(name), Limits) or Limits()
             least, most = (toml(limit).strip("`") for limit in (own.least, own.most))
-            allowed = f"{least} to {most}" if own.most < Limits().most else ""
+            allowed = f"{least} to {most}" if own.most < Limits().most and not own.wanted else ""
             rows.append([f"`{table}`", f"`{key}`", texts[name], allowed, usual])
     return pipe_table(["table", "key", "meaning", "allowed", "default"], rows)
 

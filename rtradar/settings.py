@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
+import sys
 import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ from textwrap import indent
 from typing import Annotated, Any, Literal, TypedDict, TypeVar, get_type_hints
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_path
+from rtradar.system.checks import brief, check_path, is_real
 from rtradar.system.fields import Angle, Limits, check_fields, rules_of
 from rtradar.system.registries import DETECTORS, MODELS
 from rtradar.system.seeds import Seed
@@ -112,6 +113,7 @@ _TOLERANCE = Limits(
     f"it must lie within {-MAX_SNR_DB:g} to 0 dB, or be -inf (--path-tolerance-db)",
 )
 _LEAST, _LONGEST_S = 5e-324, 60.0
+_POWER = Limits(0, sys.float_info.max, "it must be a finite number, not negative")
 _RATE = Limits(
     _LEAST, 1 - 2**-53, "a false-alarm rate is a number between 0 and 1, both excluded (--pfa)"
 )
@@ -144,7 +146,8 @@ def _documented(names: Collection[str]) -> str:
 class RunSettings:
     """The settings of a run, from motion to point cloud.
 
-    Names of window functions, and options of a model, are validated where these are built.
+    Whether there is a window function of a name, and a model has an option, is checked where these
+    are built.
 
     Parameters
     ----------
@@ -153,8 +156,7 @@ class RunSettings:
     Raises
     ------
     InputError
-        If ``fidelity`` or ``detector`` is no such name, or ``snr_db``, ``noise_power_m2``, ``pfa``,
-        ``seed``, ``order``, ``breathing`` or ``path_tolerance_db`` no such value.
+        Where a value is not allowed.
     """
 
     fidelity: str = "specular"
@@ -183,10 +185,10 @@ class RunSettings:
     doppler_window: _Window = "hann"
     spectrogram_window_s: Annotated[float | None, _SECONDS] = None
     spectrogram_overlap: Annotated[float, Limits(0, 0.999)] = 0.95
-    noise_power_m2: Annotated[float | None, Limits(0)] = None
+    noise_power_m2: Annotated[float | None, _POWER] = None
 
     def __post_init__(self) -> None:
-        if self.path_tolerance_db == -math.inf:
+        if is_real(self.path_tolerance_db) and self.path_tolerance_db == -math.inf:
             object.__setattr__(self, "path_tolerance_db", None)
         for name in ("model_options", "detector_options"):
             try:

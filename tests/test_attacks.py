@@ -101,7 +101,7 @@ HEADER = ",".join(f"{node}_{axis}" for node in NODES for axis in "xyz")
     ("column", "values", "says"),
     [
         ("up", ("z", "y"), "line 3: up is 'y', and was 'z'"),
-        ("rate_hz", ("30", "60"), "line 3: rate_hz is '60', and was '30'"),
+        ("rate_hz", ("30", "60"), "line 3: rate_hz is 60, and was 30"),
     ],
 )
 def test_what_holds_for_a_table_does_not_change_in_it(

@@ -243,6 +243,7 @@ BAD: dict[str, tuple[Callable[[Path], list[str]], str]] = {
     "radar is no TOML": (lambda folder: _radar(folder, "bandwidth_hz : 4e9"), "mine.toml"),
     "unknown scene": (lambda folder: ["synthetic:walk", "--scene", "moon"], "free-space"),
     "unknown fidelity": (lambda folder: ["synthetic:walk", "--fidelity", "perfect"], "specular"),
+    "huge number": (lambda folder: _radar(folder, "tx_y = 1" + 400 * "0"), "tx_y"),
     "pfa of zero": (lambda folder: ["synthetic:walk", "--pfa", "0"], "pfa"),
     "SNR is not a number": (lambda folder: ["synthetic:walk", "--snr-db", "nan"], "--snr-db"),
     "SNR beyond all bounds": (lambda folder: ["synthetic:walk", "--snr-db", "-5000"], "--snr-db"),

@@ -221,3 +221,18 @@ def test_values_of_another_unit_and_bases_that_are_none(
     with pytest.raises(InputError, match=says) as caught:
         Radar.load(file)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        *((name, 0) for name in ("bandwidth_hz", "frame_duration_s", "frame_period_s")),
+        *((name, 0) for name in ("adc_rate_hz", "tx_spacing_wavelengths", "carrier_step_hz")),
+        *((name, -1) for name in ("rx_spacing_wavelengths", "idle_s", "adc_start_s")),
+        *((name, -1) for name in ("tx_y", "tx_z", "rx_y", "rx_z", "noise_figure_db")),
+        *(("noise_temperature_k", -1), ("transmit_power_dbm", 201), ("yaw_deg", 361)),
+        *(("channels", "x"), ("position_m", [1, 2])),
+    ],
+)
+def test_each_field_has_its_limits(field: str, value: Any) -> None:
+    assert f"{field} = {value!r}; " in refusal(Radar, **{field: value})

@@ -34,6 +34,10 @@ def test_a_file_gives_what_its_tables_say(tmp_path: Path) -> None:
     [
         ({"adc_bits": 8}, "needs adc_full_scale_dbm"),
         ({"leakage_db": 3}, "from -200 to 0"),
+        ({"adc_bits": 8.5, "adc_full_scale_dbm": 0}, "whole number"),
+        ({"highpass_hz": 1e5}, "list of numbers"),
+        ({"seed": -1}, "seed = -1"),
+        ({"interferer": 3}, "table"),
         ({"phase_noise_hz": [1e6]}, "as many"),
         ({"phase_noise_hz": [2e6, 1e6], "phase_noise_dbc_hz": [-90, -90]}, "ascend"),
         ({"interferer": RAMPS}, "power_dbm is missing"),

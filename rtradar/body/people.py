@@ -87,8 +87,8 @@ class Person:
             kind = type(given).__name__
             raise InputError(f"Person: motion is a {kind}; give what rt.load_motion returns")
         where = f"person '{self.motion.name}'"
-        check_fields(self, f"{where}: ")
         check_number(where, "start_s", self.start_s, 0.0, self.motion.duration_s)
+        check_fields(self, f"{where}: ")
 
     def trimesh(self, time_s: float = 0.0, divisions: int = 0) -> trimesh.Trimesh:
         """Pose a mesh of human shape where the person is, whichever ``body`` they have.

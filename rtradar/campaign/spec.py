@@ -98,7 +98,7 @@ class Combination(NamedTuple):
     snr_db: float | None
 
 
-MOST_OTHERS, APART_M = 8, 1.0
+_MOST_OTHERS, APART_M = 8, 1.0
 """Most people beside the one of the label, and the least distance of their places [m]."""
 
 _Place = Annotated[tuple[float, float], within(*PERSON_LIMITS["position_m"])]
@@ -111,7 +111,7 @@ class Others:
     Synthetic actors whose mean places are at least `APART_M` from each other and from that one.
     """
 
-    count: Annotated[int, Limits(1, MOST_OTHERS)]
+    count: Annotated[int, Limits(1, _MOST_OTHERS)]
     labels: Annotated[
         tuple[str, ...],
         Limits(

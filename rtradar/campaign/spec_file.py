@@ -101,7 +101,7 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     """
     given = read_toml(path, "data set", "give a TOML file")
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
-    listed = check_files(f"data set file '{path}'", path.parent, given, changed=changed)
+    listed = check_files(f"data set file '{path}'", path.resolve().parent, given, changed=changed)
     with prefixed(f"data set file '{path}': "):
         # The path is absolute, because other processes read the meshes of scenes.
         beside = path.resolve().parent

@@ -26,8 +26,10 @@ _KINDS = {
     "indices": "i", "truth": "i", "predicted": "i", "tested_on": "U", "recordings": "U",
     "subjects": "U", "probabilities": "f",
 }  # fmt: skip
+"""Kind of each array, in NumPy's letters."""
+
 _LATER = ("subjects", "probabilities")
-"""Kind of each array in NumPy's letters, and those that are empty in older files."""
+"""Arrays that are empty in older files, both or none."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ def load_outcome(path: Path) -> Outcome:
         whole = (
             isinstance(outcome.name, str)
             and isinstance(outcome.trained_on, str)
+            and len(arrays["subjects"]) == len(arrays["probabilities"])
             and isinstance(outcome.history, list)
             and all(len(row) == len(HISTORY) for row in outcome.history)
             and np.array(rows).dtype.kind in "if"  # NaN and infinity too: a training may diverge
@@ -146,6 +149,8 @@ def load_outcome(path: Path) -> Outcome:
 def _array(name: str, values: Any, count: int) -> NDArray[Any]:
     """Array of a value, or a row of probabilities, for each cloud; ValueError if it is none."""
     kind = _KINDS[name]
+    if not isinstance(values, list | np.ndarray):
+        raise ValueError
     if name in _LATER and not len(values):
         return np.zeros(0, np.str_) if kind == "U" else np.zeros((0, 0))
     if kind == "U":
@@ -153,11 +158,11 @@ def _array(name: str, values: Any, count: int) -> NDArray[Any]:
         lengths = [len(value) for value in values if isinstance(value, str)]
         if len(lengths) < len(values) or len(values) * max(lengths, default=0) > _MAX_CHARACTERS:
             raise ValueError
-    array = np.array(values)
+    array = np.array(values, dtype=np.float64 if kind == "f" else None)
     fits = array.dtype.kind == kind and array.ndim == (2 if kind == "f" else 1)
     if not fits or len(array) != count or (kind != "U" and array.min() < 0):
         raise ValueError
-    if kind == "f" and array.max() > 1 + 1e-6:
+    if kind == "f" and not array.max() <= 1 + 1e-6:  # nor is NaN
         raise ValueError
     return array
 
@@ -246,7 +251,9 @@ def accuracy_table(rows: Sequence[tuple[str, Sequence[float], str]]) -> str:
         spread = f"{100 * np.std(fractions, ddof=1):.1f}" if len(fractions) > 1 else "-"
         empty = [""] * (columns - len(percent))
         table.append([title, *percent, *empty, f"{100 * np.mean(fractions):.1f}", spread, remark])
-    return text_table(table)
+    widest = max(len(row[-1]) for row in table)
+    # Remarks begin where they stand, unlike figures.
+    return text_table([[*row[:-1], row[-1].rstrip().ljust(widest)] for row in table])
 
 
 def confusion_table(

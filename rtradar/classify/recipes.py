@@ -24,9 +24,10 @@ _CHOICES = {
     "precision": get_args(Precision),
     "network": get_args(Network),
 }
+_BELOW_1 = math.nextafter(1.0, 0.0)
 _LIMITS = {
     "rate": (1e-12, 1e3), "stop_below": (0.0, 1e3), "weight_decay": (0.0, 1e3),
-    "edge_s": (0.0, 1e3), "dropout": (0.0, 0.99), "label_smoothing": (0.0, 0.99),
+    "edge_s": (0.0, 1e3), "dropout": (0.0, _BELOW_1), "label_smoothing": (0.0, _BELOW_1),
 }  # fmt: skip
 _FILE_KEYS = {"resample": "redraw", "step_epochs": "halve_every"}
 _LATER_FIELDS = ("network", "edge_s", "label_smoothing", "balanced")

@@ -99,7 +99,10 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
 
 
 def _done(options: argparse.Namespace) -> int:
-    """Do what the command says: it gives its exit status, or what ``--json`` writes."""
+    """Do what the command says: it gives its exit status, or yields what ``--json`` writes.
+
+    A command yields before it prints, so that the results of long work are kept if nobody reads.
+    """
     from rtradar.cli.ending import stay_if_ending
     from rtradar.system.files import check_place, write_json
 
@@ -107,9 +110,11 @@ def _done(options: argparse.Namespace) -> int:
         with _only_errors() if getattr(options, "quiet", False) else nullcontext():
             place = getattr(options, "json", None)
             check_place(place)
-            found: int | Mapping[str, Any] | None = options.command(options)
-            if place is not None and isinstance(found, Mapping):
-                write_json(place, found)
+            found: int | Iterator[Mapping[str, Any]] | None = options.command(options)
+            if isinstance(found, Iterator):
+                for content in found:
+                    if place is not None:
+                        write_json(place, content)
     except BaseException:
         stay_if_ending()  # it may have failed because its files are being removed
         raise

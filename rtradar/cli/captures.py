@@ -19,20 +19,21 @@ if TYPE_CHECKING:
     from rtradar.settings import RunSettings
 
 
-def run(options: argparse.Namespace) -> Mapping[str, Any]:
+def run(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar run``."""
     if options.as_paper:
         _choose_as_paper(options)
     if several := _several(options):
-        return _sweep(options, several)
+        yield from _sweep(options, several)
+        return
     capture = _capture(options)
     from rtradar import pipeline
     from rtradar.pipeline.timing import lines_shown
 
     with lines_shown():
         summary = pipeline.run(**capture, pictures=options.pictures).summary
+    yield summary
     tell(options, summary)
-    return summary
 
 
 def _choose_as_paper(options: argparse.Namespace) -> None:
@@ -81,10 +82,11 @@ def _show(options: argparse.Namespace, page: str) -> None:
         show_page(options.out / page)
 
 
-def compare(options: argparse.Namespace) -> Mapping[str, Any]:
+def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar compare``."""
     if any(map(os.path.isdir, options.motion)):
-        return _compare_folders(options)
+        yield from _compare_folders(options)
+        return
     from rtradar.settings import check_fidelities
 
     fidelities = [name.strip() for name in options.fidelities.split(",")]
@@ -102,6 +104,7 @@ def compare(options: argparse.Namespace) -> Mapping[str, Any]:
             )
         else:
             found = pipeline.compare(**capture, fidelities=fidelities)
+    yield found.summary
     if options.verbose and not several:
         for name, figures in found.summary["fidelities"].items():
             details = figures["stages"], found.summary["versions"], figures["variant"]
@@ -111,20 +114,19 @@ def compare(options: argparse.Namespace) -> Mapping[str, Any]:
         say(options, f"the table is {options.out / 'compare.csv'}, each recording in its folder")
     else:
         _show(options, "compare.html")
-    return found.summary
 
 
-def _compare_folders(options: argparse.Namespace) -> Mapping[str, Any]:
+def _compare_folders(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     if others := [name for name in options.motion if not os.path.isdir(name)]:
         raise InputError(f"'{others[0]}' is no folder, and others are; give folders, or recordings")
     from rtradar.pipeline.compare_folders import compare_folders
 
     found = compare_folders(options.motion, out=options.out, overwrite=options.overwrite)
+    yield found.summary
     say(options, found.table())
     for key, values in found.summary["differ"].items():
         say(options, f"{key}: " + ", ".join(f"{own} ({name})" for name, own in values.items()))
     _show(options, "compare.html")
-    return found.summary
 
 
 def _capture(options: argparse.Namespace, *, alone: bool = False) -> dict[str, Any]:
@@ -179,7 +181,9 @@ def _tables(options: argparse.Namespace, alone: bool = False) -> tuple[Mapping[s
     return table, run_file.parent if run_file else Path()
 
 
-def _sweep(options: argparse.Namespace, values: Mapping[str, list[Any]]) -> Mapping[str, Any]:
+def _sweep(
+    options: argparse.Namespace, values: Mapping[str, list[Any]]
+) -> Iterator[Mapping[str, Any]]:
     """Run every combination of the values of keys that were given more than once."""
     from rtradar.pipeline import Experiment, sweep
     from rtradar.pipeline.timing import lines_shown
@@ -187,11 +191,11 @@ def _sweep(options: argparse.Namespace, values: Mapping[str, list[Any]]) -> Mapp
     written = {name: getattr(options, name) for name in ("out", "overwrite", "pictures")}
     with lines_shown():
         found = sweep(Experiment(*_tables(options)), values, **written)
+    yield found.summary
     say(options, found.table())
     say(options, f"the table is {options.out / 'sweep.csv'}, each run in its folder")
     if options.open:
         show_page(options.out / "sweep.png")
-    return found.summary
 
 
 def _run_file(options: argparse.Namespace) -> Path | None:
@@ -214,7 +218,8 @@ def _described(options: argparse.Namespace) -> Iterator[tuple[str, Any]]:
             # From here, not from the folder of a run file.
             own = str(Path(source).absolute()) if Path(source).suffix else source
             yield table, {"base": own}
-    for key, value in vars(options).items():
+    # An option of its own goes before the same --model-option.
+    for key, value in sorted(vars(options).items(), key=lambda one: one[0].count(".")):
         if key == "settings.model_options":
             yield from ((f"{key}.{name}", own) for name, own in value)
         elif "." in key:

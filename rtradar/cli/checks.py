@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rtradar.cli.values import say, show_page
@@ -45,7 +45,7 @@ def bench(options: argparse.Namespace) -> int:
     return measured.bench(plan, json_path=options.json, figure=options.figure)
 
 
-def paper(options: argparse.Namespace) -> Mapping[str, Any]:
+def paper(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar paper``."""
     if options.mocap is not None and not options.mocap.is_dir():
         raise InputError(f"--mocap {options.mocap}: it is no folder; give that of the recordings")
@@ -58,10 +58,10 @@ def paper(options: argparse.Namespace) -> Mapping[str, Any]:
         mocap=options.mocap,
         overwrite=options.overwrite,
     )
+    yield content
     seconds = sum(part["wall_s"] for part in content["parts"].values())
     say(options, f"{len(content['items'])} items of the paper, measured in {seconds:.0f} s")
     page = options.out / "paper.html"
     say(options, f"open {page}")
     if options.open:
         show_page(page)
-    return content

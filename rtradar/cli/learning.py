@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rtradar.cli.values import say
@@ -27,7 +27,7 @@ def dataset_export(options: argparse.Namespace) -> None:
     print(f"see {options.out}")
 
 
-def dataset_build(options: argparse.Namespace) -> Mapping[str, Any]:
+def dataset_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar dataset build``."""
     from rtradar.system.checks import read_toml
 
@@ -43,9 +43,9 @@ def dataset_build(options: argparse.Namespace) -> Mapping[str, Any]:
         changed=options.changed,
         shard=options.shard,
     )
+    yield report
     say(options, in_words(report))
     say(options, f"see {options.out}")
-    return report
 
 
 def train(options: argparse.Namespace) -> None:
@@ -84,7 +84,7 @@ def train(options: argparse.Namespace) -> None:
     say(options, f"{done} of {planned} trained; see how well: rtradar evaluate {options.out}")
 
 
-def evaluate(options: argparse.Namespace) -> Mapping[str, Any]:
+def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar evaluate``."""
     from rtradar.classify.study import load_study
     from rtradar.report.pages.evaluation import EVALUATION_FILES, write_evaluation
@@ -104,19 +104,19 @@ def evaluate(options: argparse.Namespace) -> Mapping[str, Any]:
     out = options.out or options.trained[0]
     with atomic_folder(out, EVALUATION_FILES, overwrite=options.overwrite) as folder:
         table, content = write_evaluation(studies, baselines, folder)
+    yield content
     say(options, f"{table}\n\nsee {out}")
-    return content
 
 
-def predict(options: argparse.Namespace) -> Mapping[str, Any]:
+def predict(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar predict``."""
     from rtradar.recognition import predict_run
 
     answer = predict_run(options.folder)
+    yield answer
     chances = sorted(answer["probabilities"].items(), key=lambda one: -one[1])
     shown = ", ".join(f"{name} {chance:.0%}" for name, chance in chances)
     windows = f"{answer['windows']} window{'' if answer['windows'] == 1 else 's'}"
     say(options, f"{answer['activity']} ({shown}; {windows})")
     for warning in answer["warnings"]:
         print(f"rtradar: warning: {warning}", file=sys.stderr)
-    return answer

@@ -61,7 +61,7 @@ class OneLineParser(argparse.ArgumentParser):
     def __init__(
         self, *, table: Mapping[str, Any] = {}, examples: Sequence[str] = (), **options: Any
     ) -> None:
-        self._table, self._intermixed = table, "intermixed" in table
+        self._table, self._intermixed = table, table.get("intermixed", False)
         if examples:
             options["epilog"] = "\n  ".join(["examples:", *examples])
         # The beginning of an option is none: "--snr" might as well be another one tomorrow.

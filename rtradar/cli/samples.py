@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +59,7 @@ def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca100
     return said.radar, layout
 
 
-def process(options: argparse.Namespace) -> Mapping[str, Any]:
+def process(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar process``."""
     from rtradar.settings import RunSettings
 
@@ -82,21 +82,21 @@ def process(options: argparse.Namespace) -> Mapping[str, Any]:
             unit=samples.unit,
             **settings,
         )
+    yield found.summary
     tell(options, found.summary)
-    return found.summary
 
 
-def export(options: argparse.Namespace) -> Mapping[str, Any]:
+def export(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar export``."""
     if options.format == "int16" and _layout(options) is not None:
         raise InputError("--format int16 is no file of a DCA1000; leave its options out")
     from rtradar import exchange
 
     written = exchange.export(options.source, options.out, dca1000=_layout(options))
+    yield written
     axes, shape = written["axes"], written["shape"]
     if len(axes) == len(shape):
         size = ", ".join(f"{axis} {length}" for axis, length in zip(axes, shape, strict=True))
     else:
         size = f"{shape[0]} points: {', '.join(axes)}"
     print(f"{size}; {written['type']}; see {options.out}")
-    return written

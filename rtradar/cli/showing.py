@@ -28,16 +28,15 @@ Described = Iterator[tuple[str, str]]
 """Names, each with its description."""
 
 
-def list_names(options: argparse.Namespace) -> Mapping[str, Any]:
+def list_names(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar list``."""
     found = dict(KINDS[options.kind]())
+    yield {options.kind: [{"name": name, "description": text} for name, text in found.items()]}
     width = max(map(len, found)) + 2
     columns = max(shutil.get_terminal_size().columns, width + 40)
     for name, text in found.items():
         lines = textwrap.wrap(text, columns - width, break_on_hyphens=False) or [""]
         print(name.ljust(width) + f"\n{' ' * width}".join(lines))
-    rows = [{"name": name, "description": text} for name, text in found.items()]
-    return {options.kind: rows}
 
 
 def _scenes() -> Described:
@@ -119,15 +118,15 @@ KINDS: Mapping[str, Callable[[], Described]] = {
 _OF_RADARS = ("range_bin_m", "max_range_m", "velocity_bin_mps", "max_velocity_mps", "n_tx", "n_rx")
 
 
-def inspect_file(options: argparse.Namespace) -> Mapping[str, Any]:
+def inspect_file(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar inspect``."""
     file = Path(options.file)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         kind, found, text = _look(file, options)
     said = [str(warning.message) for warning in caught]
+    yield {"file": str(file), "kind": kind, **found, "warnings": said}
     print("\n".join([text, *(f"warning: {line}" for line in said)]))
-    return {"file": str(file), "kind": kind, **found, "warnings": said}
 
 
 def _look(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any], str]:
@@ -189,7 +188,7 @@ def _motion(file: Path, options: argparse.Namespace) -> tuple[str, dict[str, Any
     return "motion", found, "\n".join([repr(motion).rstrip(), *lines])
 
 
-def view(options: argparse.Namespace) -> Mapping[str, Any]:
+def view(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar view``."""
     if options.time is not None and options.still is None:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
@@ -199,13 +198,13 @@ def view(options: argparse.Namespace) -> Mapping[str, Any]:
     shown = views.view(
         options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour
     )
+    yield shown
     for kind in ("page", "still"):
         if kind in shown:
             verb = "open" if kind == "page" else "see"
             print(f"{verb} {shown[kind]['path']} ({shown[kind]['bytes'] / 1e6:.1f} MB)")
     if page is not None and options.out is None and not options.no_browser:
         show_page(page)
-    return shown
 
 
 def _own_page(folder: Path) -> Path:

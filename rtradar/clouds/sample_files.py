@@ -227,9 +227,9 @@ def write_durably(path: Path, content: bytes | memoryview) -> None:
         os.fsync(file.fileno())
 
 
-def sweep(folder: Path) -> int:
-    """Remove the partial files of interrupted writers, which must have ended; return how many."""
-    return remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
+def sweep(folder: Path) -> None:
+    """Remove the partial files of interrupted writers, which must have ended."""
+    remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
 
 
 def write_index(folder: Path, identities: Iterable[str]) -> None:
@@ -238,15 +238,14 @@ def write_index(folder: Path, identities: Iterable[str]) -> None:
     InputError if it cannot be written, or its name belongs to a file that is not an index.
     """
     path = folder / INDEX
-    try:
-        _content(path)
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError):
-        raise InputError(
-            f"'{path}' is there, and no index of a collection; "
-            "move it away, or give another folder (--out)"
-        ) from None
+    if os.path.lexists(path):  # or a link that leads nowhere
+        try:
+            _content(path)
+        except (OSError, ValueError):
+            raise InputError(
+                f"'{path}' is there, and no index of a collection; "
+                "move it away, or give another folder (--out)"
+            ) from None
     content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
     write_durably(path, content.encode() + b"\n")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rtradar.body import Person
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.radar import Radar
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene import Scene
@@ -71,7 +71,8 @@ def settings_of_table(table: Table, folder: Path = Path()) -> RunSettings:
         given["breathing"] = table_at("breathing", given, "settings.")
     if isinstance(background := given.get("background"), str):
         given["background"] = str((folder / background).absolute())
-    return read_table(RunSettings, "[settings] ", given)
+    with prefixed("[settings] "):
+        return read_table(RunSettings, "", given)
 
 
 def _radar(table: Table, folder: Path) -> Radar:

@@ -20,7 +20,7 @@ from rtradar.trace.backends.probe import probe_backend
 
 PACKAGES = (
     *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh"),
-    *("h5py", "zarr", "matplotlib"),
+    *("h5py", "zarr", "matplotlib", "jinja2"),
 )
 """Packages whose versions tell most when something goes wrong."""
 
@@ -114,9 +114,9 @@ def report(json_path: str | Path | None = None) -> int:
     be.
     """
     found = examine()
-    print(report_text(found))
     if json_path is not None:
         write_json(json_path, found)
+    print(report_text(found))
     return 0 if found["chosen"] else 1
 
 

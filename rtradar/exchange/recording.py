@@ -123,7 +123,9 @@ def unreadable(path: Path, what: str, error: Exception) -> InputError:
     if isinstance(error, InputError):
         return error
     why = getattr(error, "strerror", None) or in_short(error)
-    cure = "run it again" if path.is_dir() else "give a file of the format that its suffix says"
+    cure = "give a file of the format that its suffix says"
+    if path.is_dir() and (path.name == "if.zarr" or path.suffix.lower() != ".zarr"):
+        cure = "run it again"
     return InputError(f"cannot read {what} from '{path}': {why}; {cure}")
 
 

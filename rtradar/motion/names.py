@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.system.checks import brief, check_keys, read_toml, tables_at
 
 Array = NDArray[np.float64]
@@ -74,7 +74,10 @@ def conventions(kind: _Kind) -> tuple[Convention, ...]:
 @lru_cache(maxsize=4)
 def _read(path: Path, kind: str) -> tuple[Convention, ...]:
     named = dict[str, Mapping[str, Any]]()
-    for where, table in tables_at(kind, read_toml(path, "names of joints", "check the path")):
+    content = read_toml(path, "names of joints", "check the path")
+    with prefixed(f"{path}: "):
+        tables = list(tables_at(kind, content))
+    for where, table in tables:
         check_keys(f"{path}: {where}", table, ("name",), _KEYS)
         named[table["name"]] = {**named.get(table.get("like", ""), {}), **table}
     return tuple(_convention(path, table) for table in named.values())

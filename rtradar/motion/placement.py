@@ -89,7 +89,7 @@ def _interval(
     check_number(where, "heading_deg", heading_deg, -1e6, 1e6)
     rest = motion.duration_s - start_s
     if duration_s is not None:
-        what = f"after {start_s:g} s, duration_s"
+        what = f"after {start_s:g} s, of which {rest:g} s are left, duration_s"
         duration_s = check_number(where, what, duration_s, 1e-9, rest + 1e-6)
     return cut(motion, start_s, rest if duration_s is None else min(duration_s, rest))
 

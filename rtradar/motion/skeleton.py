@@ -137,7 +137,9 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
     tried = []
     for convention in conventions("skeletons"):
-        found = {node: there[name] for node, name in convention.found(there).items()}
+        found = {
+            node: there[name] for node, name in convention.found(there).items() if name in there
+        }
         missing = [node for node in convention.joints if node not in found]
         if convention.open_ended:
             # No end site at all: the part starts and ends in one joint, and is extended from there.

@@ -122,4 +122,4 @@ def paper_warnings() -> tuple[str, ...]:
     >>> len(paper_warnings())
     5
     """
-    return tuple(contents()["warnings"])
+    return tuple(text.format(scale=PAPER_OS_SCALE) for text in contents()["warnings"])

@@ -127,7 +127,7 @@ def figures_of(ours: Compared, reference: Compared) -> dict[str, Any]:
     return {
         **_map_figures(ours, reference),
         "detections": ours.summary.get("detections"),
-        "rdt_chamfer_bins": chamfer_bins(ours.points, reference.points, ours.radar),
+        "rdt_chamfer_bins": chamfer_bins(ours.points, reference.points, reference.radar),
     }
 
 
@@ -284,7 +284,7 @@ def _map_figures(ours: Compared, reference: Compared) -> dict[str, float | None]
         levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
         columns = min(len(maps["spectrogram_time"]) for maps in (first, second))
         spectrogram, its = (
-            thinned(maps["spectrogram"][:columns], maps["spectrogram_time"][:columns])[0]
+            thinned(maps["spectrogram"], maps["spectrogram_time"][:columns])[0]
             for maps in (first, second)
         )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
@@ -328,23 +328,25 @@ def draw_maps_and_clouds(
     for a spectrogram.
     """
     drawn = {name: place / file for name, file in MAP_PICTURES.items()}
-    powers, spectrograms, times = {}, {}, []
+    powers, thin = {}, {}
+    times = []
+    for one in compared.values():
+        with read_maps(one.maps) as maps:
+            times.append(maps["spectrogram_time"][:])
+    shortest = min(times, key=len)
     for (name, one), frame in zip(compared.items(), frames, strict=True):
         with read_maps(one.maps) as maps:
             powers[name] = maps["range_doppler"][frame]
-            spectrograms[name] = maps["spectrogram"][:]
-            times.append(maps["spectrogram_time"][:])
+            if len(shortest):
+                # A spectrogram is read in parts: that of an hour is large.
+                thin[name] = thinned(maps["spectrogram"], shortest)
             velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
             radius = maps["range"][:]
     shown, label = levels[0](powers)
     seen = np.any([above_floor(power) for power in powers.values()], axis=0)
     axes = (VELOCITY_LABEL, velocity), ("Range [m]", radius)
     comparison.draw_maps(drawn["Range-Doppler"], shown, label, *axes, titles[0], seen)
-    shortest = min(times, key=len)
-    if len(shortest):
-        thin = {
-            name: thinned(power[: len(shortest)], shortest) for name, power in spectrograms.items()
-        }
+    if thin:
         shown, label = levels[1]({name: power.T for name, (power, _) in thin.items()})
         seen = np.any([above_floor(power.T) for power, _ in thin.values()], axis=0)
         axes = ("Time [s]", next(iter(thin.values()))[1]), (VELOCITY_LABEL, slow)

@@ -66,10 +66,10 @@ def prepare(
         body = body_of_people(everyone, settings)
         radar = scene.place(radar)
         processing = replace(processing, radar=radar)
+    if in_memory:
+        refuse_large_maps(radar, radar.chirps_in(body.duration_s), sources=True)
     processing = with_background(processing)
     n_chirps, frame_starts = _frames(radar, body)
-    if in_memory:
-        refuse_large_maps(radar, n_chirps, sources=True)
     # What they return at this level, over every path, and how strong they are without the room.
     with processing.stages.time("survey"):
         model = _echo_model(radar, body, scene, settings)
@@ -144,7 +144,7 @@ def _mean_cycle(path: Path, radar: Radar, unit: str) -> NDArray[np.complex64]:
     step = max(1, _ROWS_AT_ONCE // radar.n_tx) * radar.n_tx
     if (path / "run.toml").is_file() and not (path / "if.zarr").exists():
         parts = parts_of(read_run_file(path / "run.toml"), path)
-        # What was subtracted from its maps is in its samples.
+        # Its samples still hold the background that was subtracted from its maps.
         capture = prepare(*parts[:3], replace(parts.settings, background=None))
         theirs, of_unit = capture.radar, "m"
         blocks = (values for _, values in capture.received(step, progress=False))

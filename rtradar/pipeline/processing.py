@@ -301,7 +301,7 @@ def refuse_large(what: str, n_bytes: float, instead: str) -> None:
 def refuse_large_maps(radar: Radar, n_chirps: int, *, sources: bool = False) -> None:
     """Raise an `InputError` if maps of so many chirps are too large for memory."""
     interval_s = radar.duration_of(n_chirps)
-    what = f"maps of {interval_s:.3g} s of radar '{radar.name}'"
+    what = f"maps of {interval_s:.6g} s of radar '{radar.name}'"
     instead = "give a folder, out=, and they are written there as they are computed"
     refuse_large(what, bytes_of_maps(radar, n_chirps, sources=sources), instead)
 

@@ -202,19 +202,21 @@ class _Blocks:
 
     def __iter__(self) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         most = block_chirps(self._radar) // chirps_together(self._radar)
-        held = np.empty((0, self._radar.n_rx, self._radar.samples_per_chirp), np.complex64)
+        held: list[NDArray[np.complex64]] = []
+        count = 0
         for piece in self._pieces:
-            for begin in range(0, len(piece), most):
+            begin = 0
+            while begin < len(piece):
                 # Copies, for the caller may fill the same array again.
                 with np.errstate(over="ignore"):
-                    part = np.array(piece[begin : begin + most], dtype=np.complex64)
-                held = np.concatenate([held, part]) if len(held) else part
-                if len(held) >= most:
-                    yield self._block(held[:most])
-                    held = held[most:]
-        whole = len(held) // self._cycle_rows * self._cycle_rows
-        if whole:
-            yield self._block(held[:whole])
+                    part = np.array(piece[begin : begin + most - count], dtype=np.complex64)
+                held.append(part)
+                begin, count = begin + len(part), count + len(part)
+                if count == most:
+                    yield self._block(part if len(held) == 1 else np.concatenate(held))
+                    held, count = [], 0
+        if whole := count // self._cycle_rows * self._cycle_rows:
+            yield self._block(np.concatenate(held)[:whole])
         self._checked(self.n_chirps)
 
     def _block(self, block: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:

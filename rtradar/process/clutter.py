@@ -335,18 +335,19 @@ def clutter_removal(
             f"clutter removal '{method}': under multiplexing = 'ddm' what does not move has a "
             "Doppler of its own for each Tx, which this would leave in; choose 'none', or TDM"
         )
+    make, setting = _METHODS[method]
+    given = {"time_constant_s": time_constant_s, "pulses": pulses}
+    own: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    for name in own:
+        if name != setting:
+            owner = next(other for other, (_, its) in _METHODS.items() if its == name)
+            raise InputError(
+                f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'"
+            )
     if method == "mean" and radar.cycles_per_frame < 2:
         raise InputError(
             f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and "
             "its mean is all of it; lengthen the frame or choose 'exponential' or 'mti'"
-        )
-    make, setting = _METHODS[method]
-    given = {"time_constant_s": time_constant_s, "pulses": pulses}
-    own: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    for name in own.keys() - {setting}:
-        owner = next(other for other, (_, its) in _METHODS.items() if its == name)
-        raise InputError(
-            f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'"
         )
     return make(radar, background, **own)
 

@@ -104,6 +104,12 @@ class SlidingWindows:
         room = len(self._buffer) - self._held
         if self._held == gone:
             self._first, self._held = self._first + gone, 0
+            # A hop longer than the frame leaves chirps unused.
+            skip = min(max(wanted - self._first, 0), len(block))
+            if skip:
+                self._first += skip
+                self.n_chirps += skip
+                return skip
         elif room == 0:
             kept = self._held - gone
             # At most as many at once as it moves, for NumPy copies overlapping arrays twice.

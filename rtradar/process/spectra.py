@@ -171,7 +171,7 @@ def checked_chirps(what: str, values: ArrayLike, radar: Radar) -> NDArray[np.gen
 def checked_frame(where: str, spectra: ArrayLike, radar: Radar) -> NDArray[np.complexfloating]:
     """Spectra (cycle, tx, rx, range) of a frame; InputError if they are none of the radar."""
     cube, shape = np.asarray(spectra), (radar.n_tx, radar.n_rx)
-    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
+    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind not in "fc":
         raise InputError(
             f"{where}: spectra have shape {cube.shape}, type {cube.dtype}; radar '{radar.name}' "
             f"needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, any)"
@@ -234,6 +234,8 @@ def cell_spectra(
         the radar has no line of channels to measure an angle.
     """
     cube = checked_frame("cell_spectra", spectra, radar)
+    if cube.dtype.kind != "c":
+        raise InputError(f"cell_spectra: spectra are of type {cube.dtype}; they must be complex")
     n_cycles, n_range = cube.shape[0], cube.shape[3]
     rows = _indices(range_bins, n_range, "range_bins")
     columns = _indices(velocity_bins, n_cycles, "velocity_bins")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
-from rtradar.errors import ExtensionError, InputError
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import EchoModel, account_of, has_mesh
 from rtradar.scatter.free_space_legs import over_legs
@@ -127,17 +126,9 @@ def refuse_options(
             )
 
 
-def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:
-    """List the names of models with an ability, an attribute of `BuiltInModel` that holds.
-
-    Among the given names, in their order; models of packages that cannot be loaded are left out.
-    """
-    found = []
-    for name in names:
-        with suppress(ExtensionError), MODELS.guarded(name):
-            if getattr(MODELS[name], ability, False):
-                found.append(name)
-    return found
+def models_that(ability: str) -> list[str]:
+    """List the built-in models with an ability, an attribute of `BuiltInModel` that holds."""
+    return [name for name in MODELS.built_in if getattr(MODELS[name], ability, False)]
 
 
 def affordable_models(most: float) -> list[str]:

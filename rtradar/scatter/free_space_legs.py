@@ -77,6 +77,11 @@ class _OverLegs:
         """Backend of the model."""
         return self._model.variant
 
+    @property
+    def traces(self) -> bool:
+        """Whether the model traces rays, which it may not have done yet."""
+        return bool(getattr(self._model, "traces", False))
+
     def account(self) -> dict[str, Any] | None:
         """Report what the model did."""
         return account_of(self._model)

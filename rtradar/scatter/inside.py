@@ -79,8 +79,12 @@ class Inside:
             held = np.zeros(power.shape, dtype=bool)
             held[at] = solid.holds(times[at], poses.centres[at])
             self._keep(number, times, held, power * _MESH_STEP)
+        counted = np.zeros(power.shape, dtype=bool)
         for person, number in enumerate(self._people):
-            self._keep(number, times, self._inside_person(person, times, poses), power)
+            held = self._inside_person(person, times, poses)
+            # Who is inside of two others is inside once.
+            self._keep(number, times, held, power * ~counted)
+            counted |= held
 
     def _keep(self, number: int, times: Array, held: Bools, power: Array) -> None:
         first = np.where(held, times[:, None], np.inf).min(axis=0, initial=np.inf)

@@ -112,7 +112,8 @@ class Scene:
                     f"{where}{key} has two of the name '{twice[0]}'; give each its own"
                 )
         if self.people:
-            from rtradar.body import Person  # which takes long to import
+            # `check_fields` does not know the class, which takes long to import.
+            from rtradar.body import Person
 
             if not all(isinstance(one, Person) for one in self.people):
                 raise InputError(f"{where}people must be a tuple of Person")

@@ -6,8 +6,9 @@ import copy
 import dataclasses
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed
 from rtradar.recordings import SAID, SYNTHETIC, said_of
 from rtradar.scene.materials import MATERIALS, Material, own_material
@@ -23,12 +24,13 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
-from rtradar.system.fields import keys_of, read_value
+from rtradar.system.fields import Angle, Limits, Point, keys_of, read_value
 
 if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.motion import Motion
 
+_Place = Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])]
 _OF_PEOPLE = (
     "skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing"
 )
@@ -121,12 +123,17 @@ def fields_of(table: Table) -> dict[str, Any]:
     if "radar" in table:
         radar = table_at("radar", table)
         check_keys("[radar] ", radar, *(KEYS["[radar]"] if radar else (("position_m",), ())))
-        fields |= {f"radar_{key}": value for key, value in radar.items()}
+        for key, value in radar.items():
+            kind = Point if key == "position_m" else Angle
+            fields[f"radar_{key}"] = read_value(kind, "[radar] ", key, value)
     if "person" in table:
         person = table_at("person", table)
         check_keys("[person] ", person, *KEYS["[person]"])
-        for key, value in person.items():
-            fields["person_position_m" if key == "position_m" else key] = value
+        if "position_m" in person:
+            place = person["position_m"]
+            fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
+        if "heading_deg" in person:
+            fields["heading_deg"] = person["heading_deg"]
     return fields
 
 

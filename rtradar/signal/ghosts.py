@@ -56,8 +56,8 @@ AHEAD = 8
 
 
 GhostEchoes = Callable[[NDArray[np.int64]], Echoes]
-"""What gives the echoes over walls at some chirps: they have lengths also where they are not seen,
-and are the same ones at every chirp."""
+"""Function that computes the echoes over walls at some chirps; they have lengths also where they
+are not seen, and are the same ones at every chirp."""
 
 
 class GhostIf:

@@ -76,8 +76,9 @@ class Rule(NamedTuple):
         """Return the value in its type; InputError if it is not allowed."""
         try:
             return self.read(value)
-        except InputError as error:  # of a table in it
-            raise InputError(f"{where}{key}: {error}") from None
+        except InputError as error:  # of a table in it, which may say so itself
+            own = "" if str(error).startswith(f"{key}: ") else f"{key}: "
+            raise InputError(f"{where}{own}{error}") from None
         except (ValueError, OverflowError):
             hint = self._in_units(key, value)
             raise InputError(f"{where}{key} = {brief(value)}; {self.wanted}{hint}") from None
@@ -230,7 +231,9 @@ def _number(kind: type, limits: Limits) -> Rule:
     least, most, whole = limits.least, limits.most, kind is int
     right = is_whole if whole else is_real
     wanted = f"it must be a {'whole ' * whole}number"
-    if (least, most) != (-_FINITE, _FINITE):
+    if (least, most) == (-_FINITE, _FINITE):
+        wanted += f" within +-{most:g}"
+    else:
         low, high = (f"{one}" if isinstance(one, int) else f"{one:g}" for one in (least, most))
         wanted += f" from {low} to {high}"
     return _where(

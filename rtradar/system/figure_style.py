@@ -59,16 +59,15 @@ class Theme:
     person: str
     ghost: str
     detection: str
-    cycle: list[str]
+    cycle: tuple[str, ...]
 
 
 _THEMES = tomllib.loads(Path(__file__).with_name("themes.toml").read_text(encoding="utf-8"))
 
-LIGHT = Theme(**_THEMES["light"])
-"""Colours on a white page."""
-
-DARK = Theme(**_THEMES["dark"])
-"""Colours on a dark page."""
+LIGHT, DARK = (
+    Theme(**_THEMES[name] | {"cycle": tuple(_THEMES[name]["cycle"])}) for name in ("light", "dark")
+)
+"""Colours on a white page, and on a dark one."""
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:

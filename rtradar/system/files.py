@@ -94,18 +94,15 @@ def shipped_folder(name: str) -> Path:
     return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / name
 
 
-def remove_parts(folder: Path, names: str) -> int:
-    """Remove and count what a killed `atomic_file` left of files with these names (a pattern).
+def remove_parts(folder: Path, names: str) -> None:
+    """Remove what a killed `atomic_file` left of files with these names (a pattern).
 
     No other command may write into the folder.
     """
     part = re.compile(rf"\.({names})\.[0-9a-f]{{{2 * _TOKEN_BYTES}}}\.part")
-    count = 0
     for path in folder.iterdir():
         if part.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode):
             path.unlink(missing_ok=True)
-            count += 1
-    return count
 
 
 def check_place(path: Path | None, option: str = "--json") -> None:
@@ -188,7 +185,9 @@ def read_arrays(
             if name != entry.filename and (names is None or name in names):
                 with archive.open(entry) as member:
                     shape, order, kind = _read_header(member, entry.file_size)
-                    data = bytearray(member.read())  # so that the array may be changed
+                    data = bytearray()  # so that the array may be changed
+                    while part := member.read(2**20):
+                        data += part
                 found[name] = np.ndarray(shape, kind, data, order=order)
                 _check_text(found[name])
     return found
@@ -228,9 +227,13 @@ def _read_header(
     """Read shape, order and type of an array; ValueError if its file of that size has less."""
     import numpy as np
 
-    of_old = np.lib.format.read_magic(member) == (1, 0)
-    read = np.lib.format.read_array_header_1_0 if of_old else np.lib.format.read_array_header_2_0
-    shape, fortran, kind = read(member)
+    version = np.lib.format.read_magic(member)
+    if version == (1, 0):
+        shape, fortran, kind = np.lib.format.read_array_header_1_0(member)
+    elif version == (2, 0):
+        shape, fortran, kind = np.lib.format.read_array_header_2_0(member)
+    else:
+        raise ValueError("it is of a version that no array of numbers has")
     if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
         raise ValueError("it claims more than it holds")
     if kind.hasobject:

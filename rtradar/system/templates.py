@@ -56,7 +56,7 @@ def aligned(text: str) -> str:
         if not is_table:
             lines += block
             continue
-        rows = [[cell.strip() for cell in line[1:-1].split("|")] for line in block]
+        rows = [[cell.strip() for cell in line[1:-1].split(" | ")] for line in block]
         widths = [max(map(len, column)) for column in zip_longest(*rows, fillvalue="")]
         padded = [map(str.ljust, row, widths) for row in rows]
         head, *body = (f"| {' | '.join(cells)} |" for cells in padded)

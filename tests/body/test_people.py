@@ -81,7 +81,7 @@ def test_names_that_come_twice_are_numbered() -> None:
         ({"position_m": (0, 0, 0)}, "position_m = .*2 numbers"),
         ({"position_m": (0, float("nan"))}, "position_m"),
         ({"heading_deg": 400}, "heading_deg = 400"),
-        ({"start_s": 1}, "start_s = 1.0; it must be a number from 0 to 0.6"),
+        ({"start_s": 1}, "start_s = 1; it must be a number from 0 to 0.6"),
         ({"body": "bones"}, "body = 'bones'; allowed: ellipsoids, mesh"),
         ({"material": 3}, "material = 3"),
         ({"breathing": (3, 0.25)}, r"walk': breathing = \(3, 0.25\); .* of Breathing"),

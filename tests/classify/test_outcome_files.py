@@ -19,8 +19,9 @@ CLOUDS = 20_000
 def example() -> Outcome:
     names = np.array(["a", "b"])
     return Outcome(
-        "fold 1", "", np.array([3, 5]), np.array([0, 1]), np.array([0, 0]), names, names, [EPOCH]
-    )
+        "fold 1", "", np.array([3, 5]), np.array([0, 1]), np.array([0, 0]), names, names, [EPOCH],
+        names, np.array([[0.75, 0.25], [1.0, 0.0]]),
+    )  # fmt: skip
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
@@ -43,6 +44,11 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         {"indices": [-1, 1]},
         {"recordings": [1, 2]},
         {"recordings": {"a": 1, "b": 2}},
+        {"subjects": []},
+        {"subjects": {}, "probabilities": {}},
+        {"probabilities": []},
+        {"probabilities": [[float("nan"), 0.5], [0.5, 0.5]]},
+        {"probabilities": [[1.5, 0.5], [0.5, 0.5]]},
         {"name": 3},
         {"more": 1},
         {"history": {}},

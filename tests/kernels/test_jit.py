@@ -6,6 +6,8 @@ import errno
 import math
 import os
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +19,7 @@ import pytest
 from numba import config
 from numba.core.registry import cpu_target
 
+import rtradar
 import rtradar.kernels.jit as compiling
 from rtradar.kernels.jit import (
     CacheWarning,
@@ -170,6 +173,28 @@ def test_damaged_files_are_made_anew(cache: Path, damage: Callable[[bytes], byte
     again, third = of_package(), of_package()
     assert (again(2.0), third(2.0)) == (4.0, 4.0)
     assert (from_disk(again), from_disk(third)) == (False, True)
+
+
+@pytest.mark.slow
+def test_processes_at_once(tmp_path: Path) -> None:
+    words = "from rtradar.kernels.jit import try_cache; print(try_cache()[0])"
+    command = [sys.executable, "-c", words]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    at_once = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    said = {process.communicate()[0] for process in at_once}
+    assert len(said) == 1
+    assert said.pop().startswith(f"kept, in {tmp_path}")
+    assert len(files(tmp_path)) == 1
+
+
+def test_nothing_is_kept_by_numba_itself() -> None:
+    """It would not see what other files bring in, and fails where no folder can be written."""
+    modules = list(Path(rtradar.__file__).parent.rglob("*.py"))
+    assert len(modules) > 200
+    assert not [path for path in modules if "cache=True" in path.read_text(encoding="utf-8")]
 
 
 def test_code_of_other_versions_goes_when_it_is_old(cache: Path) -> None:

@@ -99,7 +99,10 @@ def test_straight_cut_of_a_walk_faces_the_same_way() -> None:
         ({"start_s": 3.5}, "synthetic:walk, 3 s long: start_s = 3.5; .* a number from 0 to 3"),
         ({"start_s": -0.1}, "start_s = -0.1"),
         ({"start_s": math.nan}, "start_s = nan"),
-        ({"start_s": 1.0, "duration_s": 2.5}, "after 1 s, duration_s = 2.5; .* to 2$"),
+        (
+            {"start_s": 1.0, "duration_s": 2.5},
+            "after 1 s, of which 2 s are left, duration_s = 2.5; .* to 2$",
+        ),
         ({"duration_s": 0.0}, "duration_s = 0.0"),
         ({"duration_s": math.inf}, "duration_s = inf"),
         ({"heading_deg": math.nan}, "heading_deg = nan"),

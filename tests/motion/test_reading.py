@@ -347,7 +347,7 @@ def test_names_of_other_programs_are_known(tmp_path: Path, name: str) -> None:
         if words[0] in ("ROOT", "JOINT") and words[1] in names:
             other = names[words[1]]
             # Spaces may stand for underscores.
-            lines[number] = f"{words[0]} {other.replace('_', ' ') if number % 2 else other}"
+            lines[number] = f"{words[0]} {other.replace('_', ' ')}"
     motion, said = read(tmp_path, "\n".join(lines))
     walks_upright(motion)
     assert not said

@@ -7,10 +7,13 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rtradar as rt
 from rtradar.cli import main
+from rtradar.pipeline.compare_folders import compare_folders
+from rtradar.pipeline.compared import chamfer_bins
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +75,17 @@ def test_what_cannot_be_laid_on_each_other_is_refused(
         assert says in said
         assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_clouds_are_apart_in_the_bins_of_the_reference(
+    small: rt.Radar, kick: rt.Motion, tmp_path: Path
+) -> None:
+    slower = dataclasses.replace(small, frame_hop_s=2 * small.frame_hop_s)
+    for name, radar in (("a", slower), ("b", small)):
+        rt.run(
+            kick, radar, out=tmp_path / name, fidelity="analytic", duration_s=0.3, pictures=False
+        )
+    found = compare_folders([tmp_path / "a", tmp_path / "b"], out=tmp_path / "out")
+    clouds = [np.load(tmp_path / name / "cloud_rdt.npz")["points"] for name in ("a", "b")]
+    expected = chamfer_bins(*clouds, small)
+    assert found.summary["folders"]["a"]["rdt_chamfer_bins"] == pytest.approx(expected)

@@ -133,3 +133,13 @@ def test_an_object_comes_after_the_people() -> None:
     assert of_cart.sum() > 10
     assert (cloud.source[of_cart] == 1).mean() > 0.9
     assert (cloud.source[range_m > 3.0] == 0).mean() > 0.8
+
+
+def test_who_returned_a_cell_does_not_depend_on_how_far_ahead_is_looked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = []
+    for ahead in (1, 8):
+        monkeypatch.setattr("rtradar.pipeline.output.echo_table._LOOKS_AHEAD", ahead)
+        found.append(rt.run([WALKER, KICKER], RADAR, duration_s=0.15).maps["source"].values)
+    np.testing.assert_array_equal(*found)

@@ -233,3 +233,17 @@ def test_a_run_has_the_window_and_the_overlap_that_are_asked_of_it() -> None:
     for name, value in wrong:
         with pytest.raises(InputError, match=name):
             rt.run(walk, radar, **{name: value})
+
+
+def test_noise_reads_its_mean_power_and_range_bins_add() -> None:
+    # Each cell: sum of w^2 over (sum of w)^2, 1.5 / 128, times the noise power 2, times 20 range
+    # bins.
+    signals = noise((4096, 20))
+    found = spectrogram(signals, LOW, overlap=0.0, window_functions=HANN)
+    # 32 windows x 128 cells x 20 looks: 0.35 % for independent cells, half as much again for the
+    # window's skirts; five sigma.
+    assert found.power.mean() == pytest.approx(1.5 / 128 * 2 * 20, rel=0.025)
+    assert found.power.dtype == np.float64
+    parts = (signals[:, :7], signals[:, 7:])
+    both = (spectrogram(part, LOW, overlap=0.0, window_functions=HANN).power for part in parts)
+    np.testing.assert_allclose(found.power, sum(both), rtol=1e-12)

@@ -230,6 +230,18 @@ def test_a_hand_in_someone_is_a_limit() -> None:
     assert "the synthetic:punch 2: left hand in 'synthetic:punch 1' from 0.10 s" in message
 
 
+def test_a_hand_in_two_others_at_once_counts_once() -> None:
+    people = [rt.Person(STAND, (x, 0)) for x in (0, 1, 2)]
+    body = body_of_people(people, RunSettings())
+    poses, power = body.at([0.1]), np.ones((1, 63))
+    hands = [index for index, name in enumerate(body.part_names) if name.endswith("left hand")]
+    poses.centres[0, hands] = poses.centres[0, hands[0]]
+    others = Inside(Scene(), body)
+    others.look(np.array([0.1]), poses, power)
+    [(_, inside_power, _)] = others.found(power[0])
+    assert inside_power == 3.0
+
+
 def test_who_is_never_in_range_is_named() -> None:
     with pytest.raises(InputError, match="person 'synthetic:punch 2' is never within the range"):
         budget((0, 1), (40, 0))

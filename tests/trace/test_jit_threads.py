@@ -123,7 +123,13 @@ def test_no_model_takes_threads_of_dr_jit_away(
     given: list[int] = []
     monkeypatch.setattr(dr, "set_thread_count", given.append)
     body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
-    build_model("rays", SMALL, body, variant=backend.kind).echoes(np.arange(2))
+    for fidelity, options in (
+        ("specular", {}),
+        ("specular", {"visibility": "gradual"}),
+        ("physical-optics", {}),
+        ("rays", {}),
+    ):
+        build_model(fidelity, SMALL, body, variant=backend.kind, **options).echoes(np.arange(2))
     assert all(count >= dr.thread_count() for count in given)
 
 

@@ -61,13 +61,17 @@ def load_skeleton(path: Path) -> Skeleton:
                 (unit,) = text.numbers(words[1:2])
                 if not unit > 1e-6:
                     raise text.fail(f"length unit {unit}; it must be positive, and above 1e-6")
-            elif section == ":root":
+            elif section == ":root" and key in ("order", "axis", "orientation", "position"):
                 _bone_line(bones["root"], key, words[1:], text)
             elif section == ":bonedata" and key in ("begin", "end"):
+                if bone is not None and not bone.name:
+                    raise text.fail("a bone without a name ends here")
                 bone = Bone("", text.line) if key == "begin" else None
             elif section == ":bonedata":
                 if bone is None:
                     raise text.fail(f"{words[0]!r} outside begin ... end")
+                if key in ("order", "orientation", "position"):
+                    continue  # which only a root has
                 _bone_line(bone, key, words[1:], text)
                 if key == "name" and bones.setdefault(bone.name, bone) is not bone:
                     raise text.fail(f"bone {bone.name!r} is there twice; names must differ")
@@ -113,15 +117,17 @@ def _bone_line(bone: Bone, key: str, words: list[str], text: TextFile) -> None:
     elif key == "position" and _triple(words, text).any():
         raise text.fail("a root position other than 0 0 0 is not supported; move it into the AMC")
     elif key == "axis":
-        *angles, order = words[:1] if bone.name == "root" else [*words, "xyz"][:4]
-        bone.axis = _triple(angles, text) if angles else bone.axis
+        # The order stands alone or after the angles; a bone may leave it out, the root the angles.
+        root = bone.name == "root"
+        order = words[-1] if words and (root or len(words) > 3) else "" if root else "xyz"
+        bone.axis = bone.axis if root else _triple(words, text)
         bone.axis_order = order.lower()
         if sorted(bone.axis_order) != ["x", "y", "z"]:
             raise text.fail(f"axis order {order!r}; it must be a permutation of XYZ")
     elif key in _CHANNELS:
         bone.channels, allowed = tuple(word.lower() for word in words), _CHANNELS[key]
-        whole = len(words) == 6 or key == "dof"
-        if not (whole and set(bone.channels) <= set(allowed)) or len(set(words)) < len(words):
+        given, whole = set(bone.channels), len(words) == 6 or key == "dof"
+        if not (whole and given <= set(allowed)) or len(given) < len(words):
             raise text.fail(
                 f"{key} {' '.join(words)} of {bone.name!r}: only {', '.join(allowed)} are "
                 f"supported, each once{' and all of them' * (key == 'order')}"

@@ -25,6 +25,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -103,27 +104,29 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
     with TextFile(path, "table of joint positions") as text:
         header = [cell.strip(" \"'\t\r\n") for cell in next(iter(text)).split(",")]
         columns, joints = _columns(text, header)
-        held = [key for key in ("up", "rate_hz") if key in columns]
-        rows, first = list[list[float]](), dict[str, str]()
+        rows, up = list[list[float]](), ""
         for line in text:
             cells = [cell.strip(" \"'\t\r\n") for cell in line.split(",")]
             if cells == [""]:
                 continue
             if len(cells) != len(header):
                 raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
-            for key in held:
-                if first.setdefault(key, own := cells[columns[key]]) != own:
-                    was = f"{brief(own)}, and was {brief(first[key])}"
-                    raise text.fail(f"{key} is {was}; it must not change, give time_s")
             if "up" in columns:
-                cells[columns["up"]] = ""
+                own, cells[columns["up"]] = cells[columns["up"]], ""
+                if rows and own != up:
+                    raise text.fail(f"up is {brief(own)}, and was {brief(up)}; it must not change")
+                up = own
             rows.append(text.cells(cells))
+            rate = columns.get("rate_hz")
+            if rate is not None and rows[-1][rate] != rows[0][rate]:
+                was = f"{rows[-1][rate]:g}, and was {rows[0][rate]:g}"
+                raise text.fail(f"rate_hz is {was}; it must not change, give time_s")
             text.check_size(len(joints), len(rows))
     values = np.array(rows).reshape(len(rows), len(header))
     named = list(joints.values())
     arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
     if "up" in columns:
-        arrays["up"] = np.array(first.get("up", ""))
+        arrays["up"] = np.array(up)
     if "time_s" in columns:
         arrays["time_s"] = values[:, columns["time_s"]]
     if "rate_hz" in columns:
@@ -135,23 +138,23 @@ def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[st
     """Columns of what is not a coordinate, and three of each joint."""
     others, joints = dict[str, int](), dict[str, dict[str, int]]()
     for k, cell in enumerate(header):
-        if header.count(cell) > 1:
-            raise text.fail(f"column {brief(cell)} is there twice")
         found = re.fullmatch(r"(.+)[_. ]([xyz])", cell, re.IGNORECASE)
         if found:
-            joints.setdefault(found[1], {})[found[2].lower()] = k
+            first = joints.setdefault(found[1], {}).setdefault(found[2].lower(), k)
         elif cell in ("time_s", "rate_hz", "up", "frame"):
-            others[cell] = k
+            first = others.setdefault(cell, k)
         else:
             raise text.fail(
                 f"column {brief(cell)} is not understood; allowed are time_s, rate_hz, up, frame, "
                 "and NAME_x, NAME_y, NAME_z of each joint"
             )
+        if first != k:
+            raise text.fail(f"column {brief(cell)} is there twice")
     for name, place in joints.items():
-        for axis in set("xyz") - place.keys():
+        if missing := [axis for axis in "xyz" if axis not in place]:
             raise text.fail(
-                f"joint {brief(name)} has no column for {axis}; each joint needs NAME_x, NAME_y, "
-                "NAME_z"
+                f"joint {brief(name)} has no column for {missing[0]}; each joint needs NAME_x, "
+                "NAME_y, NAME_z"
             )
     return others, {name: [place[axis] for axis in "xyz"] for name, place in joints.items()}
 
@@ -231,8 +234,10 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
     times = arrays["time_s"]
     check_array(path, "time_s", times, (frames,))
     times = times.astype(np.float64)
+    for frame in np.flatnonzero(~np.isfinite(times)):
+        raise InputError(f"{path}: time_s is {times[frame]} in frame {frame + 1}; mend it")
     steps = np.diff(times)
-    for frame in np.flatnonzero(~(np.isfinite(steps) & (steps >= _LEAST_STEP_S))):
+    for frame in np.flatnonzero(steps < _LEAST_STEP_S):
         raise InputError(
             f"{path}: time_s is {times[frame + 1]:g} in frame {frame + 2}, after "
             f"{times[frame]:g}; times must ascend, by a microsecond at least"
@@ -254,8 +259,7 @@ def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, N
 
     Under the keys that an archive of joint positions has.
     """
-    with Path(__file__).with_name("body_models.toml").open("rb") as file:
-        person = tomllib.load(file)
+    person = _mean_person()
     joints = person["joints"]
     turned = _rotations_of(path, arrays, len(joints))
     if "trans" not in arrays:
@@ -279,12 +283,22 @@ def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, N
     return found | ({"rate_hz": rates[0]} if rates else {})
 
 
+@cache
+def _mean_person() -> Mapping[str, Any]:
+    """Joints and pelvis of the mean person."""
+    text = Path(__file__).with_name("body_models.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
 def _rotations_of(path: Path, arrays: Mapping[str, NDArray[Any]], joints: int) -> Array:
     """Axis times angle (frame, 3 a joint) of the joints of the body [rad]."""
-    given = arrays.get("poses", np.empty(0))
-    if "poses" not in arrays:
-        parts = [arrays.get(name, np.empty(0)) for name in ("root_orient", "pose_body")]
-        if all(part.ndim == 2 and len(part) == len(parts[0]) for part in parts):
-            given = np.concatenate(parts, axis=1)
-    check_array(path, "poses", given[..., : 3 * joints], ("frame", 3 * joints))
-    return given[:, : 3 * joints].astype(np.float64)
+    if "poses" in arrays:
+        given = arrays["poses"]
+        # Hands and face come after the body.
+        body = given[:, : 3 * joints] if given.ndim == 2 else given
+        check_array(path, "poses", body, ("frame", 3 * joints))
+        return np.asarray(body, dtype=np.float64)
+    parts = [arrays.get(name, np.empty(0)) for name in ("root_orient", "pose_body")]
+    check_array(path, "root_orient", parts[0], ("frame", 3))
+    check_array(path, "pose_body", parts[1], (len(parts[0]), 3 * joints - 3))
+    return np.concatenate(parts, axis=1).astype(np.float64)

@@ -119,7 +119,7 @@ def motion_of(
     nodes, rate_hz = _resampled(nodes, times, convention)
     pelvis, thorax = (_axes(where, nodes, sides) for sides in ("hip", "shoulder"))
     _complete(nodes, pelvis, convention)
-    _keepunit(where, nodes)
+    _keep_directions(where, nodes)
     size = stature_of(nodes) / _NOMINAL_STATURE_M
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
     nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
@@ -251,7 +251,7 @@ def _axes(where: str, nodes: Array, sides: str) -> Array:
     return level_axes(left[kept], forward[kept])
 
 
-def _keepunit(where: str, nodes: Array) -> None:
+def _keep_directions(where: str, nodes: Array) -> None:
     """Give bones that vanish for a moment, in place, the direction that they had before."""
     for node in range(1, len(NODES)):
         start = nodes[:, NODE_PARENTS[node]]

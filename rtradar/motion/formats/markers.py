@@ -79,8 +79,9 @@ A straight arm has no such plane of its own."""
 def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     """Find the 22 nodes, and the orientations of pelvis and chest.
 
-    ``markers`` are the positions (frame, 3) of all of `NEEDED`, world [m]. The nodes are (frame,
-    node, 3); the rotations of pelvis and thorax (frame, 3, 3) have columns forward, left and up.
+    ``markers`` are the positions (frame, 3) of all of `NEEDED`, in any axes and unit, as are the
+    nodes (frame, node, 3); the rotations of pelvis and thorax (frame, 3, 3) have columns forward,
+    left and up.
     """
     frames = _segments(markers)
     shanks = [
@@ -179,7 +180,8 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
 
     A bone is as long as its joints are apart in the median. Joints do not say how a bone is rotated
     about itself: seen from pelvis or chest it takes from frame to frame the smallest rotation to
-    its next direction, so that nothing on it spins. Arguments are those that `joint_centres` gives.
+    its next direction, so that nothing on it spins. Arguments are as `joint_centres` gives them, in
+    the world [m].
     """
     parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
     bones = centres[:, 1:] - centres[:, parents]

@@ -85,16 +85,14 @@ def centre_of_mass(pose: Pose, height_m: float) -> Array:
     return np.asarray(centre) / sum(mass for mass, _ in _MASSES.values())
 
 
-def standing(
-    subject: Subject, pose: Callable[[Array], Pose], forward: Array, ahead: float = AHEAD
-) -> Array:
-    """Ways of the hips forward (n,) [m] with which the centre of mass is ``ahead`` of the ankles.
+def standing(subject: Subject, pose: Callable[[Array], Pose], forward: Array) -> Array:
+    """Ways of the hips forward (n,) [m] with which the centre of mass is `AHEAD` of the ankles.
 
     ``pose`` gives the pose of such ways; ``forward`` is the first guess.
     """
     for _ in range(4):
         centre = centre_of_mass(pose(forward), subject.height_m)[:, 0]
-        forward = forward - 1.1 * (centre - ahead * subject.height_m)
+        forward = forward - 1.1 * (centre - AHEAD * subject.height_m)
     return forward
 
 

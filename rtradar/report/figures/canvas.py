@@ -258,7 +258,7 @@ def thinned(
     data : (time, ...) xarray.DataArray or h5py.Dataset
         Map, of which a part at a time is read.
     times : (time,) float64
-        Times of the map [s].
+        Times of the map [s], or of its beginning, which is then all that is read.
 
     Returns
     -------
@@ -267,14 +267,15 @@ def thinned(
     times : (step,) float64
         Mean time of each step [s].
     """
-    every = max(1, math.ceil(len(data) / _COLUMNS))
+    count = len(times)
+    every = max(1, math.ceil(count / _COLUMNS))
     if every == 1:
-        return np.asarray(data), times
+        return np.asarray(data[:count]), times
     at_once = every * max(1, _ROWS // every)  # each access to a file takes its time
     power = np.concatenate(
         [
-            _means(np.asarray(data[first : first + at_once]), every)
-            for first in range(0, len(data), at_once)
+            _means(np.asarray(data[first : min(first + at_once, count)]), every)
+            for first in range(0, count, at_once)
         ]
     )
     return power, _means(times, every)

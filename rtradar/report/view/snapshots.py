@@ -217,6 +217,13 @@ def refused(path: str | Path, error: Exception) -> InputError:
     return InputError(f"'{path}': {why}; make it anew with: rtradar run")
 
 
+_LATER = {
+    *("part_person", "object_names", "mesh_source", "mesh_faces", "mesh_of_vertex", "mesh_part"),
+    *("mesh_rows", "blend_vertex", "blend_row", "blend_weight"),
+}
+"""Fields that files of the first format lack, all of them empty or 0 there."""
+
+
 def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
     times, parts = arrays["times"], arrays["part_names"].tolist()
@@ -230,7 +237,7 @@ def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]
     }
     sizes = {"step": len(times), "part": len(parts)}
     for one in fields(Snapshots):
-        if one.name not in arrays:
+        if one.name in _LATER:
             axes, kind = one.metadata["axes"], one.metadata["kind"]
             shape = [axis if isinstance(axis, int) else sizes.get(axis, 0) for axis in axes]
             found.setdefault(one.name, np.zeros(shape, kind))

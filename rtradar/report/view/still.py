@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -68,7 +68,7 @@ class _Tints(NamedTuple):
     parts: NDArray[np.float64]
     cloud: NDArray[np.float64]
     sources: NDArray[np.float64]
-    names: Mapping[str, Any]
+    names: Sequence[tuple[str, Any]]
     scale: tuple[ScalarMappable, str] | None = None
 
 
@@ -78,12 +78,13 @@ def _tints(run_view: RunView, colour: str, step: int) -> _Tints:
     sources = to_rgba_array(run_view.source_colours)
     if colour in _NAMED:
         if colour == "part":
-            names, of_part = GROUPS, group_of_parts(snapshots.part_names.tolist())
+            names, of_part = list(GROUPS.items()), group_of_parts(snapshots.part_names.tolist())
             of_point = run_view.rdt_group()
         else:
-            names = dict(zip(run_view.source_names, run_view.source_colours, strict=True))
+            # A person and an object may have the same name.
+            names = list(zip(run_view.source_names, run_view.source_colours, strict=True))
             of_part, of_point = snapshots.part_person.tolist(), run_view.rdt_source
-        table = to_rgba_array(list(names.values()))  # the last is that of nobody
+        table = to_rgba_array([tint for _, tint in names])  # the last is that of nobody
         parts = table[of_part]
         return _Tints(parts[snapshots.echo_part], parts, table[of_point], sources, names)
     if colour == "power":
@@ -103,13 +104,13 @@ def _tints(run_view: RunView, colour: str, step: int) -> _Tints:
     echoes, parts, cloud = (
         np.asarray(painted.to_rgba(np.ma.masked_invalid(own))) for own in (values, strengths, cloud)
     )
-    return _Tints(echoes, parts, cloud, sources, {}, (painted, label))
+    return _Tints(echoes, parts, cloud, sources, [], (painted, label))
 
 
 def _explain(figure: Any, views: list[Any], tints: _Tints) -> None:
     """Add a legend of the colours below the views, or their scale."""
     if tints.scale is None:
-        patches = [Patch(color=tint, label=name) for name, tint in tints.names.items()]
+        patches = [Patch(color=tint, label=name) for name, tint in tints.names]
         columns = min(len(patches), _MOST_COLUMNS)
         figure.legend(handles=patches, loc="outside lower center", ncols=columns)
         return

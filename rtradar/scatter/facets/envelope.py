@@ -307,7 +307,8 @@ class ArrayEnvelope:
         carriers = self._surface.carriers(Geometry(*ends, centres, frames, pose.semi_axes[parts]))
         length, strength = (values[:, 0] for values in carriers)
         given = time, pose, nodes, length, parts
-        if self._gradual and isinstance(self._surface, FacetBody):
+        if self._gradual:
+            assert isinstance(self._surface, FacetBody)  # a skin has no fraction that is seen
             return Sample(self._surface.visible(*given), np.abs(strength))
         amplitude = self._surface.field(*given)
         # Without a specular point there is next to nothing to see either: antennas on opposite

@@ -1,4 +1,4 @@
-"""What facets radiate from Tx to Rx: by the reciprocal form, by the currents of Tx, or between.
+"""What facets radiate from Tx to Rx: the reciprocal form, the currents of Tx, or a blend of both.
 
 The reciprocal form of physical optics is of what both antennas see, as in a radar. Where Tx and Rx
 are far apart as the target sees them, the currents on all that Tx lights count. From `NEAR` to
@@ -105,7 +105,7 @@ def visible(
     seen: Seen,
     index: NDArray[np.integer],
 ) -> Field:
-    """Return what shadows leave of what is `radiated`, but for forward scatter: 1 in full view.
+    """Return the fraction of the `radiated` field that shadows leave, without forward scatter.
 
     It is the sum over the facets of a part with shadows over that without: 0 where there is
     nothing, and no more than `_MOST_LEFT` where the whole sum nearly cancels, as past the end of

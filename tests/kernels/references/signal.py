@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from numpy.polynomial.polynomial import polyvander
 
 from references.cases import Pair, filled, kernel_case, samples
@@ -16,6 +17,7 @@ from rtradar.kernels.nufft import (
     BetweenAnchors,
     add_anchored_tones,
     fill_anchors,
+    sum_by_nufft,
 )
 from rtradar.kernels.tone_sum import Tones, add_tones, tone_tables
 
@@ -76,6 +78,12 @@ _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])
 
 
 # Of 26 chirps, two threads have a block each.
+@kernel_case(sum_by_nufft, 1e-6)
+def _nufft() -> Pair:
+    tones, out = _tones(3, 315, 2, legvander), (np.empty((2, 3, 256), dtype=np.complex64),)
+    return filled(sum_by_nufft, tones, out=out), tone_sum_reference(tones, 256, legvander)
+
+
 @kernel_case(add_anchored_tones, 2e-3, chirps_a_run=(1, 3))
 def _anchored(chirps_a_run: int) -> Pair:
     rng, shape, chirps = np.random.default_rng(0), (6, 2, 2, 63), np.arange(26) // chirps_a_run

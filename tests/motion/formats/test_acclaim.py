@@ -79,6 +79,8 @@ def test_bad_amc_says_where(
         ("length 5", "length -5", ["two.asf, line 26", "negative"]),
         ("length 0.45", "length 0", ["two.asf, line 6", "positive"]),
         ("axis 0 0 90 XYZ", "axis 0 0 90 XYY", ["two.asf, line 27", "permutation"]),
+        ("order TX", "order tx TX", ["two.asf", "each once and all of them"]),
+        ("name second\n", "", ["two.asf", "a bone without a name ends here"]),
         (":hierarchy", ":nothing", ["two.asf", "cut off"]),
     ],
 )

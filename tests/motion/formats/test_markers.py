@@ -6,13 +6,54 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.markers import rigid_motion
+from rtradar.motion.formats.markers import (
+    CENTRES,
+    NEEDED,
+    SHANK_M,
+    joint_centres,
+    rigid_motion,
+)
 from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton import NODE_PARENT, NODES
 
 FRAMES = 200
 PARENTS = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
 STILL = np.tile(np.eye(3), (FRAMES, 1, 1))
+
+
+# A person at the origin who looks along +x, forearms forward, thumbs up [m]; the left side of what
+# is on both.
+STANDING = {
+    "FHD": (0.10, 0.07, 1.62), "BHD": (-0.08, 0.05, 1.62), "C7": (-0.05, 0.0, 1.45),
+    "CLAV": (0.05, 0.0, 1.45), "T10": (-0.10, 0.0, 1.15), "STRN": (0.10, 0.0, 1.15),
+    "SHO": (0.0, 0.2, 1.42), "ELB": (0.0, 0.2, 1.12), "WRA": (0.28, 0.2, 1.16),
+    "WRB": (0.28, 0.2, 1.08), "FIN": (0.37, 0.2, 1.12), "FWT": (0.12, 0.12, 0.95),
+    "BWT": (-0.12, 0.08, 0.95), "KNE": (0.0, 0.12, 0.08 + SHANK_M), "ANK": (0.0, 0.12, 0.08),
+    "TOE": (0.16, 0.12, 0.08),
+}  # fmt: skip
+
+FOREARM = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+"""Forward, left and up of the forearm in this pose: the thumb is up, the elbow behind."""
+
+
+def place(name: str) -> np.ndarray:
+    """A marker of the standing person."""
+    if name in STANDING:
+        return np.array(STANDING[name])
+    return np.array(STANDING[name[1:]]) * [1, 1 if name[0] == "L" else -1, 1]
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_joints_stand_where_the_table_puts_them(unit: float) -> None:
+    centres, *_ = joint_centres({name: unit * place(name)[None] for name in NEEDED})
+    for number, node in enumerate(NODES):
+        side = {"l_": "L", "r_": "R"}.get(node[:2], "")
+        centre = CENTRES[node[2:] if side else node]
+        forward, left, up = centre.offset_m
+        axes = FOREARM if centre.segment == "forearm" else np.eye(3)
+        offset = np.array([forward, -left if side == "R" else left, up]) @ axes
+        about = np.mean([place(name.replace("@", side)) for name in centre.markers], axis=0)
+        np.testing.assert_allclose(centres[0, number], unit * (about + offset), atol=1e-9 * unit)
 
 
 def swinging() -> np.ndarray:

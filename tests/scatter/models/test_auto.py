@@ -164,7 +164,7 @@ def _field(model: Any, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
     return (np.conj(value) * np.exp(-2j * np.pi * at * echoes.length / 299_792_458.0)).sum(axis=-1)
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 @pytest.mark.parametrize("name", ["tolerance_db", "tolerance_complex"])
 def test_bad_tolerances_are_refused_in_one_line(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"{name} = ") as caught:
