@@ -24,6 +24,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.angles import Steering
 from rtradar.process.window_functions import taylor
 from rtradar.radar import Radar
+from rtradar.system.threads import one_blas_thread, thread_map
 
 _Reals = NDArray[np.float64]
 _Complex = NDArray[np.complexfloating]
@@ -220,10 +221,10 @@ def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
 # -- arrays of antennas anywhere -------------------------------------------------------------------
 
 _MOST_BEAMS = 2**18  # of the grid
-_REFINEMENTS = 3  # of the highest beam, for what one sine shifts the other does
-_PHASES_AT_ONCE = 2**20  # of all channels, toward all sines of the cuts of some cells
+_WEIGHTS_AT_ONCE = 2**20  # of all channels, toward all sines of the cuts of some cells
 
 
+@one_blas_thread()
 def cuts_through_highest(
     cells: _Complex, bins: NDArray[np.int64] | None, radar: Radar, sines: _Reals, walk: int
 ) -> tuple[NDArray[np.float32] | None, NDArray[np.float32] | None]:
@@ -235,33 +236,31 @@ def cuts_through_highest(
     """
     limits = np.sin(np.radians([radar.max_azimuth_deg, radar.max_elevation_deg]))
     y, z = (_grid(radar, axis, limit) for axis, limit in enumerate(limits.tolist()))
-    grid = np.stack([own.ravel() for own in np.meshgrid(y, z, indexing="ij")], axis=1)
-    if len(grid) > _MOST_BEAMS:
+    if len(y) * len(z) > _MOST_BEAMS:
         raise InputError(
-            f"angle: radar '{radar.name}' has an array whose {len(grid)} beams are too many to "
-            "keep; bring its antennas nearer to each other"
+            f"angle: radar '{radar.name}' has an array whose {len(y) * len(z)} beams are too many "
+            "to keep; bring its antennas nearer to each other"
         )
-    out = np.zeros((2, len(cells), len(sines)), np.float32)
-    axes = np.flatnonzero(radar.measures).tolist()
-    at_once = max(1, _PHASES_AT_ONCE // (len(sines) * radar.n_channels))
-    order = axes * _REFINEMENTS if len(axes) > 1 else axes
-    used, which = np.unique(np.zeros(len(cells)) if bins is None else bins, return_inverse=True)
-    for number, range_bin in enumerate(used.tolist()):
-        range_m = None if bins is None else range_bin * radar.range_bin_m
-        same = np.flatnonzero(which == number)
-        for first in range(0, len(same), at_once):
-            some = same[first : first + at_once]
-            highest = _power(cells[some], grid[None], range_m, radar, walk).argmax(axis=1)
-            at = grid[highest]
-            for axis in order:
-                cut = np.repeat(at[:, None], len(sines), axis=1)
-                cut[..., axis] = sines
-                power = _power(cells[some], cut, range_m, radar, walk)
-                power[:, np.abs(sines) > limits[axis] + 1e-12] = 0
-                out[axis, some] = power
-                at[:, axis] = refine(sines, power, power.argmax(axis=1)[:, None])[0][:, 0]
+    range_m = None if bins is None else np.asarray(bins * radar.range_bin_m, np.float64)
+    at = _highest(cells, range_m, radar, (y, z), walk)
+    at_once = max(1, _WEIGHTS_AT_ONCE // (len(sines) * radar.n_channels))
+
+    def cut(axis: int) -> NDArray[np.float32]:
+        power = np.empty((len(cells), len(sines)), np.float32)
+
+        def fill(first: int) -> None:
+            some = slice(first, first + at_once)
+            toward = np.repeat(at[some, None], len(sines), axis=1)
+            toward[..., axis] = sines
+            own = None if range_m is None else range_m[some]
+            power[some] = _power(cells[some], toward, own, radar, walk)
+
+        thread_map(fill, range(0, len(cells), at_once))
+        power[:, np.abs(sines) > limits[axis] + 1e-12] = 0
+        return power
+
     azimuth, elevation = radar.measures
-    return out[0] if azimuth else None, out[1] if elevation else None
+    return cut(0) if azimuth else None, cut(1) if elevation else None
 
 
 def _grid(radar: Radar, axis: int, largest: float) -> _Reals:
@@ -273,37 +272,122 @@ def _grid(radar: Radar, axis: int, largest: float) -> _Reals:
     return np.linspace(-largest, largest, 2 * half + 1)
 
 
+def _highest(
+    cells: _Complex, range_m: _Reals | None, radar: Radar, axes: tuple[_Reals, _Reals], walk: int
+) -> _Reals:
+    """Sines (cell, 2) of the highest beam of each cell, refined between those of the grid.
+
+    It is the vertex of the paraboloid through the logarithms of the power of nine beams, a step of
+    the grid apart and then a quarter of it. An array that is no rectangle has tilted beams, where
+    what one sine shifts the other does, too.
+    """
+    grid = np.stack([own.ravel() for own in np.meshgrid(*axes, indexing="ij")], axis=1)
+    at = np.empty((len(cells), 2))
+    at_once = max(1, _WEIGHTS_AT_ONCE // (len(grid) * radar.n_tx))
+    ranges = np.zeros(len(cells)) if range_m is None else range_m
+    pieces = [
+        same[first : first + at_once]
+        for same in (np.flatnonzero(ranges == own) for own in np.unique(ranges))
+        for first in range(0, len(same), at_once)
+    ]
+
+    def find(number: int) -> None:
+        some = pieces[number]
+        own = None if range_m is None else range_m[some[:1]]
+        at[some] = grid[_power(cells[some], grid[None], own, radar, walk).argmax(axis=1)]
+
+    thread_map(find, range(len(pieces)))
+    largest = np.array([own[-1] for own in axes])
+    steps = np.array([np.ptp(own[:2]) for own in axes])
+    nine = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(9, 2)
+    for step in (steps, steps / 4):
+        around = _power(cells, at[:, None] + nine * step, range_m, radar, walk)
+        at = np.clip(at + _vertices(around.reshape(-1, 3, 3)) * step, -largest, largest)
+    return at
+
+
+def _vertices(power: _Reals) -> _Reals:
+    """Places (cell, 2) of maxima within power (cell, 3, 3), in steps from the middle, which is one.
+
+    They stay in the middle along an axis beside which there is no power.
+    """
+    least = np.finfo(np.float32).tiny
+    height = np.log(np.maximum(power, least))
+    middle = height[:, 1, 1, None]
+    before = np.stack([height[:, 0, 1], height[:, 1, 0]], axis=1)
+    after = np.stack([height[:, 2, 1], height[:, 1, 2]], axis=1)
+    corners = height[:, ::2, ::2]
+    bend = before - 2 * middle + after
+    inside = (bend < 0) & (np.minimum(before, after) > math.log(least) + 1)
+    bend = np.where(inside, bend, -1.0)
+    slope = np.where(inside, (after - before) / 2, 0.0)
+    twist = (corners[:, 0, 0] + corners[:, 1, 1] - corners[:, 0, 1] - corners[:, 1, 0]) / 4
+    whole = inside.all(axis=1) & (corners.min(axis=(1, 2)) > math.log(least) + 1)
+    twist = np.where(whole & (twist**2 < bend.prod(axis=1)), twist, 0.0)[:, None]
+    shift = (twist * slope[:, ::-1] - bend[:, ::-1] * slope) / (
+        bend.prod(axis=1, keepdims=True) - twist**2
+    )
+    return np.asarray(np.clip(shift, -1, 1))
+
+
 def _power(
-    cells: _Complex, sines: _Reals, range_m: float | None, radar: Radar, walk: int
+    cells: _Complex, sines: _Reals, range_m: _Reals | None, radar: Radar, walk: int
 ) -> _Reals:
     """Power (cell, direction) of beams toward ``sines (cell or 1, direction, 2)``, u and w.
 
-    It is 0 where both sines together are no direction.
+    ``range_m (cell or 1,)`` are the ranges; without them waves are plane. It is 0 where both sines
+    together are no direction.
     """
+    tx, rx = (np.arange(radar.n_tx).repeat(radar.n_rx), radar.rx_of_tx.ravel())
+    carrier = radar.centre_frequency_hz + radar.tx_offset_hz
+    # A receiver has one phase for each carrier, of which there are several under FDM alone.
+    used, which = np.unique(np.stack([rx, carrier[tx]]), axis=1, return_inverse=True)
+    rx = used[0].astype(np.int64)
     ahead = 1 - (sines**2).sum(axis=2)
     direction = np.concatenate([np.sqrt(np.maximum(ahead, 0))[..., None], sines], axis=2)
-    carrier = radar.centre_frequency_hz + np.repeat(radar.tx_offset_hz, radar.n_rx)
-    weights, offsets = phases_of(
-        _excess_m(direction, range_m, radar), carrier, radar, 0 if range_m is None else walk
-    )
-    beams = np.zeros((len(cells), sines.shape[1]), np.complex128)
-    for offset in np.unique(offsets).tolist():
-        read = (weights * (offsets == offset)).swapaxes(1, 2)
-        # Where all cells share their directions, it is one product of two matrices.
-        own = cells[:, walk + offset].reshape(len(sines), -1, radar.n_channels)
-        beams += (own @ read).reshape(beams.shape)
-    return np.asarray(np.abs(beams / radar.n_channels) ** 2 * (ahead >= 0))
+    there = _excess_m(direction, radar.tx_m, range_m)
+    back = _excess_m(direction, radar.rx_m[rx], range_m)
+    of_tx, of_rx = _phasors(there, carrier), _phasors(back, used[1])
+    values = np.zeros((len(cells), radar.n_tx, len(rx)), np.complex64)
+    values[:, tx, which] = cells[:, walk]
+    # First the receivers of each Tx are added, then all Tx. Where cells share their directions, it
+    # is one product of two matrices.
+    part = values.reshape(len(sines), -1, len(rx)) @ of_rx.swapaxes(1, 2)
+    part = part.reshape(len(cells), radar.n_tx, -1)
+    beams = (part * of_tx.swapaxes(1, 2)).sum(axis=1)
+    if walk and range_m is not None:
+        # Elements whose path ends in another range bin are read there. From one range bin to the
+        # next the phase also turns by half a turn, because the window function is even about the
+        # middle of the chirp.
+        farthest = np.abs(there).max(axis=2) + np.abs(back).max(axis=2)
+        far = farthest.max(axis=0) > radar.range_bin_m
+        weights = of_tx[:, far][..., tx] * of_rx[:, far][..., which]
+        excess = there[:, far][..., tx] + back[:, far][..., which]
+        offsets = np.rint(excess / (2 * radar.range_bin_m))
+        own = cells.reshape(len(sines), -1, *cells.shape[1:])
+        beams[:, far] = 0
+        for offset in range(-walk, walk + 1):
+            read = weights * ((offsets == offset) * np.float32((-1) ** offset))
+            added = own[:, :, walk + offset] @ read.swapaxes(1, 2)
+            beams[:, far] += added.reshape(len(cells), -1)
+    power = np.abs(beams / radar.n_channels) ** 2
+    return np.asarray(power * (ahead >= 0))
 
 
-def _excess_m(direction: _Reals, range_m: float | None, radar: Radar) -> _Reals:
-    """Path over each channel less twice the range (..., channel) [m]; plane without range."""
-    tx = np.repeat(radar.tx_m, radar.n_rx, axis=0)
-    rx = radar.rx_m[radar.rx_of_tx].reshape(-1, 3)
+def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | None) -> _Reals:
+    """Path (..., place) from a point to each place less the range [m]; plane without range."""
+    along = direction @ places_m.T
     if range_m is None:
-        return np.asarray(-direction @ (tx + rx).T)
-    point = range_m * direction[..., None, :]
-    there, back = (np.linalg.norm(point - places, axis=-1) for places in (tx, rx))
-    return np.asarray(there + back - 2 * range_m)
+        return np.asarray(-along)
+    own = range_m[:, None, None]
+    return np.asarray(np.sqrt(own**2 - 2 * own * along + (places_m**2).sum(axis=1)) - own)
+
+
+def _phasors(excess_m: _Reals, carrier_hz: _Reals) -> NDArray[np.complex64]:
+    """Phases (..., place) that bring places into step, each at its carrier."""
+    turns = excess_m * (carrier_hz / SPEED_OF_LIGHT_MPS)
+    angle = (-2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
+    return np.asarray(np.cos(angle) + np.complex64(1j) * np.sin(angle))
 
 
 def refine(

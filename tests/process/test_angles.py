@@ -400,3 +400,60 @@ def test_lines_share_the_weights_of_their_beams_only_if_they_have_the_same_eleme
     own = steering(radar, 2, np.arange(radar.samples_per_chirp), "taylor")
     for shared, computed in zip(along_z, own, strict=True):
         np.testing.assert_array_equal(shared, computed)
+
+
+HALF = LOW.wavelength_m / 2
+ANYWHERE = {
+    "tilted": {
+        "tx_positions_m": [(0, 0, 0), (0, 0, HALF)],
+        "rx_positions_m": [(0, k * HALF, k * HALF / 2) for k in range(5)],
+    },
+    "deep": {
+        "tx_positions_m": [(0, 0, 0), (0.01, 4 * HALF, 0), (0, 0, 4 * HALF)],
+        "rx_positions_m": [(0, k * HALF, j * HALF) for k in range(4) for j in range(4)],
+    },
+    "carriers": {
+        "tx_positions_m": [(0, 0, 0), (0, 4 * HALF, 0)],
+        "rx_positions_m": [(0, k * HALF, j * HALF) for k in range(4) for j in range(2)],
+        "multiplexing": "fdm",
+        "carrier_step_hz": 200e6,
+    },
+    "wide": {
+        "tx_positions_m": [(0, 0, 0), (0, 20 * HALF, 0)],
+        "rx_positions_m": [(0, k * HALF, j * 2 * HALF) for k in range(20) for j in range(2)],
+    },
+}
+
+
+@pytest.mark.parametrize("focus", [True, False])
+@pytest.mark.parametrize("array", ANYWHERE)
+def test_antennas_anywhere_add_up_in_the_direction_of_a_point(array: str, focus: bool) -> None:
+    """Each channel has the phase of its own path, in the range bin in which that path ends."""
+    radar = Radar(name=array, **ANYWHERE[array])
+    walk, bins = range_walk(radar), np.array([20, 60, 61, 61])
+    sines = np.array([(0.3, -0.2), (-0.55, 0.15), (0.0, 0.0), (0.6, 0.25)])
+    direction = np.column_stack([np.sqrt(1 - (sines**2).sum(axis=1)), sines])
+    range_m = bins * radar.range_bin_m
+    values = np.zeros((len(bins), 2 * walk + 1, radar.n_channels), np.complex64)
+    for cell, (away, toward) in enumerate(zip(range_m, direction, strict=True)):
+        for tx in range(radar.n_tx):
+            for rx in range(radar.n_rx):
+                places = radar.tx_m[tx], radar.rx_m[radar.rx_of_tx[tx, rx]]
+                path = sum(np.linalg.norm(away * toward - place) for place in places)
+                if not focus:
+                    path = 2 * away - sum(place @ toward for place in places)
+                offset = round((path - 2 * away) / (2 * radar.range_bin_m)) if focus else 0
+                frequency = radar.centre_frequency_hz + radar.tx_offset_hz[tx]
+                turns = path * frequency / C - 2 * away * radar.centre_frequency_hz / C - offset / 2
+                channel = tx * radar.n_rx + rx
+                values[cell, walk + offset, channel] = np.exp(2j * np.pi * turns)
+    if array == "wide" and focus:
+        assert (values[:, walk] == 0).any()  # some echoes end in other bins
+    seen = angle_spectra(values, radar, range_m, np.zeros(len(bins)), focus=focus)
+    for axis, power in enumerate((seen.y, seen.z)):
+        assert power is not None
+        peaks = find_peaks(seen.sines, power)
+        beam = radar.wavelength_m / np.ptp(radar.virtual_m[:, 1 + axis])
+        np.testing.assert_allclose(peaks.sine[:, 0], sines[:, axis], atol=beam / 20)
+        # Beside the peak channels are read in other bins, where these echoes have nothing.
+        np.testing.assert_allclose(peaks.power[:, 0], 1, atol=0.05)
