@@ -46,7 +46,8 @@ def stream(seed: int, *numbers: int) -> np.random.SeedSequence:
     """
     import numpy as np  # a refusal on the command line does not need it
 
-    seed = check_seed("", seed)
+    if not (type(seed) is int and 0 <= seed <= MOST_SEED):  # each cycle of noise asks for one
+        seed = check_seed("", seed)
     if seed < _WORD:
         return np.random.SeedSequence([seed, *numbers])
     # NumPy would write the words of seed and numbers in a row: 7 + 5 2^32 with 0 would be 7 with 5.
