@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from rtradar.clouds.arrays import ARRAYS, KINDS, attributes
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_files import UNKNOWN, read_sample, read_shape
+from rtradar.clouds.sample_files import ARRAYS, KINDS, UNKNOWN, attributes, read_sample, read_shape
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import check_place

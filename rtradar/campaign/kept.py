@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds.arrays import ARRAYS, KINDS
+from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.writer import axes_of

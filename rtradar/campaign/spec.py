@@ -10,8 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from rtradar.campaign.augmentation import Augmented
-from rtradar.campaign.intervals import Intervals
+from rtradar.campaign.intervals import Augmented, Intervals
 from rtradar.campaign.kept import sizes
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed

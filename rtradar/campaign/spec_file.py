@@ -13,8 +13,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from rtradar.campaign.augmentation import VARIED, Augmented
-from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
+from rtradar.campaign.intervals import INTERVAL_KEYS, VARIED, Augmented, Intervals
 from rtradar.campaign.kept import KEPT
 from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (

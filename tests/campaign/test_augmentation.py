@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.campaign.augmentation import VARIED, Augmented, mirrored, vary
+from rtradar.campaign.intervals import VARIED, Augmented, mirrored, vary
 from rtradar.campaign.samples import make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError

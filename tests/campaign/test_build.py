@@ -19,9 +19,8 @@ from hypothesis import strategies as st
 
 from rtradar import __version__
 from rtradar.campaign import build as building
-from rtradar.campaign.build import build_dataset, make_and_store, missing_of, work
-from rtradar.campaign.cluster import _place_for_kernels as place_for_kernels
-from rtradar.campaign.cluster import dask_client
+from rtradar.campaign.build import _place_for_kernels as place_for_kernels
+from rtradar.campaign.build import build_dataset, dask_client, make_and_store, missing_of, work
 from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.sample_files import sample_path, sweep, write_index
@@ -308,7 +307,7 @@ def test_workers_have_a_place_for_kernels(
 
 
 def test_no_scheduler_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rtradar.campaign.cluster._PATIENCE_S", 0.2)
+    monkeypatch.setattr("rtradar.campaign.build._PATIENCE_S", 0.2)
     with (
         pytest.raises(InputError, match=r"--scheduler tcp://127.0.0.1:1: nothing answers there"),
         dask_client(scheduler="tcp://127.0.0.1:1"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtradar.classify.scores import (
+from rtradar.classify.outcomes import (
     Answers,
     balanced_accuracy,
     best_temperature,

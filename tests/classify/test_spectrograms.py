@@ -9,8 +9,8 @@ import pytest
 import torch
 import xarray as xr
 
+from rtradar.classify.prepare import FASTEST_MPS, stack_spectrograms, varied_spectrograms
 from rtradar.classify.recipes import LEAN, SPECTROGRAM
-from rtradar.classify.spectrograms import FASTEST_MPS, stack_spectrograms, varied_spectrograms
 from rtradar.classify.training import Examples, predict, train_network
 from rtradar.errors import InputError
 

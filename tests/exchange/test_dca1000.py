@@ -16,7 +16,7 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
 from rtradar.exchange import Dca1000Layout, export, open_samples
-from rtradar.exchange.dca1000 import of_radar, pack, unpack, words_of
+from rtradar.exchange.int16_files import of_radar, pack, unpack, words_of
 from rtradar.pipeline.output.map_store import open_maps
 
 RADAR = rt.Radar(

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
+from rtradar import paper
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.paper import AS_PAPER, make, make_paper, paper_warnings
+from rtradar.paper import AS_PAPER, make_paper, paper_warnings
 from rtradar.paper.formulas import radar_figures
-from rtradar.paper.items import TEXTS, load_items
+from rtradar.paper.items import TEXTS, Sources, load_items
 from rtradar.paper.learning import learning_figures
-from rtradar.paper.sources import Sources
 
 Parts = dict[str, Callable[[Sources], dict[str, Any]]]
 
@@ -46,7 +46,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     parts = {"radar": radar_figures, "learning": learning_figures}
     monkeypatch.setattr(
-        "rtradar.paper.make._parts", lambda: {name: part(name, one) for name, one in parts.items()}
+        "rtradar.paper._parts", lambda: {name: part(name, one) for name, one in parts.items()}
     )
     return ran
 
@@ -72,7 +72,7 @@ def test_page_and_numbers_have_the_items_that_are_measured(
 def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(
     tmp_path: Path,
 ) -> None:
-    folder = Path(make.__file__).parent
+    folder = Path(paper.__file__).parent
     code = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
     asked = Asked()
     assert all(item.filled(asked) is not None for item in load_items())
@@ -87,14 +87,14 @@ def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(
 def test_a_command_that_was_stopped_goes_on(
     counted: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parts: Parts = make._parts()
+    parts: Parts = paper._parts()
 
     def stop(sources: Sources) -> dict[str, Any]:
         (sources.out / "table-4.png").touch()  # a picture that nobody has listed yet
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("rtradar.paper.make._parts", lambda: {**parts, "learning": stop})
+        patch.setattr("rtradar.paper._parts", lambda: {**parts, "learning": stop})
         with pytest.raises(KeyboardInterrupt):
             make_paper(tmp_path, quick=True)
     assert counted == ["radar"]

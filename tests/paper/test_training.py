@@ -10,8 +10,8 @@ import pytest
 from rtradar.classify import study
 from rtradar.classify.recipes import LEAN, PAPER
 from rtradar.paper import learning, training
+from rtradar.paper.items import Sources
 from rtradar.paper.learning import learning_figures
-from rtradar.paper.sources import Sources
 
 pytest.importorskip("dask")
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rtradar.recognition.description import OUTLINE, describe, envelopes, occupancy, outline
+from rtradar.recognition.recogniser import OUTLINE, describe, envelopes, occupancy, outline
 
 
 def window(n_points: int, seed: int = 0) -> NDArray[np.float64]:

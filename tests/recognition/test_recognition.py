@@ -16,14 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.classify.weights import arrays_of
+from rtradar.classify.forests import arrays_of
 from rtradar.cli import main
 from rtradar.clouds.files import save_cloud_npz
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.recognition import Recogniser, predict_run
-from rtradar.recognition.description import EDGE_S, WINDOW_S, cut_windows
+from rtradar.recognition.recogniser import EDGE_S, WINDOW_S, cut_windows
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -16,7 +16,7 @@ import sys
 import time
 from pathlib import Path
 
-from rtradar.classify.weights import train_recogniser
+from rtradar.classify.forests import train_recogniser
 from rtradar.clouds.collection import Collection
 from rtradar.radar import Radar
 from rtradar.recognition.recogniser import WEIGHTS
