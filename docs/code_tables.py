@@ -17,7 +17,7 @@ from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
 from rtradar.body import Person
-from rtradar.campaign.intervals import INTERVAL_KEYS, VARIED, Intervals
+from rtradar.campaign.intervals import INTERVAL_KEYS, Augmented, Intervals
 from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS
 from rtradar.campaign.spec_file import RUN_LIMITS
 from rtradar.clouds.sample_files import TABLES as ARRAY_TABLES
@@ -154,7 +154,7 @@ DATA_SET_KEYS = {
             "must be given",
         ),
         **{
-            key: (f"range [least, most] of {what}", f"`{list(VARIED[key][0])}`")
+            key: (f"range [least, most] of {what}", f"`{list(getattr(Augmented, key))}`")
             for key, what in (
                 ("tempo", "their tempo, a factor"),
                 ("height", "their height, a factor"),

@@ -39,6 +39,7 @@ from rtradar.errors import CampaignError, InputError
 from rtradar.kernels.jit import check_cache
 from rtradar.system.files import cleanup_on_exit, temporary_folder
 from rtradar.system.output_folder import exclusive_lock
+from rtradar.system.templates import templates
 from rtradar.system.threads import thread_environment, thread_limit
 
 if TYPE_CHECKING:
@@ -166,7 +167,6 @@ def _can_be_written(folder: str) -> bool:
     return True
 
 
-_MAX_SHOWN = 8  # values of each property in a report
 _QUEUED = 2  # submitted samples for each worker: one in progress and the next; others wait here
 _AT_LEAST = 8  # smallest number of submitted samples, because workers may join later
 _one_at_a_time = threading.Lock()
@@ -416,37 +416,5 @@ def in_words(report: Mapping[str, Any]) -> str:
     -------
     str
     """
-    lines = [f"{report['samples']} samples"]
-    for key, counted in report["by"].items():
-        shown = [f"{name} {count}" for name, count in list(counted.items())[:_MAX_SHOWN]]
-        more = [f"and {len(counted) - _MAX_SHOWN} more"] if len(counted) > _MAX_SHOWN else []
-        lines.append(f"  by {key}: {', '.join(shown + more)}")
-    workers = f"{report['workers']} worker{'' if report['workers'] == 1 else 's'}"
-    damaged = f", {report['damaged']} were damaged" if report["damaged"] else ""
-    there = f"{report['whole']} were there{damaged}"
-    if report["made"]:
-        there += (
-            f", {report['made']} made in {_time(report['wall_s'])} by {workers} "
-            f"({report['work_s']:.1f} s and {_size(report['bytes'] / report['made'])} each)"
-        )
-    lines.append(there)
-    if "estimated_s" in report:
-        lines.append(
-            f"{report['missing']} are missing: about {_time(report['estimated_s'])} on {workers}, "
-            f"and {_size(report['estimated_bytes'])}"
-            if report["missing"]
-            else "none is missing"
-        )
-    return "\n".join(lines)
-
-
-def _time(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
-
-
-def _size(size: float) -> str:
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
+    template = templates(Path(__file__).parent, escaped=False).get_template("built.txt")
+    return template.render(report=report).rstrip("\n")

@@ -123,7 +123,7 @@ class Others:
     y_m: _Place = (-1.5, 1.5)
 
     def __post_init__(self) -> None:
-        check_fields(self, "[others] ")
+        check_fields(self)
 
 
 class Spec(NamedTuple):

@@ -22,7 +22,7 @@ if missing := [
     )
 
 if TYPE_CHECKING:
-    from rtradar.classify.forests import evaluate_baselines
+    from rtradar.classify.baselines import evaluate_baselines
     from rtradar.classify.outcomes import Outcome
     from rtradar.classify.pointnet import PointNet
     from rtradar.classify.prepare import stack_clouds, stack_spectrograms
@@ -50,7 +50,7 @@ __all__ = [
     "train_network",
     "train_study",
 ]
-_MODULES = "recipes splits outcomes prepare pointnet training study forests"
+_MODULES = "recipes splits outcomes prepare pointnet training study baselines"
 
 
 def __getattr__(name: str) -> Any:

@@ -352,23 +352,3 @@ def calibration_error(answers: Answers) -> float:
         for number in range(_BINS)
     ]
     return sum(gaps) / len(right)
-
-
-def with_temperature(probabilities: NDArray[np.float64], temperature: float) -> NDArray[np.float64]:
-    """Divide the logarithms of probabilities (answer, class) by a temperature."""
-    logits = np.log(np.maximum(probabilities, 1e-12)) / temperature
-    scaled = np.exp(logits - logits.max(axis=1, keepdims=True))
-    return np.asarray(scaled / scaled.sum(axis=1, keepdims=True))
-
-
-def best_temperature(answers: Answers) -> float:
-    """Return the temperature at which the mean logarithm of the true probabilities is largest."""
-    from scipy.optimize import minimize_scalar
-
-    rows = np.arange(len(answers.truth))
-
-    def loss(log_temperature: float) -> float:
-        scaled = with_temperature(answers.probabilities, float(np.exp(log_temperature)))
-        return -float(np.mean(np.log(np.maximum(scaled[rows, answers.truth], 1e-12))))
-
-    return float(np.exp(minimize_scalar(loss, bounds=(-3.0, 3.0), method="bounded").x))

@@ -93,7 +93,7 @@ def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     studies = [load_study(folder) for folder in options.trained]
     baselines = {}
     if options.baselines:
-        from rtradar.classify.forests import evaluate_baselines
+        from rtradar.classify.baselines import evaluate_baselines
         from rtradar.clouds.collection import Collection
 
         baselines = evaluate_baselines(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -16,6 +17,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from rtradar.errors import ValidityWarning
 from rtradar.paper.items import AS_PAPER, Item, Sources, find_recordings, load_items, paper_warnings
 from rtradar.system.files import atomic_file, read_json
 from rtradar.system.output_folder import OutputFiles, resumable_folder
@@ -92,7 +94,9 @@ def make_paper(
                     continue
                 bar.set_description(name)
                 began, spent = time.perf_counter(), time.process_time()
-                figures = measure(sources)
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", ValidityWarning)
+                    figures = measure(sources)
                 took = time.perf_counter() - began, time.process_time() - spent
                 kept[name] = {"figures": figures, "wall_s": took[0], "cpu_s": took[1]}
                 content = _write(folder, settings, kept)

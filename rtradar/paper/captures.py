@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import platform
 import time
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -23,7 +22,7 @@ from skimage.measure import marching_cubes
 from rtradar.bench.runs import measure_baseline
 from rtradar.clouds.rdt import RdtCloud
 from rtradar.clouds.spatial import SpatialCloud
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError
 from rtradar.paper.formulas import slow_chirps
 from rtradar.paper.items import ACTIVITIES, Sources
 from rtradar.pipeline import Result, run, simulate
@@ -62,14 +61,12 @@ def activity_figures(sources: Sources) -> dict[str, Any]:
     radar = Radar.preset("paper-12ghz")
     results: dict[str, Result] = {}
     cpu_s = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ValidityWarning)
-        for name, activity in ACTIVITIES.items():
-            motion = sources.motion(name)
-            duration_s = min(activity.shown_s, motion.duration_s)
-            began_s = time.process_time()
-            results[name] = run(motion, radar, duration_s=duration_s)
-            cpu_s.append(time.process_time() - began_s)
+    for name, activity in ACTIVITIES.items():
+        motion = sources.motion(name)
+        duration_s = min(activity.shown_s, motion.duration_s)
+        began_s = time.process_time()
+        results[name] = run(motion, radar, duration_s=duration_s)
+        cpu_s.append(time.process_time() - began_s)
     flat: dict[str, Callable[[Result, Axes], Any]] = {
         "figure-4": lambda result, axes: result.plot.range_time(axes),
         "figure-5": lambda result, axes: result.plot.range_doppler(ax=axes),
@@ -99,10 +96,15 @@ def _side_by_side(
     panels = figure.subplots(2, 2, subplot_kw={"projection": projection})
     for (activity, result), axes in zip(results.items(), panels.flat, strict=True):
         draw(result, axes)
-        for text in list(axes.texts):
-            text.remove()
-        dress(axes, title=ACTIVITIES[activity].title, grid=projection is not None)
+        _dressed(axes, ACTIVITIES[activity].title, grid=projection is not None)
     save_figure(figure, sources.out / f"{name}.png")
+
+
+def _dressed(axes: Any, title: str, *, grid: bool) -> None:
+    """Give a panel its name in the place of all other texts."""
+    for text in list(axes.texts):
+        text.remove()
+    dress(axes, title=title, grid=grid)
 
 
 def _draw_first_points(result: Result, axes: Any) -> None:
@@ -238,11 +240,9 @@ def detection_figures(sources: Sources) -> dict[str, Any]:
         Figures by their names.
     """
     radar = Radar.preset("paper-12ghz")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ValidityWarning)
-        duration_s = radar.frame_duration_s + radar.cycle_duration_s
-        capture = simulate(sources.motion("jumping_jack"), radar, duration_s=duration_s)
-        samples = capture.samples.values[: radar.chirps_per_frame]
+    duration_s = radar.frame_duration_s + radar.cycle_duration_s
+    capture = simulate(sources.motion("jumping_jack"), radar, duration_s=duration_s)
+    samples = capture.samples.values[: radar.chirps_per_frame]
     shape = -1, radar.n_tx, radar.n_rx, radar.samples_per_chirp
     cube = range_spectrum(samples, radar).reshape(shape)
     found: dict[str, Any] = {}
@@ -322,18 +322,14 @@ def cost_figures(sources: Sources) -> dict[str, Any]:
     activity = ACTIVITIES["jumping_jack"]
     longest_s = min(activity.shown_s, motion.duration_s)
     duration_s = min(_QUICK_S, longest_s) if sources.quick else longest_s
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ValidityWarning)
-        summary = run(motion, Radar.preset("paper-77ghz"), duration_s=duration_s).summary
-        figure = new_figure(3.8, width_in=9.0)
-        for axes, name in zip(figure.subplots(1, 2), ("60", "77"), strict=True):
-            radar = slow_chirps(name)
-            aliased = run(motion, radar, fidelity="analytic", duration_s=longest_s)
-            aliased.plot.spectrogram(axes)
-            for text in list(axes.texts):
-                text.remove()
-            dress(axes, title=f"{activity.title}, {radar.name}", grid=False)
-        save_figure(figure, sources.out / "number-60-77ghz.png")
+    summary = run(motion, Radar.preset("paper-77ghz"), duration_s=duration_s).summary
+    figure = new_figure(3.8, width_in=9.0)
+    for axes, name in zip(figure.subplots(1, 2), ("60", "77"), strict=True):
+        radar = slow_chirps(name)
+        aliased = run(motion, radar, fidelity="analytic", duration_s=longest_s)
+        aliased.plot.spectrogram(axes)
+        _dressed(axes, f"{activity.title}, {radar.name}", grid=False)
+    save_figure(figure, sources.out / "number-60-77ghz.png")
     return {
         "machine": f"{os.cpu_count()} cores, {platform.machine()}",
         "numpy_frame_s": frame_s,

@@ -1,7 +1,7 @@
 """Recognition of activities with weights that come with the package; NumPy alone runs them.
 
-They have learnt from synthetic actors only. `rtradar.classify` trains others, and exports such
-weights. What a person does in a run is recognised in windows of its cloud, and averaged.
+They have learnt from synthetic actors only (``validation/measurements/shipped_weights.py``). What a
+person does in a run is recognised in windows of its cloud, and averaged.
 """
 
 from __future__ import annotations

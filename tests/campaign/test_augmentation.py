@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.campaign.intervals import VARIED, Augmented, mirrored, vary
+from rtradar.campaign.intervals import Augmented, mirrored, vary
 from rtradar.campaign.samples import make_sample, plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
@@ -47,7 +47,7 @@ def test_tempo_height_build_and_drift_are_those_that_are_said() -> None:
 
 
 def test_copies_never_reach_beyond_the_recording() -> None:
-    augmented = Augmented(1, {key: usual for key, (usual, _, _) in VARIED.items()})
+    augmented = Augmented(1)
     for seed in range(200):
         drawn = augmented.draw(seed, 0.4, 1.6, 2.05)
         assert drawn["start_s"] >= 0

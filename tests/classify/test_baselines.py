@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtradar.classify.forests import (
+from rtradar.classify.baselines import (
     BASELINES,
     axis_features,
     evaluate_baselines,

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from rtradar.classify import study
-from rtradar.classify.forests import BASELINES
+from rtradar.classify.baselines import BASELINES
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import LEAN, PAPER, RECIPES, SMALL
 from rtradar.classify.study import load_network, train_study

@@ -8,10 +8,7 @@ import pytest
 from rtradar.classify.outcomes import (
     Answers,
     balanced_accuracy,
-    best_temperature,
-    calibration_error,
     interval,
-    with_temperature,
 )
 
 
@@ -43,17 +40,3 @@ def test_intervals_are_those_of_drawing_people() -> None:
     spread = 1.96 * np.sqrt(0.75 * 0.25 / 16)
     assert low == pytest.approx(0.75 - spread, abs=1 / 16)
     assert high == pytest.approx(0.75 + spread, abs=1 / 16)
-
-
-def test_a_temperature_mends_what_is_too_sure_of_itself() -> None:
-    random = np.random.default_rng(0)
-    honest = random.uniform(0.05, 0.95, 4000)
-    truth = (random.random(4000) > honest).astype(int)
-    names = np.arange(4000).astype(str)
-    both = np.stack([honest, 1 - honest], axis=1)
-    sure = Answers(with_temperature(both, 0.5), truth, names, names)
-    assert calibration_error(sure) > 0.1
-    assert best_temperature(sure) == pytest.approx(2, rel=0.1)
-    mended = sure._replace(probabilities=with_temperature(sure.probabilities, 2.0))
-    assert mended.probabilities == pytest.approx(both)
-    assert calibration_error(mended) < 0.03  # 4000 answers

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.classify.forests import arrays_of
+from rtradar.classify.outcomes import Answers, calibration_error
 from rtradar.cli import main
 from rtradar.clouds.files import save_cloud_npz
 from rtradar.errors import InputError
@@ -24,6 +25,9 @@ from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.recognition import Recogniser, predict_run
 from rtradar.recognition.recogniser import EDGE_S, WINDOW_S, cut_windows
+from rtradar.validate import validation_folder
+
+MAKER = runpy.run_path(str(validation_folder() / "measurements" / "shipped_weights.py"))
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -50,7 +54,7 @@ def test_the_forest_in_numpy_answers_as_scikit_learn_does(tmp_path: Path) -> Non
     forest = ExtraTreesClassifier(20, random_state=0).fit(described, random.integers(3, size=80))
     usual = {"mean": np.zeros(5), "inverse_covariance": np.eye(5), "most": 1.0}
     card = {"classes": ["a", "b", "c"], "temperature": 1.0, "usual": usual}
-    Recogniser(arrays_of(forest), card).save(tmp_path / "weights.npz")
+    Recogniser(MAKER["arrays_of"](forest), card).save(tmp_path / "weights.npz")
     recogniser = Recogniser.load(tmp_path / "weights.npz")
     assert recogniser.classes == ("a", "b", "c")
     asked = random.normal(size=(50, 5)).astype(np.float32)
@@ -137,3 +141,17 @@ def test_damaged_runs_are_one_line(tmp_path: Path, name: str, damage: bytes | No
 def test_no_extra_is_needed() -> None:
     asked = "import sys, rtradar.recognition; sys.exit(bool({'torch', 'sklearn'} & {*sys.modules}))"
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
+
+
+def test_a_temperature_mends_what_is_too_sure_of_itself() -> None:
+    random = np.random.default_rng(0)
+    honest = random.uniform(0.05, 0.95, 4000)
+    truth = (random.random(4000) > honest).astype(int)
+    names = np.arange(4000).astype(str)
+    both = np.stack([honest, 1 - honest], axis=1)
+    sure = Answers(MAKER["with_temperature"](both, 0.5), truth, names, names)
+    assert calibration_error(sure) > 0.1
+    assert MAKER["best_temperature"](sure) == pytest.approx(2, rel=0.1)
+    mended = sure._replace(probabilities=MAKER["with_temperature"](sure.probabilities, 2.0))
+    assert mended.probabilities == pytest.approx(both)
+    assert calibration_error(mended) < 0.03  # 4000 answers

@@ -30,7 +30,7 @@ from sklearn.model_selection import StratifiedKFold, cross_val_score
 from rtradar.campaign.samples import plan_samples
 from rtradar.campaign.spec import Spec
 from rtradar.campaign.spec_file import read_spec
-from rtradar.classify.forests import metadata_features
+from rtradar.classify.baselines import metadata_features
 from rtradar.clouds.collection import Collection
 
 DATA_SETS = Path(__file__).resolve().parents[1]

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from people_data import build
+from shipped_weights import ANSWERS
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier, VotingClassifier
 from sklearn.metrics import confusion_matrix
@@ -25,7 +26,7 @@ from sklearn.neighbors import NearestCentroid
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from rtradar.classify.forests import ANSWERS, axis_features
+from rtradar.classify.baselines import axis_features
 from rtradar.classify.outcomes import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.prepare import stacked_for
 from rtradar.classify.recipes import EDGES, SMALL, SPECTROGRAM, Recipe
