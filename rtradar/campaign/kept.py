@@ -16,12 +16,7 @@ from rtradar.pipeline.output.writer import axes_of
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
-from rtradar.process import (
-    angle_grid,
-    measured_angles,
-    range_azimuth,
-    window_cycles,
-)
+from rtradar.process import angle_grid, measured_angles, range_azimuth, window_cycles
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings

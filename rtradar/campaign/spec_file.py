@@ -72,10 +72,7 @@ _TOP: dict[str, Any] = {
 
 _MANY = Annotated[int, Limits(1, 1_000_000)]
 _DIFFERENT = "it must be a list of different whole numbers, not empty"
-_SEVERAL = Annotated[
-    tuple[int, ...],
-    Limits(0, 1_000_000, _DIFFERENT, (1, 2**31)),
-]
+_SEVERAL = Annotated[tuple[int, ...], Limits(0, 1_000_000, _DIFFERENT, (1, 2**31))]
 _SYNTHETIC: dict[str, Any] = {
     "label": Annotated[str, Limits(allowed=ACTIVITY_NAMES)],
     "count": _MANY,
@@ -231,16 +228,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         check_equal_sizes(keep, lengths, combinations, run.spectrogram_window_s)
     switches = {key: top[key] for key in _SWITCHES if key in top}
     return Spec(
-        run,
-        intervals,
-        combinations,
-        drawn,
-        actors,
-        recordings,
-        keep,
-        others,
-        augmented,
-        **switches,
+        run, intervals, combinations, drawn, actors, recordings, keep, others, augmented, **switches
     )
 
 

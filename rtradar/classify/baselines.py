@@ -18,19 +18,12 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from tqdm import tqdm
 
-from rtradar.classify.outcomes import (
-    Outcome,
-    outcome_of,
-)
+from rtradar.classify.outcomes import Outcome, outcome_of
 from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
-from rtradar.recognition.recogniser import (
-    correlations,
-    course,
-    statistics,
-)
+from rtradar.recognition.recogniser import correlations, course, statistics
 from rtradar.system.seeds import word
 
 METADATA = (

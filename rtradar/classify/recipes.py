@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from rtradar.errors import InputError
@@ -208,45 +210,21 @@ class Recipe:
         return cls(**{names.get(key, key): value for key, value in content.items()})
 
 
-PAPER = Recipe("paper")
+RECIPES: dict[str, Recipe] = {}
+"""Predefined recipes by name, those of ``recipes.toml``."""
+
+for _name, _told in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items():
+    _base = RECIPES.get(_told.pop("base", ""), Recipe(_name))
+    RECIPES[_name] = _base.changed(name=_name, **_told)
+
+PAPER = RECIPES["paper"]
 """Settings of the paper. Unlike the paper, no test cloud is dropped for not filling a batch."""
 
-LEAN = Recipe(
-    "lean",
-    batch=16,
-    epochs=30,
-    rate=2e-3,
-    schedule="one-cycle",
-    weight_decay=1e-2,
-    input_transform=False,
-    feature_transform=False,
-    resample=True,
-    augmentation="physical",
-)
+LEAN = RECIPES["lean"]
 """Our baseline: larger batches at a higher rate, resampled points, augmented clouds, no T-Nets.
 
 T-Nets would mix time with velocity.
 """
 
-SMALL = LEAN.changed(
-    name="small",
-    points=128,
-    batch=32,
-    epochs=50,
-    dropout=0.3,
-    augmentation="wide",
-    network="pooled",
-    edge_s=0.1,
-    label_smoothing=0.05,
-    balanced=True,
-)
-"""A small network, widely varied clouds, few points: what learns from actors for recordings."""
-
-EDGES = SMALL.changed(name="edges", network="edges")
-"""The same with a network that looks at the neighbours of each point."""
-
-SPECTROGRAM = SMALL.changed(name="spectrogram", points=0, network="spectrogram")
-"""Convolutions over the spectrogram, in place of the cloud."""
-
-RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER, SMALL, EDGES, SPECTROGRAM)}
-"""Predefined recipes by name."""
+SMALL, EDGES, SPECTROGRAM = (RECIPES[name] for name in ("small", "edges", "spectrogram"))
+"""A small network, one that looks at the neighbours of each point, and one over spectrograms."""

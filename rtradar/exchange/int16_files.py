@@ -28,14 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.exchange.recording import (
-    IF_AXES,
-    IF_UNIT,
-    ROW_AXES,
-    IfRecording,
-    SampleFile,
-    radar_of,
-)
+from rtradar.exchange.recording import IF_AXES, IF_UNIT, ROW_AXES, IfRecording, SampleFile, radar_of
 from rtradar.radar import Radar
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.real_samples import complex_of_real, real_of_complex

@@ -11,13 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.sample_files import (
-    INDEX,
-    is_whole,
-    sample_path,
-    write_index,
-    write_sample,
-)
+from rtradar.clouds.sample_files import INDEX, is_whole, sample_path, write_index, write_sample
 from rtradar.errors import InputError
 
 SPATIAL = np.arange(12.0).reshape(4, 3)

@@ -247,10 +247,7 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path) 
         "    print(peak_memory_mb() - before)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
     )
     # 46 MB are written and read, in blocks of 0.3 MB; the times of all chirps take 0.7 MB.
     grown = [float(line) for line in done.stdout.split()]

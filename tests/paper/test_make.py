@@ -69,9 +69,7 @@ def test_page_and_numbers_have_the_items_that_are_measured(
     assert {path.name for path in out.iterdir()} <= set(content["files"])
 
 
-def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(
-    tmp_path: Path,
-) -> None:
+def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(tmp_path: Path) -> None:
     folder = Path(paper.__file__).parent
     code = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
     asked = Asked()
