@@ -68,9 +68,8 @@ def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
 
 def test_every_take_meets_every_setting(tmp_path: Path) -> None:
     each = '[each]\nradar = ["paper-12ghz", "paper-77ghz"]\nfidelity = ["analytic", "specular"]\n'
-    found = planned(
-        tmp_path, HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5)
-    )
+    text = HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5)
+    found = planned(tmp_path, text)
     assert len(found) == (5 + 5 + 5) * 4  # 3 s every 0.5 s: five intervals of 1 s
     told = counts(found)
     assert told["label"] == {"kick": 20, "walk": 40}
@@ -81,9 +80,8 @@ def test_every_take_meets_every_setting(tmp_path: Path) -> None:
 
 
 def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
-    found = planned(
-        tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk")
-    )
+    each = '[each]\nfidelity = ["analytic", "specular"]\n'
+    found = planned(tmp_path, HEAD + each + actors(4, "walk"))
     by_take = defaultdict(list)
     for recipe in found:
         by_take[recipe.parameters["recording"]].append(recipe)
@@ -128,21 +126,15 @@ def test_what_is_drawn_is_the_same_tomorrow(tmp_path: Path) -> None:
     (recipe,) = planned(tmp_path, HEAD + actors(1, "walk"))
     # The first eight digits that sha256sum gives for (0, 'walk', 0), and for ('subject', 0).
     assert recipe.parameters["seed"] == recipe.parameters["take"] == 0x94DE7F0B
-    take, subject = (
-        np.random.default_rng([seed, 0]).random(8) for seed in (0x94DE7F0B, 0xC9D761C3)
-    )
-    told = {
-        key: recipe.parameters[key]
-        for key in ("heading_deg", "snr_db", "tempo", "amplitude", "build", "height_m")
-    }
-    assert told == {
-        "heading_deg": round(-30 + 60 * take[0], 4),
-        "snr_db": round(10 + 20 * take[1], 4),
-        "tempo": round(0.8 + 0.45 * take[4], 4),
-        "amplitude": round(0.8 + 0.3 * take[5], 4),
-        "build": round(0.8 + 0.45 * subject[6], 4),
-        "height_m": round(1.55 + 0.4 * subject[7], 4),
-    }
+    seeds = (0x94DE7F0B, 0xC9D761C3)
+    take, subject = (np.random.default_rng([seed, 0]).random(8) for seed in seeds)
+    drawn = {
+        "heading_deg": -30 + 60 * take[0], "snr_db": 10 + 20 * take[1],
+        "tempo": 0.8 + 0.45 * take[4], "amplitude": 0.8 + 0.3 * take[5],
+        "build": 0.8 + 0.45 * subject[6], "height_m": 1.55 + 0.4 * subject[7],
+    }  # fmt: skip
+    told = {key: recipe.parameters[key] for key in drawn}
+    assert told == {key: round(value, 4) for key, value in drawn.items()}
 
 
 def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
@@ -151,9 +143,8 @@ def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
     drawn = "[drawn]\nheading_deg = [7, 7]\noffset_x_m = [0.25, 0.25]\noffset_y_m = [-0.5, -0.5]\n"
     each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\n"
     each += "radar_position_m = [[-3, 0, 1.5]]\n"
-    (recipe,) = planned(
-        tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk")
-    )
+    text = "[windows]\nduration_s = 1.0\n" + drawn + each
+    (recipe,) = planned(tmp_path, text + actors(1, "walk"))
     told = recipe.parameters
     assert (told["heading_deg"], told["snr_db"]) == (7, 3)
     assert told["person_position_m"] == list(recipe.scene.person_position_m) == [1.25, 1.5]
@@ -164,14 +155,11 @@ def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
 
 def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
     found = planned(tmp_path, HEAD + actors(60, "walk", "kick"))
-    for key, (low, high) in {
-        "heading_deg": (-30, 30),
-        "snr_db": (10, 30),
-        "tempo": (0.8, 1.25),
-        "amplitude": (0.8, 1.1),
-        "build": (0.8, 1.25),
-        "height_m": (1.55, 1.95),
-    }.items():
+    ranges = {
+        "heading_deg": (-30, 30), "snr_db": (10, 30), "tempo": (0.8, 1.25),
+        "amplitude": (0.8, 1.1), "build": (0.8, 1.25), "height_m": (1.55, 1.95),
+    }  # fmt: skip
+    for key, (low, high) in ranges.items():
         values = {
             label: np.array([r.parameters[key] for r in found if r.label == label])
             for label in ("walk", "kick")
@@ -181,9 +169,8 @@ def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
             assert drawn.max() <= high
         if key not in ("build", "height_m"):  # which are those of the same three people
             # Means of 60 uniform values each: five standard deviations of their difference.
-            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * (high - low) / np.sqrt(
-                12
-            ) * np.sqrt(2 / 60)
+            spread = (high - low) / np.sqrt(12) * np.sqrt(2 / 60)
+            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * spread
 
 
 def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
@@ -199,9 +186,8 @@ def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
 def test_a_range_that_changes_moves_no_other(tmp_path: Path) -> None:
     (one,) = planned(tmp_path, HEAD + actors(1, "walk"))
     (other,) = planned(tmp_path, HEAD + "tempo = [1.0, 1.0]\n" + actors(1, "walk"))
-    assert {key for key in one.parameters if one.parameters[key] != other.parameters[key]} == {
-        "tempo"
-    }
+    differs = {key for key in one.parameters if one.parameters[key] != other.parameters[key]}
+    assert differs == {"tempo"}
 
 
 def test_parameters_are_plain_json_and_tell_what_a_reader_needs(tmp_path: Path) -> None:
@@ -222,18 +208,16 @@ def test_what_is_sent_of_a_recording_is_what_its_interval_needs(tmp_path: Path) 
 
 def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
     text = recording(tmp_path)
-    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace(
-        "31", "30"
-    )  # 29 / 15 s = 1.93333...
+    # 29 / 15 s = 1.93333...
+    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace("31", "30")
     (tmp_path / "walk.bvh").write_text(third.rstrip().rpartition("\n")[0] + "\n")
     (recipe,) = planned(tmp_path, text)
     packed = recipe.packed().motion
     assert packed is not None
     assert recipe.interval_s == 1.933333
     assert packed.duration_s == pytest.approx(29 / 15, abs=1e-6)
-    (later,) = planned(
-        tmp_path, text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666")
-    )
+    text = text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666")
+    (later,) = planned(tmp_path, text)
     assert later.interval_s == 1.666667
     assert later.packed().motion is not None
 
@@ -257,9 +241,7 @@ def test_settings_of_a_run_reach_the_sample_and_change_ids_where_they_are_not_th
 
 
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"recording 'walk.bvh' from 0 s is given twice; leave one out"
-    ):
+    with pytest.raises(InputError, match=r"'walk.bvh' from 0 s is given twice; leave one out"):
         planned(tmp_path, HEAD + recording(tmp_path) * 2)
 
 
@@ -362,9 +344,8 @@ def test_random_rooms_are_one_for_each_interval(tmp_path: Path) -> None:
     assert len({plan.parameters["scene_digest"] for plan in planned}) == 3
     assert {plan.kind[1] for plan in planned} == {"random"}
     assert all(plan.scene.walls for plan in planned)
-    assert [plan.identity for plan in plan_samples(read_spec(file))] == [
-        plan.identity for plan in planned
-    ]
+    again = plan_samples(read_spec(file))
+    assert [plan.identity for plan in again] == [plan.identity for plan in planned]
     file.write_text(text.replace("[each]", '[each]\nscene = ["living-room"]'))
     with pytest.raises(InputError, match="leave scene and radar_position_m under"):
         read_spec(file)
