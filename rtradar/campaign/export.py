@@ -232,7 +232,7 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
     }
     classes = [(printable(one), k, labels[one]) for k, one in enumerate(collection.classes)]
     template = templates(Path(__file__).parent, escaped=False).get_template("card.md")
-    return template.render(
+    card = template.render(
         samples=len(collection),
         motions=len(counts("recording")),
         people=len(counts("subject").keys() - {UNKNOWN}),
@@ -246,3 +246,4 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
         ranges=ranges,
         limits=limits,
     )
+    return f"{card}\n"

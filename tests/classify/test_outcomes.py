@@ -33,15 +33,9 @@ def outcome(
     truth: list[int], predicted: list[int], trained_on: str = "", tested_on: str = ""
 ) -> Outcome:
     asked = np.array(list(tested_on)) if tested_on else np.full(len(truth), "")
-    return Outcome(
-        "fold 1",
-        trained_on,
-        np.arange(len(truth)),
-        np.array(truth),
-        np.array(predicted),
-        asked,
-        np.array(["a", "b"])[np.arange(len(truth)) % 2],
-    )
+    places = np.arange(len(truth))
+    answers = np.array(truth), np.array(predicted)
+    return Outcome("fold 1", trained_on, places, *answers, asked, np.array(["a", "b"])[places % 2])
 
 
 def test_the_papers_table_has_the_papers_means() -> None:
@@ -81,15 +75,8 @@ def test_every_value_is_asked_by_every_other() -> None:
     assert mean.tolist() == [[0.75, 0.5], [0.0, 1.0]]
     assert spread[0].tolist() == pytest.approx([0.25 * np.sqrt(2), 0.0])
     assert np.isnan(spread[1]).all()
-    assert transfer_table(values, mean, spread).splitlines()[1].split() == [
-        "a",
-        "75.0",
-        "+-",
-        "35.4",
-        "50.0",
-        "+-",
-        "0.0",
-    ]
+    row = transfer_table(values, mean, spread).splitlines()[1]
+    assert row.split() == ["a", "75.0", "+-", "35.4", "50.0", "+-", "0.0"]
 
 
 EPOCH = dict.fromkeys(HISTORY, 0.5)
@@ -109,38 +96,21 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     assert load_outcome(tmp_path / "outcome.json").as_dict() == example().as_dict()
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"truth": [0.5, 1.0]},
-        {"truth": [None, 1]},
-        {"truth": [True, False]},
-        {"truth": [0, 10**30]},
-        {"truth": [[0], [1]]},
-        {"truth": "01"},
-        {"truth": []},
-        {"predicted": [0]},
-        {"predicted": [0, -1]},
-        {"indices": [-1, 1]},
-        {"recordings": [1, 2]},
-        {"recordings": {"a": 1, "b": 2}},
-        {"subjects": []},
-        {"subjects": {}, "probabilities": {}},
-        {"probabilities": []},
-        {"probabilities": [[float("nan"), 0.5], [0.5, 0.5]]},
-        {"probabilities": [[1.5, 0.5], [0.5, 0.5]]},
-        {"name": 3},
-        {"more": 1},
-        {"history": {}},
-        {"history": [[]]},
-        {"history": [{"rate": 1.0}]},
-        {"history": [{**EPOCH, "more": 1.0}]},
-        {"history": [{**EPOCH, "seconds": "1"}]},
-        {"history": [{**EPOCH, "seconds": 10**400}]},
-        {"history": [{**EPOCH, "seconds": None}]},
-    ],
-    ids=repr,
-)
+WRONG: list[dict[str, Any]] = [
+    *({"truth": one} for one in ([0.5, 1.0], [None, 1], [True, False], [0, 10**30], [[0], [1]])),
+    *({"truth": one} for one in ("01", [])),
+    *({"predicted": one} for one in ([0], [0, -1])),
+    {"indices": [-1, 1]}, {"recordings": [1, 2]}, {"recordings": {"a": 1, "b": 2}},
+    {"subjects": []}, {"subjects": {}, "probabilities": {}}, {"probabilities": []},
+    {"probabilities": [[float("nan"), 0.5], [0.5, 0.5]]},
+    {"probabilities": [[1.5, 0.5], [0.5, 0.5]]},
+    {"name": 3}, {"more": 1}, {"history": {}}, {"history": [[]]}, {"history": [{"rate": 1.0}]},
+    {"history": [{**EPOCH, "more": 1.0}]},
+    *({"history": [{**EPOCH, "seconds": one}]} for one in ("1", 10**400, None)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", WRONG, ids=repr)
 def test_what_is_no_outcome_is_damaged(tmp_path: Path, changes: dict[str, Any]) -> None:
     (tmp_path / "outcome.json").write_text(json.dumps(example().as_dict() | changes))
     with pytest.raises(InputError, match="is damaged; remove it"):
@@ -158,10 +128,11 @@ def test_what_is_no_json_of_ours_is_damaged(tmp_path: Path, text: str) -> None:
 
 def test_one_long_name_takes_no_memory_for_all(tmp_path: Path) -> None:
     """NumPy would give each name the room of the longest: 8 GB here, for a file of 0.3 MB."""
-    many = {name: [0] * CLOUDS for name in ("indices", "truth", "predicted")} | {
-        "recordings": [""] * CLOUDS
+    many = {name: [0] * CLOUDS for name in ("indices", "truth", "predicted")}
+    changes = many | {
+        "recordings": [""] * CLOUDS,
+        "tested_on": ["x" * 100_000] + [""] * (CLOUDS - 1),
     }
-    changes = many | {"tested_on": ["x" * 100_000] + [""] * (CLOUDS - 1)}
     (tmp_path / "outcome.json").write_text(json.dumps(example().as_dict() | changes))
     with pytest.raises(InputError, match="is damaged; remove it"):
         load_outcome(tmp_path / "outcome.json")

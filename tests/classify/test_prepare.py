@@ -55,9 +55,8 @@ def test_clouds_of_any_number_of_points_become_one_array(made_up: Callable[..., 
     assert stacked.dtype == np.float32
     for cloud, own in zip(stacked[:2], whole, strict=False):
         from_the_middle = own - [own[:, 0].mean(), 0.0, 0.0]
-        assert {tuple(row) for row in cloud.tolist()} == {
-            tuple(row) for row in from_the_middle.astype(np.float32).tolist()
-        }
+        wanted = from_the_middle.astype(np.float32)
+        assert set(map(tuple, cloud.tolist())) == set(map(tuple, wanted.tolist()))
     assert not stacked[2].any()
     assert np.array_equal(stacked, stack_clouds(clouds).numpy())
 
@@ -89,12 +88,9 @@ def test_physical_variations_are_those_of_another_recording(points: torch.Tensor
     plain = (scaled(points[:1], "physical") * SCALES).expand(400, -1, -1)
     varied = for_training(points[:1].expand(400, -1, -1), "physical", "physical") * SCALES
     shift = varied.mean(dim=1)[:, :2]
-    assert shift.abs().amax(dim=0).tolist() == pytest.approx(
-        [0.1, 0.1], abs=2e-3
-    )  # the largest of 400 draws
-    assert shift.mean(dim=0).tolist() == pytest.approx(
-        [0, 0], abs=0.015
-    )  # five standard deviations
+    # The largest of 400 draws, and five standard deviations.
+    assert shift.abs().amax(dim=0).tolist() == pytest.approx([0.1, 0.1], abs=2e-3)
+    assert shift.mean(dim=0).tolist() == pytest.approx([0, 0], abs=0.015)
     varied[..., :2] -= shift[:, None]
     factor = (varied * plain).sum(dim=1) / (plain**2).sum(dim=1)
     time, distance, velocity = factor.unbind(dim=1)
@@ -107,9 +103,8 @@ def test_physical_variations_are_those_of_another_recording(points: torch.Tensor
     # A velocity is a range over a time.
     torch.testing.assert_close(velocity, distance / time, rtol=0, atol=0.02)
     jitter = (varied - factor[:, None] * plain).std(dim=(0, 1))
-    torch.testing.assert_close(
-        jitter, torch.tensor([0.008, 0.012, 0.035]), rtol=0.02, atol=0
-    )  # 160 000 draws
+    wanted = torch.tensor([0.008, 0.012, 0.035])  # 160 000 draws
+    torch.testing.assert_close(jitter, wanted, rtol=0.02, atol=0)
 
 
 def test_turned_clouds_are_turned_in_the_plane_of_time_and_velocity_and_jittered(
@@ -119,17 +114,15 @@ def test_turned_clouds_are_turned_in_the_plane_of_time_and_velocity_and_jittered
     turned = for_training(points[:1].expand(400, -1, -1), "rotation", "unit-sphere")
     before, after = (torch.complex(cloud[..., 0], cloud[..., 2]) for cloud in (plain, turned))
     turn = (after * before.conj()).sum(dim=1) / (before.abs() ** 2).sum(dim=1)
-    torch.testing.assert_close(
-        turn.abs(), torch.ones(400), rtol=0, atol=0.02
-    )  # jitter; a turn, no stretch
+    # Jitter; a turn, no stretch.
+    torch.testing.assert_close(turn.abs(), torch.ones(400), rtol=0, atol=0.02)
     quadrants = torch.bincount((turn.angle() / (math.pi / 2) + 2).long().clamp(0, 3), minlength=4)
     assert (quadrants - 100).abs().amax() < 45  # five standard deviations of a fair draw
     rest = torch.stack([(after - turn[:, None] * before).real, turned[..., 1] - plain[..., 1]])
     assert rest[1].abs().amax().item() == pytest.approx(0.05, abs=1e-6)
     # 0.02, of which 1.2 % are held at 0.05.
-    torch.testing.assert_close(
-        rest.std(dim=(1, 2)), torch.tensor([0.0199, 0.0199]), rtol=0.02, atol=0
-    )
+    wanted = torch.tensor([0.0199, 0.0199])
+    torch.testing.assert_close(rest.std(dim=(1, 2)), wanted, rtol=0.02, atol=0)
 
 
 def test_without_augmentation_clouds_are_scaled_alone(points: torch.Tensor) -> None:
@@ -174,10 +167,8 @@ def test_a_data_set_without_spectrograms_is_refused(collection: Any) -> None:
 
 
 def test_a_recipe_of_spectrograms_has_no_points_and_no_variation_of_clouds() -> None:
-    for fields, said in (
-        ({"points": 100}, "has no points"),
-        ({"augmentation": "physical"}, "wide"),
-    ):
+    cases = ({"points": 100}, "has no points"), ({"augmentation": "physical"}, "wide")
+    for fields, said in cases:
         with pytest.raises(InputError, match=said):
             SPECTROGRAM.changed(**fields)
     with pytest.raises(InputError, match="at least 1"):

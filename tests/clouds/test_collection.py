@@ -90,12 +90,6 @@ def test_nothing_is_read_of_the_clouds_until_it_is_asked_for(folder: Path) -> No
         found.points(0)
 
 
-def test_a_cloud_may_be_empty(tmp_path: Path) -> None:
-    write_sample(tmp_path, "a", Sample(np.zeros((0, 3)), "walk", {}), np.zeros((0, 3)))
-    write_index(tmp_path, "a")
-    assert Collection(tmp_path).points(0).shape == (0, 3)
-
-
 def test_the_same_sample_is_the_same_bytes(tmp_path: Path) -> None:
     for name, told in (("a", {"x": 1, "y": 2}), ("b", {"y": 2, "x": 1})):
         write_sample(tmp_path, name, sample(1, **told), SPATIAL)

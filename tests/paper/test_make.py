@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -74,9 +74,8 @@ def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(tmp_path: 
     code = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
     asked = Asked()
     assert all(item.filled(asked) is not None for item in load_items())
-    keys = {
-        re.sub(r"\\{[^}]*\\}", ".+", re.escape(key)) for key in re.findall(r'"([^"\s]+)"', code)
-    }
+    words = re.findall(r'"([^"\s]+)"', code)
+    keys = {re.sub(r"\\{[^}]*\\}", ".+", re.escape(key)) for key in words}
     known = re.compile("|".join(key for key in keys if re.search("[a-z]", key)))
     learnt = learning_figures(Sources(tmp_path, quick=True, full=False, recordings={}))
     assert [name for name in asked.names - learnt.keys() if not known.fullmatch(name)] == []
@@ -151,7 +150,5 @@ def test_a_run_as_the_paper_warns_of_each_fault(
     assert main([*words, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().err
     assert all(text in said for text in paper_warnings())
-    parameters: Mapping[str, Any] = json.loads((tmp_path / "summary.json").read_text())[
-        "parameters"
-    ]
+    parameters = json.loads((tmp_path / "summary.json").read_text())["parameters"]
     assert {name: parameters[name] for name in AS_PAPER} == AS_PAPER
