@@ -202,10 +202,9 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 def confusion(outcomes: Sequence[Outcome], n_classes: int) -> NDArray[np.int64]:
     """Count test clouds by true and predicted class, (truth, prediction), over all trainings."""
-    counts = np.zeros((n_classes, n_classes), dtype=np.int64)
-    for outcome in outcomes:
-        np.add.at(counts, (outcome.truth, outcome.predicted), 1)
-    return counts
+    pairs = [n_classes * one.truth + one.predicted for one in outcomes]
+    counts = np.bincount(np.concatenate(pairs), minlength=n_classes**2)
+    return counts.reshape(n_classes, n_classes)
 
 
 def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
@@ -222,22 +221,18 @@ def transfer(
     Returns the values of the column, the mean accuracy (trained_on, tested_on) over the folds, and
     its standard deviation; both are NaN if there is none.
     """
-    values = sorted(
-        {outcome.trained_on for outcome in outcomes}
-        | {str(value) for one in outcomes for value in one.tested_on}
-    )
-    mean, spread = np.full((2, len(values), len(values)), np.nan)
-    for row, trained_on in enumerate(values):
-        for column, tested_on in enumerate(values):
-            fractions = [
-                float(np.mean(one.truth[asked] == one.predicted[asked]))
-                for one in outcomes
-                if one.trained_on == trained_on and (asked := one.tested_on == tested_on).any()
-            ]
-            if fractions:
-                mean[row, column] = np.mean(fractions)
-            if len(fractions) > 1:
-                spread[row, column] = np.std(fractions, ddof=1)
+    import pandas as pd  # slow to import
+
+    rows = [
+        (one.trained_on, str(value), np.mean((one.truth == one.predicted)[one.tested_on == value]))
+        for one in outcomes
+        for value in np.unique(one.tested_on)
+    ]
+    table = pd.DataFrame(rows, columns=["trained", "tested", "right"])
+    values = sorted({*table["trained"], *table["tested"]})
+    found = table.groupby(["trained", "tested"])["right"].agg(["mean", "std"])
+    square = found.reindex(pd.MultiIndex.from_product([values, values])).to_numpy()
+    mean, spread = square.T.reshape(2, len(values), len(values))
     return values, mean, spread
 
 
@@ -347,8 +342,5 @@ def calibration_error(answers: Answers) -> float:
     confidence = answers.probabilities.max(axis=1)
     right = answers.probabilities.argmax(axis=1) == answers.truth
     place = np.minimum((confidence * _BINS).astype(int), _BINS - 1)
-    gaps = [
-        abs(float(np.sum(confidence[place == number] - right[place == number])))
-        for number in range(_BINS)
-    ]
-    return sum(gaps) / len(right)
+    gaps = np.bincount(place, confidence - right, minlength=_BINS)
+    return float(np.abs(gaps).sum() / len(right))

@@ -16,8 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.campaign.intervals import Intervals, strike_times
-from rtradar.campaign.patterns import matching_files
-from rtradar.campaign.spec_file import _spec, read_spec
+from rtradar.campaign.spec_file import _spec, matching_files, read_spec
 from rtradar.errors import InputError, InputErrors
 from rtradar.motion import ACTIVITIES, synthetic_motion
 
