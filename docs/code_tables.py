@@ -17,11 +17,10 @@ from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
 from rtradar.body import Person
-from rtradar.campaign.augmentation import VARIED
-from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
+from rtradar.campaign.intervals import INTERVAL_KEYS, Augmented, Intervals
 from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS
 from rtradar.campaign.spec_file import RUN_LIMITS
-from rtradar.clouds.arrays import TABLES as ARRAY_TABLES
+from rtradar.clouds.sample_files import TABLES as ARRAY_TABLES
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.receiver import Interferer, Receiver
@@ -155,7 +154,7 @@ DATA_SET_KEYS = {
             "must be given",
         ),
         **{
-            key: (f"range [least, most] of {what}", f"`{list(VARIED[key][0])}`")
+            key: (f"range [least, most] of {what}", f"`{list(getattr(Augmented, key))}`")
             for key, what in (
                 ("tempo", "their tempo, a factor"),
                 ("height", "their height, a factor"),

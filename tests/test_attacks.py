@@ -22,7 +22,7 @@ from rtradar.errors import InputError
 from rtradar.exchange import open_samples
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
-from rtradar.recognition.predict import _of_scene
+from rtradar.recognition import _of_scene
 from rtradar.scene.mesh_files import read_mesh
 from rtradar.settings import RunSettings
 from rtradar.system.files import csv_text

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.exchange import Dca1000Layout, export
-from rtradar.exchange.export import open_samples
+from rtradar.exchange import Dca1000Layout, export, open_samples
 from rtradar.process import angle, range_doppler, range_spectrum, ti_oob
 from rtradar.signal import separate
 

@@ -165,12 +165,7 @@ end
 @pytest.fixture(scope="module")
 def imported() -> None:
     """Import what is slow to import before time is measured."""
-    for name in (
-        "torch",
-        "matplotlib.pyplot",
-        "rtradar.pipeline.output.view",
-        "rtradar.campaign",
-    ):
+    for name in ("torch", "matplotlib.pyplot", "rtradar.pipeline.output.view", "rtradar.campaign"):
         pytest.importorskip(name)
 
 
@@ -242,31 +237,19 @@ def folders(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "set" / "x.bvh").write_text("HIERARCHY\n")
     (root / "clouds").mkdir()
     write_index(root / "clouds", ["one"])
-    write_sample(
-        root / "clouds",
-        "one",
-        Sample(np.ones((9, 3)), "walk", {"recording": "r"}),
-        np.zeros((0, 3)),
-    )
+    sample = Sample(np.ones((9, 3)), "walk", {"recording": "r"})
+    write_sample(root / "clouds", "one", sample, np.zeros((0, 3)))
     plan = {
-        "data": [],
-        "clouds": 2,
-        "fingerprint": "",
-        "made": "",
-        "classes": ["kick", "walk"],
-        "split": "folds",
-    }
-    write_plan(
-        root / "trained",
-        plan | {"recipe": RECIPES["lean"].as_dict(), "folds": 2, "seed": 0, "trainings": ["1"]},
-    )
+        "data": [], "clouds": 2, "fingerprint": "", "made": "", "classes": ["kick", "walk"],
+        "split": "folds", "folds": 2, "seed": 0, "trainings": ["1"],
+        "recipe": RECIPES["lean"].as_dict(),
+    }  # fmt: skip
+    write_plan(root / "trained", plan)
     (root / "trained" / "training-01").mkdir()
     column, words = np.array([0, 1]), np.array(["", ""])
     history = [dict.fromkeys(HISTORY, 0.5)]
-    save_outcome(
-        root / "trained" / "training-01" / "outcome.json",
-        Outcome("1", "", column, column, column, words, words, history),
-    )
+    outcome = Outcome("1", "", column, column, column, words, words, history)
+    save_outcome(root / "trained" / "training-01" / "outcome.json", outcome)
     return root
 
 

@@ -17,7 +17,7 @@ from rtradar.classify.recipes import RECIPES
 from rtradar.classify.splits import SCHEMES
 from rtradar.cli.parser import parser
 from rtradar.cli.showing import KINDS as LISTED
-from rtradar.clouds.arrays import KINDS
+from rtradar.clouds.sample_files import KINDS
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import models_that
 from rtradar.scene.moving import _KINDS as MOTIONS

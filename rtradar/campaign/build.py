@@ -1,20 +1,30 @@
-"""Building of a data set on Dask: only samples that are missing or damaged are made."""
+"""Building of a data set on Dask: only samples that are missing or damaged are made.
+
+The cluster on which they are made is one on this machine, or an existing one.
+"""
 
 from __future__ import annotations
 
 import itertools
+import logging
 import math
+import os
+import signal
+import sys
+import tempfile
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from unittest import mock
 
 from tqdm import tqdm
 
 from rtradar import __version__
-from rtradar.campaign.cluster import dask_client, refuse_in_worker
 from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
 from rtradar.campaign.spec_file import check_shard, read_spec, write_made
 from rtradar.clouds.sample_files import (
@@ -26,13 +36,137 @@ from rtradar.clouds.sample_files import (
     write_sample,
 )
 from rtradar.errors import CampaignError, InputError
-from rtradar.system.files import cleanup_on_exit
+from rtradar.kernels.jit import check_cache
+from rtradar.system.files import cleanup_on_exit, temporary_folder
 from rtradar.system.output_folder import exclusive_lock
+from rtradar.system.templates import templates
+from rtradar.system.threads import thread_environment, thread_limit
 
 if TYPE_CHECKING:
     from distributed import Client
 
-_MAX_SHOWN = 8  # values of each property in a report
+_PATIENCE_S = 30  # time within which a scheduler must answer, and its first worker join
+
+
+@contextmanager
+def dask_client(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
+    """Yield a client of a cluster with at least one worker.
+
+    ``workers`` processes on this machine share its cores, or have as many threads each as
+    `RTRADAR_THREADS` says; by default there are as many as cores. ``scheduler`` is the address of
+    an existing one, such as ``tcp://host:8786``. InputError if Dask or any worker is missing.
+    """
+    try:
+        import dask
+        from dask.system import CPU_COUNT
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise InputError(
+            f"data sets are built on Dask ({error}); "
+            "install the extra 'campaign' of rtradar, in a checkout: pip install -e '.[campaign]'"
+        ) from None
+    # Errors are reported once and in one line. Loggers of Dask have levels of their own.
+    for name in logging.root.manager.loggerDict:
+        if name.split(".")[0] in ("asyncio", "distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            why = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(
+                f"--scheduler {scheduler}: nothing answers there ({why}); start one: dask scheduler"
+            ) from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=_PATIENCE_S)
+            except TimeoutError:
+                raise InputError(
+                    f"--scheduler {scheduler} has no workers; start some: dask worker {scheduler}"
+                ) from None
+            yield client
+        return
+    check_cache()
+    count = workers or CPU_COUNT
+    environment = thread_environment(thread_limit() or max(1, CPU_COUNT // count))
+    settings = {
+        # A forked process would inherit the locks of Dr.Jit's threads, but not the threads.
+        "distributed.worker.multiprocessing-method": "spawn",
+        "distributed.nanny.pre-spawn-environ": environment,  # read as linear algebra is loaded
+        "distributed.nanny.environ": environment,
+    }
+    with (
+        _place_for_kernels(environment),
+        mock.patch.dict(os.environ),  # Dask changes it to that of its workers
+        dask.config.set(settings),
+    ):
+        # Python's process that removes semaphores of a killed build starts with this, silently.
+        silent = (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker")
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, silent))
+        with _interrupts_blocked():
+            try:
+                local = LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=True,
+                    memory_limit=0,  # a worker paused for lack of memory would never report it
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+            except RuntimeError:
+                raise InputError(
+                    "the workers of the data set did not start; in a script, which they import, "
+                    "put what builds it under: if __name__ == '__main__':"
+                ) from None
+        with local as cluster, Client(cluster, set_as_default=False) as client:
+            yield client
+
+
+def refuse_in_worker() -> None:
+    """Exit where a worker imports the user's script, which would build there once more."""
+    imported = sys.modules.get("__mp_main__")
+    if imported is not None and imported is not sys.modules["__main__"]:
+        raise SystemExit(1)
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C, which a terminal sends to all, in processes and threads that are started here.
+
+    This process ends its workers itself. A worker that is interrupted while it loads its modules
+    would print a traceback.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # it would unblock the signal in the thread that starts it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _place_for_kernels(environment: dict[str, str]) -> Iterator[None]:
+    """Give workers a temporary folder for Dr.Jit's kernels, if it cannot write to its own."""
+    home = os.environ.get("HOME")
+    folder = os.environ.get("DRJIT_CACHE_DIR") or (home and os.path.join(home, ".drjit"))
+    with ExitStack() as stack:
+        if sys.platform != "win32" and not (folder and _can_be_written(folder)):
+            environment["DRJIT_CACHE_DIR"] = str(stack.enter_context(temporary_folder()))
+        yield
+
+
+def _can_be_written(folder: str) -> bool:
+    try:
+        os.makedirs(folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
 _QUEUED = 2  # submitted samples for each worker: one in progress and the next; others wait here
 _AT_LEAST = 8  # smallest number of submitted samples, because workers may join later
 _one_at_a_time = threading.Lock()
@@ -282,37 +416,5 @@ def in_words(report: Mapping[str, Any]) -> str:
     -------
     str
     """
-    lines = [f"{report['samples']} samples"]
-    for key, counted in report["by"].items():
-        shown = [f"{name} {count}" for name, count in list(counted.items())[:_MAX_SHOWN]]
-        more = [f"and {len(counted) - _MAX_SHOWN} more"] if len(counted) > _MAX_SHOWN else []
-        lines.append(f"  by {key}: {', '.join(shown + more)}")
-    workers = f"{report['workers']} worker{'' if report['workers'] == 1 else 's'}"
-    damaged = f", {report['damaged']} were damaged" if report["damaged"] else ""
-    there = f"{report['whole']} were there{damaged}"
-    if report["made"]:
-        there += (
-            f", {report['made']} made in {_time(report['wall_s'])} by {workers} "
-            f"({report['work_s']:.1f} s and {_size(report['bytes'] / report['made'])} each)"
-        )
-    lines.append(there)
-    if "estimated_s" in report:
-        lines.append(
-            f"{report['missing']} are missing: about {_time(report['estimated_s'])} on {workers}, "
-            f"and {_size(report['estimated_bytes'])}"
-            if report["missing"]
-            else "none is missing"
-        )
-    return "\n".join(lines)
-
-
-def _time(seconds: float) -> str:
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
-
-
-def _size(size: float) -> str:
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
+    template = templates(Path(__file__).parent, escaped=False).get_template("built.txt")
+    return template.render(report=report).rstrip("\n")

@@ -7,22 +7,20 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from rtradar.clouds.arrays import ARRAYS, KINDS, attributes
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_files import UNKNOWN, read_sample, read_shape
+from rtradar.clouds.sample_files import ARRAYS, KINDS, UNKNOWN, attributes, read_sample, read_shape
 from rtradar.errors import InputError
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import check_place
 from rtradar.system.output_folder import new_folder
+from rtradar.system.templates import templates
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}")
 _CHUNK_BYTES = 4_000_000  # about what is read at a time
@@ -32,20 +30,6 @@ _COUNTS = {"points": ("n_points", "RDT cloud"), "spatial": ("n_spatial", "spatia
 _COORDINATES = {"coordinate": ["time", "range", "velocity"], "axis": ["x", "y", "z"]}
 _NOT_KNOWN = -2  # who returned a point that is none, or of a sample with one person
 _UNITS = re.compile(r"_(s|m|deg|db)$")
-_COLUMNS = {
-    "source": "where the motion is from",
-    "radar": "radars",
-    "scene": "scenes",
-    "fidelity": "fidelity levels",
-    "duration_s": "lengths of intervals [s]",
-    "body_material": "material of the body",
-    "clutter_removal": "removal of static clutter",
-    "detector": "detectors",
-    "pfa": "probability of a false alarm",
-    "version": "versions of rtradar",
-}
-_RANGES = {"snr_db": "SNR [dB]", "heading_deg": "heading [deg]"}
-_MOST_SHOWN = 12
 
 
 def export_dataset(folders: Sequence[Path], out: Path) -> int:
@@ -229,68 +213,37 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
     str
     """
     rows, labels = collection.provenance, Counter(collection.labels.tolist())
-    subjects = {str(row.get("subject", UNKNOWN)) for row in rows}
-    told = [row["limits"] for row in rows if isinstance(row.get("limits"), list)]
-    limits = Counter(printable(str(line)) for lines in told for line in lines)
+
+    def counts(key: str, usual: str | None = None) -> Counter[str]:
+        given = (row.get(key, usual) for row in rows)
+        return Counter(printable(str(value)) for value in given if value is not None)
+
+    limits = Counter(
+        printable(str(line))
+        for row in rows
+        if isinstance(row.get("limits"), list)
+        for line in row["limits"]
+    )
     if empty := sum(not read_shape(path, "points")[0] for path in collection.paths):
         limits["nothing was detected: the cloud is empty"] = empty
-    classes = [(name, number, labels[name]) for number, name in enumerate(collection.classes)]
-    known = [
-        (
-            f"`{name}`",
-            ", ".join(array.metadata.dimension_names),
-            " x ".join(map(str, array.shape)),
-            array.attrs.get("units", ""),
-            array.attrs.get("long_name", ""),
-        )
-        for name, array in sorted(arrays.items())
-        if len(array.shape) > 1 or "long_name" in array.attrs
-    ]
-    card = resources.files("rtradar.campaign").joinpath("card.md").read_text("utf-8")
-    return Template(card).substitute(
+    ranges = {
+        name: [row[key] for row in rows if isinstance(row.get(key), int | float)]
+        for key, name in (("snr_db", "SNR [dB]"), ("heading_deg", "heading [deg]"))
+    }
+    classes = [(printable(one), k, labels[one]) for k, one in enumerate(collection.classes)]
+    template = templates(Path(__file__).parent, escaped=False).get_template("card.md")
+    card = template.render(
         samples=len(collection),
-        motions=len({str(row.get("recording")) for row in rows}),
-        people=len(subjects - {UNKNOWN}),
-        kinds=len(labels),
-        classes=_table(("class", "label", "samples"), classes),
-        arrays=_table(("name", "dimensions", "size", "unit", "meaning"), known),
-        made="\n".join(_made(rows)),
-        licences="\n".join(_licences(rows)),
-        limits="\n".join(
-            f"- in {count} samples: {line}" for line, count in limits.most_common(_MOST_SHOWN)
-        ),
+        motions=len(counts("recording")),
+        people=len(counts("subject").keys() - {UNKNOWN}),
+        classes=classes,
+        arrays=[
+            (name, array)
+            for name, array in sorted(arrays.items())
+            if len(array.shape) > 1 or "long_name" in array.attrs
+        ],
+        counts=counts,
+        ranges=ranges,
+        limits=limits,
     )
-
-
-def _made(rows: list[Mapping[str, Any]]) -> list[str]:
-    lines = []
-    for key, name in _COLUMNS.items():
-        counted = Counter(printable(str(row[key])) for row in rows if key in row)
-        if counted:
-            shown = [f"{value} ({count})" for value, count in counted.most_common(_MOST_SHOWN)]
-            more = len(counted) - len(shown)
-            lines.append(f"- {name}: {', '.join(shown)}{f' and {more} more' if more else ''}")
-    for key, name in _RANGES.items():
-        values = [row[key] for row in rows if isinstance(row.get(key), int | float)]
-        if values:
-            lines.append(f"- {name}: {min(values):.3g} to {max(values):.3g}")
-    unknown = sum(row.get("subject") == UNKNOWN for row in rows)
-    if unknown:
-        lines.append(
-            f"- subject unknown: {unknown} samples; each of their recordings counts as a person of "
-            "its own where a split goes by subject"
-        )
-    return lines
-
-
-def _licences(rows: list[Mapping[str, Any]]) -> list[str]:
-    counted = Counter(printable(str(row.get("licence", UNKNOWN))) for row in rows)
-    hints = {UNKNOWN: "; nobody said what may be done with them: find out before you pass them on"}
-    return [
-        f"- {name}: {count} samples{hints.get(name, '')}" for name, count in counted.most_common()
-    ]
-
-
-def _table(head: tuple[str, ...], rows: Iterable[Iterable[object]]) -> str:
-    lines = [head, ["---"] * len(head), *([printable(str(cell)) for cell in row] for row in rows)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return f"{card}\n"

@@ -1,11 +1,16 @@
-"""Intervals of recordings and takes: at equal steps, at random, or round the strikes."""
+"""Intervals of recordings and takes, and copies that other people might have made.
+
+Intervals lie at equal steps, at random, or round the strikes. A copy is the same motion mirrored,
+faster, taller or drifting, at another moment.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +18,8 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.motion.skeleton import NODES, to_nodes
-from rtradar.system.checks import brief, check_number
+from rtradar.system.fields import Limits, check_fields, keys_of, within
 from rtradar.system.seeds import stream
-
-_NUMBERS = {"start_s": 0.0, "duration_s": 1e-3, "hop_s": 1e-3, "end_s": 1e-3}
-INTERVAL_KEYS = (*_NUMBERS, "place", "count")
-"""Keys of the intervals in files."""
-
-PLACES = ("regular", "random", "strike")
-"""Ways of placing intervals in a recording."""
 
 _SLACK_S = 1e-6  # by which rounding may shorten a recording
 _PLACES_STREAM = 4  # differs from the random streams of what else a seed draws
@@ -41,43 +39,27 @@ class Intervals:
     begins does not give its kind away.
     """
 
-    start_s: float = 0.0
-    duration_s: float | None = None
-    hop_s: float | None = None
-    end_s: float | None = None
-    place: str = "regular"
-    count: int = 1
+    start_s: Annotated[float, Limits(0.0, 1e5)] = 0.0
+    duration_s: Annotated[float | None, Limits(1e-3, 1e5)] = None
+    hop_s: Annotated[float | None, Limits(1e-3, 1e5)] = None
+    end_s: Annotated[float | None, Limits(1e-3, 1e5)] = None
+    place: Annotated[str, Limits(allowed=("regular", "random", "strike"))] = "regular"
+    count: Annotated[int, Limits(1, 10_000)] = 1
 
-    @classmethod
-    def read(cls, where: str, table: Mapping[str, Any]) -> Intervals:
-        """Read the intervals from a table whose keys are known; InputError for invalid values."""
-        given: dict[str, Any] = {
-            key: check_number(where, key, table[key], least, 1e5)
-            for key, least in _NUMBERS.items()
-            if key in table
-        }
-        given |= {key: table[key] for key in ("place", "count") if key in table}
-        found = cls(**given)
-        if found.place not in PLACES:
-            raise InputError(f"{where}: place = {brief(found.place)}; allowed: {', '.join(PLACES)}")
-        count = found.count
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= 10_000:
+    def __post_init__(self) -> None:
+        check_fields(self)
+        regular = self.place == "regular"
+        if self.count > 1 if regular else self.hop_s is not None:
+            key = "count" if regular else "hop_s"
+            raise InputError(f"{key} has no use where place is '{self.place}'")
+        if self.duration_s is None and (self.hop_s is not None or not regular):
+            key = "hop_s" if regular else f"place = '{self.place}'"
+            raise InputError(f"{key} needs duration_s; give both")
+        needed = self.start_s + (self.duration_s or 1e-3) - _SLACK_S
+        if self.end_s is not None and self.end_s < needed:
             raise InputError(
-                f"{where}: count = {brief(count)}; it must be a whole number from 1 to 10000"
+                f"end_s = {self.end_s:g} leaves no room for one interval from {self.start_s:g} s on"
             )
-        unfit = ("hop_s",) if found.place != "regular" else ("count",)
-        if wrong := [key for key in unfit if key in table]:
-            raise InputError(f"{where}: {wrong[0]} has no use where place is '{found.place}'")
-        if found.duration_s is None and (found.hop_s is not None or found.place != "regular"):
-            key = "hop_s" if found.hop_s is not None else f"place = '{found.place}'"
-            raise InputError(f"{where}: {key} needs duration_s; give both")
-        needed = found.start_s + (found.duration_s or 1e-3) - _SLACK_S
-        if found.end_s is not None and found.end_s < needed:
-            raise InputError(
-                f"{where}: end_s = {found.end_s:g} leaves no room for one interval "
-                f"from {found.start_s:g} s on"
-            )
-        return found
 
     @property
     def needed_s(self) -> float | None:
@@ -155,6 +137,10 @@ class Intervals:
         return sorted(starts[: self.count]) or self._drawn(end, random, None)
 
 
+INTERVAL_KEYS = keys_of(Intervals)[1]
+"""Keys of the intervals in files."""
+
+
 def strike_times(motion: Motion) -> NDArray[np.float64]:
     """Return the times [s] at which a hand or a foot is fastest relative to the hips, (strike,).
 
@@ -171,3 +157,89 @@ def strike_times(motion: Motion) -> NDArray[np.float64]:
     speeds = np.linalg.norm(np.gradient(relative, _STEP_S, axis=0), axis=2).max(axis=1)
     speed = gaussian_filter1d(speeds, _SMOOTHING_S / _STEP_S)
     return np.asarray(times[find_peaks(speed, height=_LEAST_STRIKE * speed.max())[0]])
+
+
+_STREAM = 5  # differs from the random streams of what else a seed draws
+_MIRRORED = np.array(
+    [NODES.index({"l": "r", "r": "l"}[name[0]] + name[1:] if name[1] == "_" else name)
+     for name in NODES]
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Augmented:
+    """``copies`` of each interval of a recording, half of them mirrored, drawn from ranges.
+
+    Tempo, height and build are factors, a drift has any direction, and the start is moved.
+    """
+
+    copies: Annotated[int, Limits(1, 1000)]
+    tempo: Annotated[tuple[float, float], within(0.4, 2.5)] = (0.8, 1.25)
+    height: Annotated[tuple[float, float], within(0.5, 2.0)] = (0.9, 1.1)
+    build: Annotated[tuple[float, float], within(0.4, 2.5)] = (0.8, 1.25)
+    drift_mps: Annotated[tuple[float, float], within(0.0, 3.0)] = (0.0, 0.3)
+    start_s: Annotated[tuple[float, float], within(-10.0, 10.0)] = (-0.3, 0.3)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def draw(self, seed: int, start_s: float, duration_s: float, length_s: float) -> dict[str, Any]:
+        """Draw a copy of an interval of a recording of this length [s], as plain JSON values.
+
+        The recording has no end before the copy does: a tempo or start that needs more is changed.
+        """
+        random = np.random.default_rng(stream(seed, _STREAM))
+        ranges = {key: value for key, value in vars(self).items() if key != "copies"}
+        drawn = {
+            key: round(low + (high - low) * float(random.random()), 4)
+            for key, (low, high) in ranges.items()
+        }
+        most = math.floor(1e4 * length_s / duration_s) / 1e4
+        tempo = min(drawn["tempo"], max(most, 1.0))
+        last = max(0.0, length_s - duration_s * tempo)
+        return {
+            "start_s": math.floor(1e4 * min(max(start_s + drawn["start_s"], 0.0), last)) / 1e4,
+            "varied": {
+                "mirror": bool(random.integers(2)),
+                "tempo": tempo,
+                "height": drawn["height"],
+                "build": drawn["build"],
+                "drift_mps": drawn["drift_mps"],
+                "drift_deg": round(float(random.uniform(-180.0, 180.0)), 2),
+            },
+        }
+
+
+def vary(motion: Motion, how: Mapping[str, Any]) -> Motion:
+    """Return the motion as a copy of `Augmented.draw` has it."""
+    nodes = to_nodes(motion)
+    if how["mirror"]:
+        nodes = mirrored(nodes)
+    nodes = nodes.scaled(how["height"])
+    angle = math.radians(how["drift_deg"])
+    way = how["drift_mps"] * np.array([math.cos(angle), math.sin(angle), 0.0])
+    tempo = how["tempo"]
+    times = nodes.frame_times / tempo
+    return dataclasses.replace(
+        nodes,
+        root_positions=nodes.root_positions + times[:, None] * way,
+        rate_hz=nodes.rate_hz * tempo,
+        first_frame_s=nodes.first_frame_s / tempo,
+        length_s=nodes.duration_s / tempo,
+        girth=nodes.girth * how["build"],
+    )
+
+
+def mirrored(nodes: Motion) -> Motion:
+    """Mirror a motion of the 22 nodes at the plane y = 0: left becomes right."""
+
+    def flipped(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        return vectors * [1.0, -1.0, 1.0]
+
+    return dataclasses.replace(
+        nodes,
+        offsets=flipped(nodes.offsets[_MIRRORED]),
+        root_positions=flipped(nodes.root_positions),
+        # The axis of a rotation is a pseudovector: its other two components change sign.
+        rotations=nodes.rotations[:, _MIRRORED] * [-1.0, 1.0, -1.0, 1.0],
+    )

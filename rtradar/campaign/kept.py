@@ -9,19 +9,14 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds.arrays import ARRAYS, KINDS
+from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.description import Movers
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.writer import axes_of
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells
 from rtradar.pipeline.sources import Sources
-from rtradar.process import (
-    angle_grid,
-    measured_angles,
-    range_azimuth,
-    window_cycles,
-)
+from rtradar.process import angle_grid, measured_angles, range_azimuth, window_cycles
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings

@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from rtradar import __version__
 from rtradar.body import Person
-from rtradar.campaign.augmentation import vary
+from rtradar.campaign.intervals import vary
 from rtradar.campaign.kept import capture_of
 from rtradar.campaign.spec import (
     APART_M,

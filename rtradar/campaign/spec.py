@@ -10,8 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from rtradar.campaign.augmentation import Augmented
-from rtradar.campaign.intervals import Intervals
+from rtradar.campaign.intervals import Augmented, Intervals
 from rtradar.campaign.kept import sizes
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed
@@ -124,7 +123,7 @@ class Others:
     y_m: _Place = (-1.5, 1.5)
 
     def __post_init__(self) -> None:
-        check_fields(self, "[others] ")
+        check_fields(self)
 
 
 class Spec(NamedTuple):
@@ -241,18 +240,9 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
     values = each.get(key, usual)
     if not isinstance(values, list) or not values:
         raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
-    different = {
-        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
-        for value in values
-    }
-    if len(different) < len(values):
+    if len({repr(value) for value in values}) < len(values):
         raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
     return values
-
-
-def _comparable(value: object) -> object:
-    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
-    return value if isinstance(value, int | float | str | None) else repr(value)
 
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:

@@ -1,6 +1,9 @@
 """Reader of the specification of a data set from TOML; errors are lines that name the key.
 
-The page on data sets, ``docs/data-sets.md``, lists the keys and has an example.
+The page on data sets, ``docs/data-sets.md``, lists the keys and has an example. Patterns, such as
+``{label}/{subject}_*.bvh``, name several recordings: ``*`` and ``?`` stand for letters of one name,
+``**`` for any folders. ``{label}`` and ``{subject}`` stand for letters of one name, too, which
+become the activity and the subject; each ends where the text behind it begins.
 """
 
 from __future__ import annotations
@@ -9,14 +12,12 @@ import dataclasses
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from rtradar.campaign.augmentation import VARIED, Augmented
-from rtradar.campaign.intervals import INTERVAL_KEYS, Intervals
+from rtradar.campaign.intervals import INTERVAL_KEYS, Augmented, Intervals
 from rtradar.campaign.kept import KEPT
-from rtradar.campaign.patterns import FIELD, file_in, matching_files
 from rtradar.campaign.spec import (
     DRAWN,
     EACH,
@@ -33,15 +34,13 @@ from rtradar.campaign.spec import (
 from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
 from rtradar.description import MOST_FILES, check_files, path_from, versions
 from rtradar.errors import InputError, prefixed
-from rtradar.motion import ACTIVITIES
-from rtradar.process import DETECTORS, WindowFunctions
+from rtradar.process import WindowFunctions
 from rtradar.recordings import SAID, said_of
 from rtradar.settings import RunSettings
 from rtradar.system.checks import (
     Complaints,
     Table,
     brief,
-    check_keys,
     inside,
     is_whole,
     read_toml,
@@ -51,35 +50,47 @@ from rtradar.system.checks import (
 )
 from rtradar.system.fields import Limits, annotations_of, read_range, read_table, read_value
 from rtradar.system.files import digest_of
+from rtradar.system.registries import ACTIVITY_NAMES
+
+_Thing = TypeVar("_Thing")
 
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
 """Limits of settings of a run, narrower than those of the settings themselves."""
 
-_YES_OR_NO = {"angles": True, "skip_short": False, "random_rooms": False, "clouds": True}
-_TOP = (
-    "seed",
-    *RUN_KEYS,
-    "keep",
-    *_YES_OR_NO,
-    "folder",
-    "windows",
-    "each",
-    "drawn",
-    "others",
-    "augmented",
-    "synthetic",
-    "recordings",
-)
-_COUNT, _MANY = Annotated[int, Limits(0, 1_000_000)], Annotated[int, Limits(1, 1_000_000)]
-_PFA = Annotated[float, Limits(*RUN_LIMITS["pfa"])]
-_KEPT = Annotated[
-    tuple[str, ...], Limits(allowed=tuple(KEPT), wanted=f"it must be a list of: {', '.join(KEPT)}")
-]
-_SYNTHETIC = ("label",), ("count", "seeds", "subjects")
-_RECORDING = (
-    ("file",),
-    ("label", "subject", "licence", "skeleton", *SAID, *INTERVAL_KEYS),
-)
+_SWITCHES = ("angles", "skip_short", "random_rooms", "clouds")
+_RUN = annotations_of(RunSettings)
+_TOP: dict[str, Any] = {
+    **{key: _RUN[key] for key in ("seed", *RUN_KEYS)},
+    "pfa": Annotated[float, Limits(*RUN_LIMITS["pfa"])],
+    "keep": Annotated[
+        tuple[str, ...], Limits(allowed=KEPT, wanted=f"it must be a list of: {', '.join(KEPT)}")
+    ],
+    **dict.fromkeys(_SWITCHES, bool),
+    "folder": str,
+    **dict.fromkeys(("windows", "each", "drawn", "others", "augmented"), Any),
+    **dict.fromkeys(("synthetic", "recordings"), Any),
+}
+"""Keys of a file, and what may stand there; tables are read one by one."""
+
+_MANY = Annotated[int, Limits(1, 1_000_000)]
+_DIFFERENT = "it must be a list of different whole numbers, not empty"
+_SEVERAL = Annotated[tuple[int, ...], Limits(0, 1_000_000, _DIFFERENT, (1, 2**31))]
+_SYNTHETIC: dict[str, Any] = {
+    "label": Annotated[str, Limits(allowed=ACTIVITY_NAMES)],
+    "count": _MANY,
+    "seeds": _SEVERAL,
+    "subjects": _MANY | _SEVERAL,
+}
+_RECORDING: dict[str, Any] = {
+    **dict.fromkeys(("file", "label", "subject", "licence", "skeleton"), str),
+    **dict.fromkeys((*SAID, *INTERVAL_KEYS), Any),
+}
+_UNKNOWN = dict.fromkeys(("label", "subject", "licence"), UNKNOWN)
+_FIELD = re.compile(r"\{(label|subject)\}")
+"""Part of a pattern that gives a value."""
+
+_PIECE = re.compile(r"\*|\?|\{label\}|\{subject\}")
+_MOST_WILD = 10  # wildcards of a pattern, so that matching stays quick
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
@@ -170,24 +181,22 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
 
 def _spec(table: Table, folder: Path) -> Spec:
     wrong = Complaints()
-    drawn_table, each, windows = (
-        wrong.of(table_at, key, table) or {} for key in ("drawn", "each", "windows")
-    )
-    for where, own, keys in (
-        ("", table, _TOP),
-        ("[drawn] ", drawn_table, tuple(DRAWN)),
-        ("[each] ", each, tuple(EACH)),
-        ("[windows] ", windows, INTERVAL_KEYS),
-    ):
-        wrong.lines += wrong_keys(where, own, (), keys)
+    top = _values(_TOP, "", table, wrong)
+    drawn_table, each = (wrong.of(table_at, key, table) or {} for key in ("drawn", "each"))
+    wrong.lines += wrong_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
+    wrong.lines += wrong_keys("[each] ", each, (), tuple(EACH))
     wrong.lines += [
         f"{key} is under [each] and under [drawn]; give it once"
         for key in drawn_table
         if key in each
     ]
-    intervals = wrong.of(Intervals.read, "[windows]", windows)
+    intervals = wrong.of(_of_table, Intervals, "windows", {"windows": {}, **table})
+    others = wrong.of(_of_table, Others, "others", table)
+    augmented = wrong.of(_of_table, Augmented, "augmented", table)
     actors = _actors(table, wrong)
-    recordings = _recordings(table, windows if intervals else {}, folder, wrong)
+    windows = table.get("windows", {}) if intervals else {}
+    beside = wrong.of(_folder, top.get("folder", "."), folder)
+    recordings = _recordings(table, windows, beside, wrong)
     if not table.get("synthetic") and not table.get("recordings"):
         wrong.lines.append("there is neither [[synthetic]] nor [[recordings]]; give one of them")
     if table.get("synthetic") and intervals and intervals.needed_s is None:
@@ -200,12 +209,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         or (0.0, 0.0)
         for key, (usual, least, most) in DRAWN.items()
     }
-    switches: dict[str, Any] = {
-        key: bool(wrong.of(read_value, bool, "", key, table.get(key, usual)))
-        for key, usual in _YES_OR_NO.items()
-    }
-    kinds = wrong.of(read_value, _KEPT, "", "keep", table.get("keep", [])) or ()
-    keep = tuple(kind for kind in KEPT if kind in kinds)
+    keep = tuple(kind for kind in KEPT if kind in top.get("keep", ()))
     if table.get("clouds") is False and not table.get("keep"):
         wrong.lines.append("clouds = false, and keep is empty; nothing would be left")
     if table.get("angles") is False and "range_azimuth" in keep:
@@ -215,9 +219,7 @@ def _spec(table: Table, folder: Path) -> Spec:
             "random_rooms = true draws rooms and where the radar stands; leave scene and "
             "radar_position_m under [each] out"
         )
-    run = wrong.of(_run_settings, table)
-    others = wrong.of(_others, table)
-    augmented = wrong.of(_augmented, table)
+    run = wrong.of(_run_settings, top)
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
@@ -231,63 +233,46 @@ def _spec(table: Table, folder: Path) -> Spec:
         lengths = {recorded.intervals.duration_s for recorded in recordings}
         lengths |= {intervals.duration_s} if actors else set()
         check_equal_sizes(keep, lengths, combinations, run.spectrogram_window_s)
+    switches = {key: top[key] for key in _SWITCHES if key in top}
     return Spec(
-        run,
-        intervals,
-        combinations,
-        drawn,
-        actors,
-        recordings,
-        keep,
-        others,
-        augmented,
-        **switches,
+        run, intervals, combinations, drawn, actors, recordings, keep, others, augmented, **switches
     )
 
 
-def _others(table: Table) -> Others | None:
-    """Return who is there beside the person of the label, if there is a table ``[others]``."""
-    if "others" not in table:
-        return None
-    return read_table(Others, "[others] ", table_at("others", table))
-
-
-def _augmented(table: Table) -> Augmented | None:
-    """Return how recordings are augmented, if there is a table ``[augmented]``."""
-    if "augmented" not in table:
-        return None
-    given = table_at("augmented", table)
-    check_keys("[augmented] ", given, ("copies",), tuple(VARIED))
-    copies = read_value(Annotated[int, Limits(1, 1000)], "[augmented] ", "copies", given["copies"])
-    ranges = {
-        key: read_range("[augmented] ", key, given.get(key, usual), least, most)
-        for key, (usual, least, most) in VARIED.items()
+def _values(
+    hints: Mapping[str, Any],
+    where: str,
+    table: Table,
+    wrong: Complaints,
+    needed: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    """Return those values of a table that are allowed; complain about the others and about keys."""
+    wrong.lines += wrong_keys(
+        where, table, needed, tuple(key for key in hints if key not in needed)
+    )
+    found = {
+        key: wrong.of(read_value, hint, where, key, table[key])
+        for key, hint in hints.items()
+        if key in table
     }
-    return Augmented(copies, ranges)
+    return {key: value for key, value in found.items() if value is not None}
 
 
-def _run_settings(table: Table) -> RunSettings:
-    wrong, hints = Complaints(), annotations_of(RunSettings)
-    given: dict[str, Any] = {}
-    for key in ("seed", *RUN_KEYS):
-        if key in table:
-            hint = _PFA if key == "pfa" else hints[key]
-            given[key] = wrong.of(read_value, hint, "", key, table[key])
-    if isinstance(detector := given.get("detector"), str):
-        wrong.of(DETECTORS.check, detector)
-    named = {axis: given.get(f"{axis}_window") for axis in ("range", "doppler")}
-    windows = wrong.of(
-        lambda: WindowFunctions(**{axis: own for axis, own in named.items() if own is not None})
-    )
-    wrong.check()
-    assert windows is not None  # for else there are complaints
-    run = RunSettings(**given)
+def _of_table(kind: type[_Thing], key: str, table: Table) -> _Thing | None:
+    """Make an object of a table of the file; None if it is not there."""
+    given = table_at(key, table)
+    with prefixed(f"[{key}] "):
+        return read_table(kind, "", given) if key in table else None
+
+
+def _run_settings(top: Mapping[str, Any]) -> RunSettings:
+    run = RunSettings(**{key: top[key] for key in ("seed", *RUN_KEYS) if key in top})
+    windows = WindowFunctions(run.range_window, run.doppler_window)
     return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
 
 
-def _folder(table: Table, beside: Path) -> Path:
+def _folder(named: str, beside: Path) -> Path:
     """Folder of the recordings, below the file's own or below that of an environment variable."""
-    named = read_value(str, "data set: ", "folder", table.get("folder", "."))
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
@@ -311,87 +296,140 @@ def _folder(table: Table, beside: Path) -> Path:
 def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
     found: dict[str, Actor] = {}
     for where, one in wrong.of(tables_at, "synthetic", table) or ():
-        wrong.lines += wrong_keys(where, one, *_SYNTHETIC)
-        actor = wrong.of(_actor, where, one) if "label" in one else None
-        if actor and actor.label in found:
+        given = {"label": "", "subjects": 10, **_values(_SYNTHETIC, where, one, wrong, ("label",))}
+        if ("count" in one) == ("seeds" in one):
+            wrong.lines.append(f"{where}: give count or seeds, one of them")
+        for key, value in given.items():
+            if isinstance(value, tuple) and len(set(value)) < len(value):
+                wrong.lines.append(f"{where}{key} = {brief(list(value))}; {_DIFFERENT}")
+        seeds, subjects = (
+            range(own) if isinstance(own, int) else own
+            for own in (given.get("seeds", given.get("count", 0)), given["subjects"])
+        )
+        actor = Actor(given["label"], seeds, subjects)
+        if actor.label and actor.label in found:
             wrong.lines.append(
                 f"[[synthetic]] label = '{actor.label}' is given twice; give its takes together"
             )
-        elif actor:
-            found[actor.label] = actor
+        found[actor.label] = actor
     return tuple(found.values())
 
 
-def _actor(where: str, table: Table) -> Actor:
-    wrong = Complaints()
-    label = wrong.of(read_value, str, where, "label", table["label"])
-    if label is not None and label not in ACTIVITIES:
-        wrong.lines.append(
-            f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
-        )
-    seeds = None
-    if ("count" in table) == ("seeds" in table):
-        wrong.lines.append(f"{where}: give count or seeds, one of them")
-    else:
-        seeds = wrong.of(_numbers, where, "seeds" if "seeds" in table else "count", table)
-    subjects = wrong.of(_numbers, where, "subjects", {"subjects": 10, **table})
-    wrong.check()
-    return Actor(label or "", seeds or (), subjects or ())
-
-
-def _numbers(where: str, key: str, table: Table) -> Sequence[int]:
-    """Return a list of whole numbers as it is, or for a count all numbers below it."""
-    value = table[key]
-    if not isinstance(value, list):
-        return range(read_value(_MANY, where, key, value))
-    if not value or len(set(map(str, value))) < len(value):
-        raise InputError(
-            f"{where}{key} = {brief(value)}; "
-            "it must be a list of different whole numbers, not empty"
-        )
-    return tuple(read_value(_COUNT, where, key, number) for number in value)
-
-
 def _recordings(
-    table: Table, windows: Table, folder: Path, wrong: Complaints
+    table: Table, windows: Table, folder: Path | None, wrong: Complaints
 ) -> tuple[Recorded, ...]:
-    beside = wrong.of(_folder, table, folder)
+    """Return the recordings of all tables, each those of a pattern or the one that it names."""
     found: list[Recorded] = []
     for where, one in wrong.of(tables_at, "recordings", table) or ():
-        wrong.lines += wrong_keys(where, one, *_RECORDING)
-        if beside is not None and "file" in one:
-            found += wrong.of(_recorded, where, one, windows, beside) or ()
+        texts = _values(_RECORDING, where, one, wrong, ("file",))
+        own = {key: texts[key] for key in INTERVAL_KEYS if key in texts}
+        said = wrong.of(said_of, where.strip(), one) or {}
+        intervals = wrong.of(_intervals, where, {**windows, **own}) or Intervals()
+        if "label" not in one and "{label}" not in texts.get("file", ""):
+            wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
+        if folder is None or "file" not in texts:
+            continue
+        for name, fields in wrong.of(matching_files, where, texts["file"], folder) or ():
+            values = {**_UNKNOWN, **texts, **fields}
+            about = {
+                key: wrong.of(read_value, str, where, key, values[key]) or "" for key in _UNKNOWN
+            }
+            skeleton = None
+            if "skeleton" in texts:
+                named = _FIELD.sub(lambda field: values[field[1]], texts["skeleton"])  # noqa: B023
+                skeleton = wrong.of(file_in, where, "skeleton", named, folder)
+            path = folder / name
+            found.append(Recorded(name, path, skeleton, intervals=intervals, said=said, **about))
     return tuple(found)
 
 
-def _recorded(where: str, table: Table, windows: Table, folder: Path) -> list[Recorded]:
-    """Return the recordings of one table: those of its pattern, or the one that it names."""
-    wrong, place = Complaints(), where.strip()
-    texts = {
-        key: wrong.of(read_value, str, where, key, table[key]) or ""
-        for key in ("file", "label", "subject", "licence", "skeleton")
-        if key in table
-    }
-    own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
-    said = wrong.of(said_of, place, table)
-    intervals = wrong.of(Intervals.read, place, {**windows, **own})
-    if "label" not in texts and "{label}" not in texts["file"]:
-        wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
-    matches = wrong.of(matching_files, where, texts["file"], folder) if texts["file"] else None
-    wrong.check()
-    assert intervals is not None  # for else there are complaints
-    assert said is not None
-    found = []
-    for name, fields in matches or ():
-        values = {"subject": UNKNOWN, "licence": UNKNOWN, **texts, **fields}
-        skeleton = None
-        if "skeleton" in texts:
-            named = FIELD.sub(lambda field: values[field[1]], texts["skeleton"])  # noqa: B023
-            skeleton = wrong.of(file_in, where, "skeleton", named, folder)
-        about = {key: values[key] for key in ("label", "subject", "licence")}
-        for key in fields:
-            wrong.of(read_value, str, where, key, fields[key])
-        path = folder / name
-        found.append(Recorded(name, path, skeleton, intervals=intervals, said=said, **about))
-    wrong.check()
+def _intervals(where: str, table: Table) -> Intervals:
+    with prefixed(where):
+        return Intervals(**table)
+
+
+# -- patterns of files -----------------------------------------------------------------------------
+
+
+def matching_files(where: str, pattern: str, folder: Path) -> list[tuple[str, dict[str, str]]]:
+    """Return the files of a pattern in a folder by relative name, each with the values of fields.
+
+    InputError if there is none, or the pattern leaves the folder.
+    """
+    if not _PIECE.search(pattern) or _is_file(folder, pattern):
+        file_in(where, "file", pattern, folder)
+        return [(pattern, {})]
+    if inside(folder, pattern) is None:
+        raise _leaves(where, "file", pattern)
+    if len(_PIECE.findall(pattern)) > _MOST_WILD or pattern.count("**/") > 1:
+        raise InputError(
+            f"{where}file = {brief(pattern)}: {_MOST_WILD} wildcards are allowed, "
+            "one of them **; give fewer"
+        )
+    *folders, last = pattern.split("/")
+    parts = [part if part == "**" else _single(part) for part in folders] + [_single(last)]
+    expression, found = _expression(parts), []
+    for path in sorted(folder.glob(_FIELD.sub("*", "/".join(parts)).replace("[", "[[]"))):
+        name = path.relative_to(folder).as_posix()
+        if (match := expression.fullmatch(name)) and path.is_file():
+            if inside(folder, name) is None:
+                raise _leaves(where, "file", name)
+            found.append((name, match.groupdict()))
+    if not found:
+        raise InputError(
+            f"{where}file = {brief(pattern)} matches no file in '{folder}'; "
+            "mend the pattern, or leave it out"
+        )
     return found
+
+
+def _expression(parts: list[str]) -> re.Pattern[str]:
+    """Return the regular expression of a pattern of these names."""
+    seen: set[str] = set()
+
+    def wild(piece: str) -> str:
+        if piece in ("*", "?"):
+            return "[^/]*?" if piece == "*" else "[^/]"
+        name, again = piece.strip("{}"), piece in seen
+        seen.add(piece)
+        return f"(?P={name})" if again else f"(?P<{name}>[^/]+?)"
+
+    def one(part: str) -> str:
+        fixed = [re.escape(text) for text in _PIECE.split(part)]
+        pieces = [wild(piece) for piece in _PIECE.findall(part)]
+        if not pieces:
+            return fixed[0]
+        # Each but the last ends where the text behind it begins, and is not tried again: the time
+        # stays in proportion to the length of the name.
+        held = [f"(?>{piece}{text})" for piece, text in zip(pieces[:-1], fixed[1:-1], strict=True)]
+        return "".join([fixed[0], *held, pieces[-1], fixed[-1]])
+
+    folders = ["(?:[^/]+/)*" if part == "**" else f"{one(part)}/" for part in parts[:-1]]
+    return re.compile("".join(folders) + one(parts[-1]))
+
+
+def _single(part: str) -> str:
+    """Return a name with one star where there are several, which mean the same."""
+    return re.sub(r"\*+", "*", part)
+
+
+def _is_file(folder: Path, name: str) -> bool:
+    try:
+        return inside(folder, name) is not None and (folder / name).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def file_in(where: str, key: str, name: str, folder: Path) -> Path:
+    """Return the path of an existing file in a folder or below; InputError if it is not there."""
+    if inside(folder, name) is None:
+        raise _leaves(where, key, name)
+    if not _is_file(folder, name):
+        raise InputError(f"{where}{key} = {brief(name)}: there is no such file in '{folder}'")
+    return folder / name
+
+
+def _leaves(where: str, key: str, name: str) -> InputError:
+    return InputError(
+        f"{where}{key} = {brief(name)} leaves the folder of recordings; name files in it or below"
+    )

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from rtradar.classify.baselines import evaluate_baselines
     from rtradar.classify.outcomes import Outcome
     from rtradar.classify.pointnet import PointNet
-    from rtradar.classify.prepare import stack_clouds
+    from rtradar.classify.prepare import stack_clouds, stack_spectrograms
     from rtradar.classify.recipes import LEAN, PAPER, Recipe
-    from rtradar.classify.spectrograms import stack_spectrograms
     from rtradar.classify.splits import Split, make_splits
     from rtradar.classify.study import Study, load_network, load_study, train_study
     from rtradar.classify.training import Examples, predict, train_network
@@ -51,7 +50,7 @@ __all__ = [
     "train_network",
     "train_study",
 ]
-_MODULES = "recipes splits outcomes prepare spectrograms pointnet training study baselines"
+_MODULES = "recipes splits outcomes prepare pointnet training study baselines"
 
 
 def __getattr__(name: str) -> Any:

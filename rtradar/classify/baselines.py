@@ -23,7 +23,7 @@ from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
-from rtradar.recognition.description import correlations, course, statistics
+from rtradar.recognition.recogniser import correlations, course, statistics
 from rtradar.system.seeds import word
 
 METADATA = (

@@ -1,4 +1,9 @@
-"""Outcomes of trainings: predictions for test clouds, their files, and their scores as tables."""
+"""Outcomes of trainings: predictions for test clouds, their files, their scores and tables of them.
+
+Clouds of one recording are not independent evidence, nor are recordings of one person. So answers
+about windows are averaged over the recording, recordings are counted, each class with the same
+weight (balanced accuracy, the mean of the recalls), and intervals come from drawing people.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +11,17 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.cards import text_table
-from rtradar.classify.scores import Answers
 from rtradar.classify.splits import Split
 from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json
+from rtradar.system.seeds import stream
 
 HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "seconds")
 """Quantities measured in every epoch."""
@@ -75,7 +80,7 @@ class Outcome:
 
     @property
     def answers(self) -> Answers | None:
-        """What `rtradar.classify.scores` judges; None if probabilities were not kept."""
+        """What `rtradar.classify.outcomes` judges; None if probabilities were not kept."""
         if not len(self.probabilities):
             return None
         return Answers(self.probabilities, self.truth, self.recordings, self.subjects)
@@ -197,10 +202,9 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 def confusion(outcomes: Sequence[Outcome], n_classes: int) -> NDArray[np.int64]:
     """Count test clouds by true and predicted class, (truth, prediction), over all trainings."""
-    counts = np.zeros((n_classes, n_classes), dtype=np.int64)
-    for outcome in outcomes:
-        np.add.at(counts, (outcome.truth, outcome.predicted), 1)
-    return counts
+    pairs = [n_classes * one.truth + one.predicted for one in outcomes]
+    counts = np.bincount(np.concatenate(pairs), minlength=n_classes**2)
+    return counts.reshape(n_classes, n_classes)
 
 
 def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
@@ -217,22 +221,18 @@ def transfer(
     Returns the values of the column, the mean accuracy (trained_on, tested_on) over the folds, and
     its standard deviation; both are NaN if there is none.
     """
-    values = sorted(
-        {outcome.trained_on for outcome in outcomes}
-        | {str(value) for one in outcomes for value in one.tested_on}
-    )
-    mean, spread = np.full((2, len(values), len(values)), np.nan)
-    for row, trained_on in enumerate(values):
-        for column, tested_on in enumerate(values):
-            fractions = [
-                float(np.mean(one.truth[asked] == one.predicted[asked]))
-                for one in outcomes
-                if one.trained_on == trained_on and (asked := one.tested_on == tested_on).any()
-            ]
-            if fractions:
-                mean[row, column] = np.mean(fractions)
-            if len(fractions) > 1:
-                spread[row, column] = np.std(fractions, ddof=1)
+    import pandas as pd  # slow to import
+
+    rows = [
+        (one.trained_on, str(value), np.mean((one.truth == one.predicted)[one.tested_on == value]))
+        for one in outcomes
+        for value in np.unique(one.tested_on)
+    ]
+    table = pd.DataFrame(rows, columns=["trained", "tested", "right"])
+    values = sorted({*table["trained"], *table["tested"]})
+    found = table.groupby(["trained", "tested"])["right"].agg(["mean", "std"])
+    square = found.reindex(pd.MultiIndex.from_product([values, values])).to_numpy()
+    mean, spread = square.T.reshape(2, len(values), len(values))
     return values, mean, spread
 
 
@@ -280,3 +280,67 @@ def transfer_table(
     return text_table(
         [["trained on", *values], *([name, *map(cell, *each)] for name, *each in rows)]
     )
+
+
+_BINS = 10  # of the calibration error
+_DRAWS = 2000  # of people
+
+
+class Answers(NamedTuple):
+    """Probabilities ``(answer, class)``, true classes ``(answer,)``, who and which recording."""
+
+    probabilities: NDArray[np.float64]
+    truth: NDArray[np.int64]
+    recordings: NDArray[np.str_]
+    subjects: NDArray[np.str_]
+
+    def by_recording(self) -> Answers:
+        """Average the answers about each class of each recording."""
+        keys = np.char.add(np.char.add(self.recordings, "\0"), self.truth.astype(str))
+        _, first, place = np.unique(keys, return_index=True, return_inverse=True)
+        mean = np.zeros((len(first), self.probabilities.shape[1]))
+        np.add.at(mean, place, self.probabilities)
+        mean /= np.bincount(place)[:, None]
+        return Answers(mean, self.truth[first], self.recordings[first], self.subjects[first])
+
+
+def balanced_accuracy(answers: Answers) -> float:
+    """Mean over the classes that are asked about of the fraction that is right."""
+    right = answers.probabilities.argmax(axis=1) == answers.truth
+    return float(np.mean([right[answers.truth == one].mean() for one in np.unique(answers.truth)]))
+
+
+def interval(answers: Answers, level: float = 0.95, seed: int = 0) -> tuple[float, float]:
+    """Return the interval of the balanced accuracy when other people are asked about.
+
+    Subjects are drawn with replacement (bootstrap), those of each set of activities among
+    themselves, so that no class is lost.
+    """
+    right = answers.probabilities.argmax(axis=1) == answers.truth
+    classes, place = np.unique(answers.truth, return_inverse=True)
+    subjects, who = np.unique(answers.subjects, return_inverse=True)
+    asked, known = np.zeros((2, len(subjects), len(classes)))
+    np.add.at(asked, (who, place), 1)
+    np.add.at(known, (who, place), right)
+    _, kind = np.unique(asked > 0, axis=0, return_inverse=True)
+    random = np.random.default_rng(stream(seed))
+    found = []
+    for _ in range(_DRAWS):
+        drawn = np.concatenate(
+            [
+                random.choice(np.flatnonzero(kind == one), np.count_nonzero(kind == one))
+                for one in np.unique(kind)
+            ]
+        )
+        found.append(np.mean(known[drawn].sum(axis=0) / asked[drawn].sum(axis=0)))
+    low, high = np.quantile(found, [(1 - level) / 2, (1 + level) / 2])
+    return float(low), float(high)
+
+
+def calibration_error(answers: Answers) -> float:
+    """Expected calibration error: how far confidence is from accuracy, over ten bins of it."""
+    confidence = answers.probabilities.max(axis=1)
+    right = answers.probabilities.argmax(axis=1) == answers.truth
+    place = np.minimum((confidence * _BINS).astype(int), _BINS - 1)
+    gaps = np.bincount(place, confidence - right, minlength=_BINS)
+    return float(np.abs(gaps).sum() / len(right))

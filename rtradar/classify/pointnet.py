@@ -28,8 +28,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from rtradar.classify.prepare import VELOCITIES
 from rtradar.classify.recipes import Recipe
-from rtradar.classify.spectrograms import VELOCITIES
 
 _GLOBAL_FEATURES = 1024
 _MOMENTUM, _EPSILON = 0.1, 1e-5  # torch's defaults of batch norm

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from rtradar.errors import InputError
-from rtradar.system.checks import check_number, is_whole
+from rtradar.system.fields import Limits, check_fields
 
 Schedule = Literal["step", "one-cycle"]
 Scaling = Literal["unit-sphere", "physical"]
@@ -17,18 +19,8 @@ Augmentation = Literal["none", "rotation", "physical", "wide"]
 Precision = Literal["float32", "bfloat16"]
 Network = Literal["pointnet", "pooled", "edges", "spectrogram"]
 
-_CHOICES = {
-    "schedule": get_args(Schedule),
-    "scaling": get_args(Scaling),
-    "augmentation": get_args(Augmentation),
-    "precision": get_args(Precision),
-    "network": get_args(Network),
-}
-_BELOW_1 = math.nextafter(1.0, 0.0)
-_LIMITS = {
-    "rate": (1e-12, 1e3), "stop_below": (0.0, 1e3), "weight_decay": (0.0, 1e3),
-    "edge_s": (0.0, 1e3), "dropout": (0.0, _BELOW_1), "label_smoothing": (0.0, _BELOW_1),
-}  # fmt: skip
+_WEIGHT = Limits(0.0, 1e3)
+_PART = Limits(0.0, 1 - 2**-53, "it must be a number from 0 to 1, which is excluded")
 _FILE_KEYS = {"resample": "redraw", "step_epochs": "halve_every"}
 _LATER_FIELDS = ("network", "edge_s", "label_smoothing", "balanced")
 """Fields that files of studies have only where they differ from their defaults."""
@@ -103,47 +95,40 @@ class Recipe:
     """
 
     name: str
-    points: int = 1000
-    batch: int = 3
-    epochs: int = 200
-    rate: float = 1e-4
+    points: Annotated[int, Limits(0, 10**9)] = 1000
+    batch: Annotated[int, Limits(2, 10**9)] = 3
+    epochs: Annotated[int, Limits(1, 10**9)] = 200
+    rate: Annotated[float, Limits(1e-12, 1e3)] = 1e-4
     schedule: Schedule = "step"
-    step_epochs: int = 10
-    stop_below: float = 1e-6
-    weight_decay: float = 0.0
+    step_epochs: Annotated[int, Limits(1, 10**9)] = 10
+    stop_below: Annotated[float, _WEIGHT] = 1e-6
+    weight_decay: Annotated[float, _WEIGHT] = 0.0
     input_transform: bool = True
     feature_transform: bool = True
-    dropout: float = 0.3
+    dropout: Annotated[float, _PART] = 0.3
     scaling: Scaling = "physical"
     resample: bool = False
     augmentation: Augmentation = "none"
     precision: Precision = "float32"
     network: Network = "pointnet"
-    edge_s: float = 0.0
-    label_smoothing: float = 0.0
+    edge_s: Annotated[float, _WEIGHT] = 0.0
+    label_smoothing: Annotated[float, _PART] = 0.0
     balanced: bool = False
 
     def __post_init__(self) -> None:
-        whole = {"points": int(self.takes_points), "batch": 2, "epochs": 1, "step_epochs": 1}
-        for field, least in whole.items():
-            value = getattr(self, field)
-            fits = is_whole(value) and value >= least
-            self._demand(field, fits, f"a whole number, at least {least}")
-        for field, (low, high) in _LIMITS.items():
-            check_number("recipe", field, getattr(self, field), low, high)
         words = {old: new for new, old in _FILE_VALUES.items()}
-        for field, allowed in _CHOICES.items():
-            value = words.get(getattr(self, field), getattr(self, field))
-            object.__setattr__(self, field, value)
-            self._demand(field, value in allowed, f"one of {', '.join(allowed)}")
-        if not self.takes_points:
-            self._demand("points", self.points == 0, "0, for a spectrogram has no points")
-            fits = self.augmentation in ("none", "wide")
-            self._demand("augmentation", fits, "none or wide, for a spectrogram is no cloud")
-
-    def _demand(self, field: str, fulfilled: bool, wanted: str) -> None:
-        if not fulfilled:
-            raise InputError(f"recipe: {field} = {getattr(self, field)!r}; it must be {wanted}")
+        for key in ("schedule", "augmentation"):
+            value = getattr(self, key)
+            object.__setattr__(self, key, words.get(str(value), value))
+        check_fields(self, "recipe: ")
+        if self.takes_points != (self.points > 0):
+            wanted = "at least 1" if self.takes_points else "0, for a spectrogram has no points"
+            raise InputError(f"recipe: points = {self.points}; it must be {wanted}")
+        if not self.takes_points and self.augmentation not in ("none", "wide"):
+            raise InputError(
+                f"recipe: augmentation = '{self.augmentation}'; it must be none or wide, for a "
+                "spectrogram is no cloud"
+            )
 
     @property
     def takes_points(self) -> bool:
@@ -225,45 +210,21 @@ class Recipe:
         return cls(**{names.get(key, key): value for key, value in content.items()})
 
 
-PAPER = Recipe("paper")
+RECIPES: dict[str, Recipe] = {}
+"""Predefined recipes by name, those of ``recipes.toml``."""
+
+for _name, _told in tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8")).items():
+    _base = RECIPES.get(_told.pop("base", ""), Recipe(_name))
+    RECIPES[_name] = _base.changed(name=_name, **_told)
+
+PAPER = RECIPES["paper"]
 """Settings of the paper. Unlike the paper, no test cloud is dropped for not filling a batch."""
 
-LEAN = Recipe(
-    "lean",
-    batch=16,
-    epochs=30,
-    rate=2e-3,
-    schedule="one-cycle",
-    weight_decay=1e-2,
-    input_transform=False,
-    feature_transform=False,
-    resample=True,
-    augmentation="physical",
-)
+LEAN = RECIPES["lean"]
 """Our baseline: larger batches at a higher rate, resampled points, augmented clouds, no T-Nets.
 
 T-Nets would mix time with velocity.
 """
 
-SMALL = LEAN.changed(
-    name="small",
-    points=128,
-    batch=32,
-    epochs=50,
-    dropout=0.3,
-    augmentation="wide",
-    network="pooled",
-    edge_s=0.1,
-    label_smoothing=0.05,
-    balanced=True,
-)
-"""A small network, widely varied clouds, few points: what learns from actors for recordings."""
-
-EDGES = SMALL.changed(name="edges", network="edges")
-"""The same with a network that looks at the neighbours of each point."""
-
-SPECTROGRAM = SMALL.changed(name="spectrogram", points=0, network="spectrogram")
-"""Convolutions over the spectrogram, in place of the cloud."""
-
-RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER, SMALL, EDGES, SPECTROGRAM)}
-"""Predefined recipes by name."""
+SMALL, EDGES, SPECTROGRAM = (RECIPES[name] for name in ("small", "edges", "spectrogram"))
+"""A small network, one that looks at the neighbours of each point, and one over spectrograms."""

@@ -121,18 +121,16 @@ def values_of(clouds: Collection, scheme: str) -> NDArray[np.str_]:
 
 def intervals_of(clouds: Collection) -> NDArray[np.int64]:
     """Number the groups of clouds of equal or overlapping intervals of a recording, (cloud,)."""
-    recording = recordings_of(clouds)
-    start = clouds.column("start_s").astype(np.float64)
-    end = start + clouds.column("duration_s").astype(np.float64)
-    intervals = np.zeros(len(clouds), dtype=np.int64)
-    number, last, begun, until = -1, -1, -np.inf, -np.inf
-    for index in np.lexsort((start, recording)):
-        # Intervals with the same start are the same even if they have no length.
-        if recording[index] != last or not (start[index] < until or start[index] == begun):
-            number, last, until = number + 1, recording[index], -np.inf
-        begun, until = start[index], max(until, end[index])
-        intervals[index] = number
-    return intervals
+    import pandas as pd  # slow to import
+
+    start, length = (clouds.column(name).astype(float) for name in ("start_s", "duration_s"))
+    given = {"recording": recordings_of(clouds), "start": start, "end": start + length}
+    table = pd.DataFrame(given).sort_values(["recording", "start"], kind="stable")
+    each = table.groupby("recording")
+    until = each["end"].cummax().groupby(table["recording"]).shift(fill_value=-np.inf)
+    # Intervals with the same start are the same even if they have no length.
+    begins = (table["start"] >= until) & (table["start"] != each["start"].shift())
+    return (begins.cumsum() - 1).sort_index().to_numpy(np.int64)
 
 
 def recordings_of(clouds: Collection) -> NDArray[np.int64]:

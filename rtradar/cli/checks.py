@@ -49,7 +49,7 @@ def paper(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar paper``."""
     if options.mocap is not None and not options.mocap.is_dir():
         raise InputError(f"--mocap {options.mocap}: it is no folder; give that of the recordings")
-    from rtradar.paper.make import make_paper
+    from rtradar.paper import make_paper
 
     content = make_paper(
         options.out,

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.cards import cut, html_card, text_card
-from rtradar.clouds.arrays import ARRAYS, KINDS, attributes
 from rtradar.clouds.sample_files import (
+    ARRAYS,
+    KINDS,
     Sample,
+    attributes,
     damaged,
     read_digest,
     read_index,

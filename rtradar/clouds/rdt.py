@@ -115,7 +115,7 @@ class RdtCloud:
         self._radar = radar
         self._sample = UniformSample(n_points, seed)
         self._last: NDArray[np.bool_] | None = None
-        self._last_time = 0.0
+        self._last_time = -np.inf
         self._n_voxels = 0
 
     def push(self, mask: ArrayLike, time_s: float) -> None:
@@ -136,24 +136,25 @@ class RdtCloud:
         """
         # A copy, as the caller may reuse the array before the next slab.
         cells: NDArray[np.bool_] = np.array(mask)
-        if cells.ndim != 2 or cells.dtype != np.bool_ or 0 in cells.shape:
+        before = cells if self._last is None else self._last
+        if (
+            cells.ndim != 2
+            or cells.dtype != np.bool_
+            or 0 in cells.shape
+            or cells.shape != before.shape
+        ):
+            others = "" if self._last is None else f", {before.shape} as those before it"
             raise InputError(
                 f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; "
-                "it must be (range, velocity) bool"
+                f"it must be (range, velocity) bool{others}"
             )
-        if not np.isfinite(time_s):
-            raise InputError(f"RDT cloud: time_s = {time_s!r}; it must be finite")
+        if not (self._last_time < time_s < np.inf):
+            raise InputError(
+                f"RDT cloud: time_s = {time_s}; it must be finite, and later than that of the last "
+                f"mask, {self._last_time}"
+            )
         if self._last is None:
             self._slab(np.zeros_like(cells), cells, time_s - self._radar.frame_hop_s, time_s)
-        elif cells.shape != self._last.shape:
-            raise InputError(
-                f"RDT cloud: mask has shape {cells.shape}; those before it have {self._last.shape}"
-            )
-        elif time_s <= self._last_time:
-            raise InputError(
-                f"RDT cloud: time_s = {time_s}; "
-                f"it must be later than that of the last mask, {self._last_time}"
-            )
         else:
             self._slab(self._last, cells, self._last_time, time_s)
         self._last, self._last_time = cells, float(time_s)

@@ -4,7 +4,8 @@ An archive holds ``points``, ``spatial``, perhaps ``spatial_source``, maps and j
 (label and provenance as JSON). It is not compressed and has fixed dates, so that the same sample
 gives the same bytes everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all
 bytes before them. A file that is read may be damaged or come from a stranger, so its contents are
-checked before use.
+checked before use. All arrays in the files of runs and data sets are listed in ``arrays.toml``,
+with all that files say of them.
 """
 
 from __future__ import annotations
@@ -14,16 +15,17 @@ import io
 import json
 import os
 import re
+import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds.arrays import ARRAYS, Array
 from rtradar.errors import InputError
 from rtradar.system.checks import brief
 from rtradar.system.files import (
@@ -34,6 +36,56 @@ from rtradar.system.files import (
     read_json,
     remove_parts,
 )
+
+
+class Array(NamedTuple):
+    """Axes, meaning, unit and type of an array; a ``sparse`` one is mostly of one value."""
+
+    dims: tuple[str, ...]
+    meaning: str
+    unit: str = "m2"
+    dtype: str = "<f4"
+    sparse: bool = False
+
+
+_TEXT = resources.files("rtradar.clouds").joinpath("arrays.toml").read_text("utf-8")
+TABLES: Mapping[str, Mapping[str, Array]] = {
+    table: {name: Array(tuple(told.pop("dims")), **told) for name, told in entries.items()}
+    for table, entries in tomllib.loads(_TEXT).items()
+}
+"""Tables of ``arrays.toml``, each with its arrays by name."""
+
+_KEPT = ("spectrogram", "range_doppler", "range_azimuth")
+_AXES = ("time", "range", "velocity", "azimuth", "spectrogram_time", "spectrogram_velocity")
+
+ARRAYS: Mapping[str, Array] = {
+    **TABLES["samples"],
+    **{name: TABLES["maps"][name] for name in _KEPT},
+    **{name: TABLES["axes"][name] for name in _AXES},
+}
+"""Arrays that the file of a sample may hold: clouds, maps, joints, and the axes of those.
+
+``spatial_source`` is there where ``source_names`` of the provenance lists several people or
+objects.
+"""
+
+KINDS = {
+    "clouds": "points",
+    "spatial": "spatial",
+    "spectrograms": "spectrogram",
+    "range_doppler": "range_doppler",
+    "range_azimuth": "range_azimuth",
+    "joints": "joints",
+}
+"""What a data set may hold of each sample, and the name of its array."""
+
+
+def attributes(name: str) -> dict[str, str]:
+    """Return the attributes of an array of a sample: ``units`` and ``long_name``."""
+    return {"units": ARRAYS[name].unit, "long_name": ARRAYS[name].meaning}
+
+
+# -- files -----------------------------------------------------------------------------------------
 
 FORMAT = 1
 """Format number of sample files and of indexes; files with another number are refused."""

@@ -6,7 +6,6 @@ of theirs; `rtradar.exchange.open_samples` makes one line of them.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -219,27 +218,18 @@ def write_npy(path: Path, recording: IfRecording) -> dict[str, Any]:
 
 def open_npy(path: Path) -> SampleFile:
     """Open an array (chirp, rx, sample) or (chirp, tx, rx, sample) of numbers."""
-    with open_regular(path) as file:
-        try:
-            version = np.lib.format.read_magic(file)
-            header = f"read_array_header_{version[0]}_0"
-            shape, fortran, kind = getattr(np.lib.format, header)(file)
-        except Exception as error:  # it parses the header as Python, which fails in many ways
-            raise ValueError(in_short(error)) from None
-        offset, size = file.tell(), path.stat().st_size
-    if fortran or kind.kind not in "ciuf":
-        raise ValueError(f"it holds {kind}{' in the order of Fortran' if fortran else ''}")
-    if offset + math.prod(shape) * kind.itemsize != size:
-        raise ValueError(f"it has {size} bytes, and its header tells of {shape} {kind}")
-    step = math.prod(shape[1:])
+    try:
+        found = np.lib.format.open_memmap(path, mode="r")
+    except Exception as error:  # it parses the header as Python, which fails in many ways
+        raise ValueError(in_short(error)) from None
+    if found.dtype.kind not in "ciuf" or not found.flags.c_contiguous:
+        raise ValueError(f"it holds {found.dtype}, or is in the order of Fortran")
 
     def read(first: int, last: int) -> NDArray[Any]:
-        with open_regular(path) as file:
-            place = offset + first * step * kind.itemsize
-            values = np.fromfile(file, dtype=kind, count=(last - first) * step, offset=place)
-        return values.reshape(last - first, *shape[1:])
+        # Mapped anew, so that what was read takes no memory.
+        return np.array(np.lib.format.open_memmap(path, mode="r")[first:last])
 
-    return _rows(path, shape, read, "", kind)
+    return _rows(path, found.shape, read, "", found.dtype)
 
 
 def write_zarr(path: Path, recording: IfRecording) -> dict[str, Any]:

@@ -1,9 +1,15 @@
-"""The four activities before the paper's radar: its pictures 4, 5 and 8 to 12, side by side."""
+"""Figures of the page that simulated captures give.
+
+The four activities before the paper's radar are its pictures 4, 5 and 8 to 12; CFAR on one channel
+and on all its pictures 6 and 7 and its table 3. Then follow time and memory, and what becomes of
+the paper's chirps at 60 and 77 GHz.
+"""
 
 from __future__ import annotations
 
+import os
+import platform
 import time
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -13,14 +19,24 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from rtradar.bench.runs import measure_baseline
 from rtradar.clouds.rdt import RdtCloud
 from rtradar.clouds.spatial import SpatialCloud
-from rtradar.errors import ValidityWarning
-from rtradar.paper.sources import ACTIVITIES, Sources
-from rtradar.pipeline import Result, run
+from rtradar.errors import InputError
+from rtradar.paper.formulas import slow_chirps
+from rtradar.paper.items import ACTIVITIES, Sources
+from rtradar.pipeline import Result, run, simulate
+from rtradar.process import ca_cfar, os_cfar, power_map, range_spectrum
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import add_colour_bar, bin_edges, few_ticks
+from rtradar.report.figures.canvas import (
+    VELOCITY_LABEL,
+    add_colour_bar,
+    bin_edges,
+    draw_levels,
+    few_ticks,
+)
 from rtradar.system.figure_style import DIVERGING, LIGHT, dress, new_figure, save_figure
+from rtradar.validate.claims import choose, claims, run_claim, validation_folder
 
 Results = Mapping[str, Result]
 
@@ -45,14 +61,12 @@ def activity_figures(sources: Sources) -> dict[str, Any]:
     radar = Radar.preset("paper-12ghz")
     results: dict[str, Result] = {}
     cpu_s = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ValidityWarning)
-        for name, activity in ACTIVITIES.items():
-            motion = sources.motion(name)
-            duration_s = min(activity.shown_s, motion.duration_s)
-            began_s = time.process_time()
-            results[name] = run(motion, radar, duration_s=duration_s)
-            cpu_s.append(time.process_time() - began_s)
+    for name, activity in ACTIVITIES.items():
+        motion = sources.motion(name)
+        duration_s = min(activity.shown_s, motion.duration_s)
+        began_s = time.process_time()
+        results[name] = run(motion, radar, duration_s=duration_s)
+        cpu_s.append(time.process_time() - began_s)
     flat: dict[str, Callable[[Result, Axes], Any]] = {
         "figure-4": lambda result, axes: result.plot.range_time(axes),
         "figure-5": lambda result, axes: result.plot.range_doppler(ax=axes),
@@ -82,10 +96,15 @@ def _side_by_side(
     panels = figure.subplots(2, 2, subplot_kw={"projection": projection})
     for (activity, result), axes in zip(results.items(), panels.flat, strict=True):
         draw(result, axes)
-        for text in list(axes.texts):
-            text.remove()
-        dress(axes, title=ACTIVITIES[activity].title, grid=projection is not None)
+        _dressed(axes, ACTIVITIES[activity].title, grid=projection is not None)
     save_figure(figure, sources.out / f"{name}.png")
+
+
+def _dressed(axes: Any, title: str, *, grid: bool) -> None:
+    """Give a panel its name in the place of all other texts."""
+    for text in list(axes.texts):
+        text.remove()
+    dress(axes, title=title, grid=grid)
 
 
 def _draw_first_points(result: Result, axes: Any) -> None:
@@ -201,3 +220,121 @@ def _strongest_deg(result: Result, name: str) -> float:
     """Find the angle of most power in the first frame [degree]."""
     power = result.maps[f"range_{name}"].values[0].sum(axis=0)
     return float(np.degrees(result.maps[name].values[power.argmax()]))
+
+
+_SCHEMES = ("SISO-CA", "SISO-OS", "MIMO-CA", "MIMO-OS")
+_RULES = {"true": "noise-free map", "rule": "paper's rule", "coded": "paper as coded"}
+
+
+def detection_figures(sources: Sources) -> dict[str, Any]:
+    """Detect a jumping jack on one channel and on all, and score the detectors by `table3.py`.
+
+    Parameters
+    ----------
+    sources : Sources
+        Who moves, and the folder of the pictures.
+
+    Returns
+    -------
+    dict
+        Figures by their names.
+    """
+    radar = Radar.preset("paper-12ghz")
+    duration_s = radar.frame_duration_s + radar.cycle_duration_s
+    capture = simulate(sources.motion("jumping_jack"), radar, duration_s=duration_s)
+    samples = capture.samples.values[: radar.chirps_per_frame]
+    shape = -1, radar.n_tx, radar.n_rx, radar.samples_per_chirp
+    cube = range_spectrum(samples, radar).reshape(shape)
+    found: dict[str, Any] = {}
+    for name, kind, looks in (("figure-6", "one", 1), ("figure-7", "all", radar.n_channels)):
+        power = power_map(cube, radar, channel=0) if looks == 1 else power_map(cube, radar)
+        masks = {"CA": ca_cfar(power, looks=looks), "OS": os_cfar(power, looks=looks)}
+        found |= {f"ca_{kind}": int(masks["CA"].sum()), f"os_{kind}": int(masks["OS"].sum())}
+        _draw(sources, name, power, masks, radar)
+    return found | _table3(quick=sources.quick)
+
+
+def _draw(
+    sources: Sources,
+    name: str,
+    power: NDArray[np.floating[Any]],
+    masks: dict[str, NDArray[np.bool_]],
+    radar: Radar,
+) -> None:
+    """Draw a map once for each detector, with its detections."""
+    figure = new_figure(4.0, width_in=9.0)
+    panels = figure.subplots(1, 2, sharey=True)
+    level = 10 * np.log10(power / power.max())
+    velocity = radar.velocity_mps(radar.cycles_per_frame)
+    for axes, (law, mask) in zip(panels, masks.items(), strict=True):
+        image = draw_levels(axes, level, velocity, radar.range_m)
+        rows, columns = np.nonzero(mask)
+        colour = LIGHT.detection
+        axes.scatter(velocity[columns], radar.range_m[rows], s=5, color=colour)
+        axes.set(xlabel=VELOCITY_LABEL, ylabel="Range [m]", ylim=(2.5, 6.0))
+        dress(axes, title=f"{law}-CFAR, {len(rows)} detections", grid=False)
+    add_colour_bar(image, list(panels), "Power [dB re maximum]")
+    save_figure(figure, sources.out / f"{name}.png")
+
+
+def _table3(*, quick: bool) -> dict[str, Any]:
+    """Run the script of table 3; precision and missing rate by rule of truth, in words."""
+    ((claim, _),) = choose(claims(validation_folder()), "table3")
+    outcome = run_claim(claim, quick=quick)
+    if outcome.trouble:
+        raise RuntimeError(f"{claim.script.name} {outcome.trouble}")
+    together = "one of four" if quick else "all four"
+    rows = {(row.claim, row.quantity): row.ours for row in outcome.rows}
+    found: dict[str, Any] = {"table3_frames": together}
+    for key, rule in _RULES.items():
+        cells = []
+        for scheme in _SCHEMES:
+            where = f"{together}, {rule}"
+            missed = rows[where, f"{scheme} missing rate"]
+            # Where nothing is detected there is no precision.
+            right = rows.get((where, f"{scheme} precision"))
+            cells.append(f"{scheme} {'-' if right is None else f'{right:.1f}'} / {missed:.1f}")
+        found[f"table3_{key}"] = "; ".join(cells)
+    return found
+
+
+_QUICK_S = 1.0
+
+
+def cost_figures(sources: Sources) -> dict[str, Any]:
+    """Time the paper's method and ours, take memory at 77 GHz, and draw what its chirps alias.
+
+    Parameters
+    ----------
+    sources : Sources
+        Who moves, and the folder of the pictures.
+
+    Returns
+    -------
+    dict
+        Figures by their names.
+    """
+    baseline = measure_baseline("paper-12ghz", 1, quick=True)
+    if baseline is None:
+        raise InputError("there is no paper_numpy.py to time; use a checkout, or install again")
+    frame_s = baseline["total"]["median"]
+    motion = sources.motion("jumping_jack")
+    activity = ACTIVITIES["jumping_jack"]
+    longest_s = min(activity.shown_s, motion.duration_s)
+    duration_s = min(_QUICK_S, longest_s) if sources.quick else longest_s
+    summary = run(motion, Radar.preset("paper-77ghz"), duration_s=duration_s).summary
+    figure = new_figure(3.8, width_in=9.0)
+    for axes, name in zip(figure.subplots(1, 2), ("60", "77"), strict=True):
+        radar = slow_chirps(name)
+        aliased = run(motion, radar, fidelity="analytic", duration_s=longest_s)
+        aliased.plot.spectrogram(axes)
+        _dressed(axes, f"{activity.title}, {radar.name}", grid=False)
+    save_figure(figure, sources.out / "number-60-77ghz.png")
+    return {
+        "machine": f"{os.cpu_count()} cores, {platform.machine()}",
+        "numpy_frame_s": frame_s,
+        "numpy_sample_min": frame_s * 117 / 60,
+        "s_77": summary["wall_s"],
+        "capture_77": summary["capture_s"],
+        "mb_77": summary["peak_memory_mb"],
+    }

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.paper.items import PAPER_OS_SCALE
-from rtradar.paper.sources import Sources
+from rtradar.paper.items import PAPER_OS_SCALE, Sources
 from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
 from rtradar.system.figure_style import new_figure, save_figure

@@ -48,9 +48,8 @@ def write_collection(folder: Path, *, frames: tuple[int, ...] = (2, 2, 2)) -> Co
 
 def test_zarr_and_xarray_read_what_the_collection_holds(tmp_path: Path) -> None:
     collection = write_collection(tmp_path / "data")
-    assert (
-        main(["dataset", "export", str(tmp_path / "data"), "--out", str(tmp_path / "x.zarr")]) == 0
-    )
+    words = ["dataset", "export", str(tmp_path / "data"), "--out", str(tmp_path / "x.zarr")]
+    assert main(words) == 0
     group = zarr.open_group(tmp_path / "x.zarr", mode="r")
     with xr.open_zarr(tmp_path / "x.zarr") as data:
         assert data["sample"].values.tolist() == list(collection.ids)
@@ -72,10 +71,8 @@ def test_zarr_and_xarray_read_what_the_collection_holds(tmp_path: Path) -> None:
             for name, value in collection.provenance[index].items():
                 read = one[name].values[()]
                 assert (json.loads(read) if isinstance(value, list) else read) == value
-        assert set(data.coords) == {"sample", "coordinate", "axis", "joint", "time"} | {
-            "spectrogram_time",
-            "spectrogram_velocity",
-        }
+        coords = "sample coordinate axis joint time spectrogram_time spectrogram_velocity"
+        assert set(data.coords) == set(coords.split())
         assert "folder" not in data
         assert data["seed"].dtype == np.int64
         assert data["snr_db"].attrs["units"] == "dB"
@@ -130,9 +127,8 @@ def test_samples_of_several_lengths_are_filled_up(tmp_path: Path) -> None:
     export_dataset([tmp_path / "data"], tmp_path / "x.zarr")
     with xr.open_zarr(tmp_path / "x.zarr") as data:
         np.testing.assert_array_equal(data["time_of_sample"][0], [0.0, 0.1, np.nan])
-        np.testing.assert_array_equal(
-            data["joints"][2, :1], read_sample(collection.paths[2], "joints")
-        )
+        own = read_sample(collection.paths[2], "joints")
+        np.testing.assert_array_equal(data["joints"][2, :1], own)
         assert np.isnan(data["joints"][2, 1:]).all()
 
 
@@ -142,11 +138,8 @@ def test_nothing_is_replaced_and_nothing_half_written_stays(
     write_collection(tmp_path / "data")
     (tmp_path / "mine").write_text("mine")
     before = sorted(tmp_path.iterdir())
-    for out, says in (
-        ("mine", "is there already"),
-        ("data", "is there already"),
-        ("none/x.zarr", "there is no folder"),
-    ):
+    there = "is there already"
+    for out, says in (("mine", there), ("data", there), ("none/x.zarr", "there is no folder")):
         words = ["dataset", "export", str(tmp_path / "data"), "--out", str(tmp_path / out)]
         assert main(words) == 2
         said = capsys.readouterr().err
@@ -174,17 +167,16 @@ def test_the_file_to_begin_with_can_be_built_and_has_every_key(
     assert main(["dataset", "init"]) == 0
     assert "rtradar dataset build dataset.toml --out DIR" in capsys.readouterr().out
     assert build_dataset(Path("dataset.toml"), Path("out"))["made"] == 8
-    text = Path("dataset.toml").read_text()
+    text = before = Path("dataset.toml").read_text()
     for key in (*RUN_KEYS, *DRAWN, *EACH, *INTERVAL_KEYS, "seed", "keep", "folder", "skeleton"):
         assert f"{key} = " in text, key
     # Everything that is commented out may be put in.
-    more = (
-        text.replace("# pfa", "pfa").replace("# keep ", "keep ").replace("# spreading", "spreading")
-    )
-    Path("more.toml").write_text(more)
+    for key in ("pfa", "keep ", "spreading"):
+        text = text.replace(f"# {key}", key)
+    Path("more.toml").write_text(text)
     assert len(read_spec(Path("more.toml")).keep) == 4
     assert main(["dataset", "init"]) == 2
     assert "'dataset.toml' is there already; give another name" in capsys.readouterr().err
-    assert Path("dataset.toml").read_text() == text
+    assert Path("dataset.toml").read_text() == before
     with pytest.raises(InputError, match="give a folder that exists"):
         write_template(Path("none/x.toml"))

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import shutil
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.campaign.samples import SamplePlan, counts, plan_samples, scene_digest
+from rtradar.campaign.intervals import Augmented, mirrored, vary
+from rtradar.campaign.samples import SamplePlan, counts, make_sample, plan_samples, scene_digest
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
+from rtradar.motion import synthetic_motion
+from rtradar.motion.skeleton import NODES
 from rtradar.settings import RunSettings
+from rtradar.validate import validation_folder
 
 HEAD = """
 [windows]
@@ -62,9 +68,8 @@ def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
 
 def test_every_take_meets_every_setting(tmp_path: Path) -> None:
     each = '[each]\nradar = ["paper-12ghz", "paper-77ghz"]\nfidelity = ["analytic", "specular"]\n'
-    found = planned(
-        tmp_path, HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5)
-    )
+    text = HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5)
+    found = planned(tmp_path, text)
     assert len(found) == (5 + 5 + 5) * 4  # 3 s every 0.5 s: five intervals of 1 s
     told = counts(found)
     assert told["label"] == {"kick": 20, "walk": 40}
@@ -75,12 +80,11 @@ def test_every_take_meets_every_setting(tmp_path: Path) -> None:
 
 
 def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
-    found = planned(
-        tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk")
-    )
-    by_take: dict[str, list[SamplePlan]] = {}
+    each = '[each]\nfidelity = ["analytic", "specular"]\n'
+    found = planned(tmp_path, HEAD + each + actors(4, "walk"))
+    by_take = defaultdict(list)
     for recipe in found:
-        by_take.setdefault(recipe.parameters["recording"], []).append(recipe)
+        by_take[recipe.parameters["recording"]].append(recipe)
     assert len(by_take) == 4
     for one, other in by_take.values():
         differs = {key for key in one.parameters if one.parameters[key] != other.parameters[key]}
@@ -90,14 +94,9 @@ def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
 def test_ids_do_not_depend_on_what_else_there_is_or_where(tmp_path: Path) -> None:
     other = tmp_path / "elsewhere"
     other.mkdir()
-    few = {
-        recipe.identity
-        for recipe in planned(tmp_path, HEAD + actors(3, "walk") + recording(tmp_path))
-    }
-    many = {
-        recipe.identity
-        for recipe in planned(other, HEAD + actors(9, "kick", "walk") + recording(other, hop_s=0.5))
-    }
+    small = planned(tmp_path, HEAD + actors(3, "walk") + recording(tmp_path))
+    large = planned(other, HEAD + actors(9, "kick", "walk") + recording(other, hop_s=0.5))
+    few, many = ({recipe.identity for recipe in found} for found in (small, large))
     assert len(few) == 4
     assert few < many
 
@@ -127,21 +126,15 @@ def test_what_is_drawn_is_the_same_tomorrow(tmp_path: Path) -> None:
     (recipe,) = planned(tmp_path, HEAD + actors(1, "walk"))
     # The first eight digits that sha256sum gives for (0, 'walk', 0), and for ('subject', 0).
     assert recipe.parameters["seed"] == recipe.parameters["take"] == 0x94DE7F0B
-    take, subject = (
-        np.random.default_rng([seed, 0]).random(8) for seed in (0x94DE7F0B, 0xC9D761C3)
-    )
-    told = {
-        key: recipe.parameters[key]
-        for key in ("heading_deg", "snr_db", "tempo", "amplitude", "build", "height_m")
-    }
-    assert told == {
-        "heading_deg": round(-30 + 60 * take[0], 4),
-        "snr_db": round(10 + 20 * take[1], 4),
-        "tempo": round(0.8 + 0.45 * take[4], 4),
-        "amplitude": round(0.8 + 0.3 * take[5], 4),
-        "build": round(0.8 + 0.45 * subject[6], 4),
-        "height_m": round(1.55 + 0.4 * subject[7], 4),
-    }
+    seeds = (0x94DE7F0B, 0xC9D761C3)
+    take, subject = (np.random.default_rng([seed, 0]).random(8) for seed in seeds)
+    drawn = {
+        "heading_deg": -30 + 60 * take[0], "snr_db": 10 + 20 * take[1],
+        "tempo": 0.8 + 0.45 * take[4], "amplitude": 0.8 + 0.3 * take[5],
+        "build": 0.8 + 0.45 * subject[6], "height_m": 1.55 + 0.4 * subject[7],
+    }  # fmt: skip
+    told = {key: recipe.parameters[key] for key in drawn}
+    assert told == {key: round(value, 4) for key, value in drawn.items()}
 
 
 def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
@@ -150,9 +143,8 @@ def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
     drawn = "[drawn]\nheading_deg = [7, 7]\noffset_x_m = [0.25, 0.25]\noffset_y_m = [-0.5, -0.5]\n"
     each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\n"
     each += "radar_position_m = [[-3, 0, 1.5]]\n"
-    (recipe,) = planned(
-        tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk")
-    )
+    text = "[windows]\nduration_s = 1.0\n" + drawn + each
+    (recipe,) = planned(tmp_path, text + actors(1, "walk"))
     told = recipe.parameters
     assert (told["heading_deg"], told["snr_db"]) == (7, 3)
     assert told["person_position_m"] == list(recipe.scene.person_position_m) == [1.25, 1.5]
@@ -163,14 +155,11 @@ def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
 
 def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
     found = planned(tmp_path, HEAD + actors(60, "walk", "kick"))
-    for key, (low, high) in {
-        "heading_deg": (-30, 30),
-        "snr_db": (10, 30),
-        "tempo": (0.8, 1.25),
-        "amplitude": (0.8, 1.1),
-        "build": (0.8, 1.25),
-        "height_m": (1.55, 1.95),
-    }.items():
+    ranges = {
+        "heading_deg": (-30, 30), "snr_db": (10, 30), "tempo": (0.8, 1.25),
+        "amplitude": (0.8, 1.1), "build": (0.8, 1.25), "height_m": (1.55, 1.95),
+    }  # fmt: skip
+    for key, (low, high) in ranges.items():
         values = {
             label: np.array([r.parameters[key] for r in found if r.label == label])
             for label in ("walk", "kick")
@@ -180,17 +169,15 @@ def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
             assert drawn.max() <= high
         if key not in ("build", "height_m"):  # which are those of the same three people
             # Means of 60 uniform values each: five standard deviations of their difference.
-            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * (high - low) / np.sqrt(
-                12
-            ) * np.sqrt(2 / 60)
+            spread = (high - low) / np.sqrt(12) * np.sqrt(2 / 60)
+            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * spread
 
 
 def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
-    bodies: dict[str, set[tuple[float, float]]] = {}
+    bodies = defaultdict(set)
     for recipe in planned(tmp_path, HEAD + actors(6, "walk", "punch")):
-        bodies.setdefault(recipe.parameters["subject"], set()).add(
-            (recipe.parameters["build"], recipe.parameters["height_m"])
-        )
+        told = recipe.parameters
+        bodies[told["subject"]].add((told["build"], told["height_m"]))
     assert len(bodies) == 3
     assert all(len(body) == 1 for body in bodies.values())
     assert len(set.union(*bodies.values())) == 3
@@ -199,9 +186,8 @@ def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
 def test_a_range_that_changes_moves_no_other(tmp_path: Path) -> None:
     (one,) = planned(tmp_path, HEAD + actors(1, "walk"))
     (other,) = planned(tmp_path, HEAD + "tempo = [1.0, 1.0]\n" + actors(1, "walk"))
-    assert {key for key in one.parameters if one.parameters[key] != other.parameters[key]} == {
-        "tempo"
-    }
+    differs = {key for key in one.parameters if one.parameters[key] != other.parameters[key]}
+    assert differs == {"tempo"}
 
 
 def test_parameters_are_plain_json_and_tell_what_a_reader_needs(tmp_path: Path) -> None:
@@ -222,18 +208,16 @@ def test_what_is_sent_of_a_recording_is_what_its_interval_needs(tmp_path: Path) 
 
 def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
     text = recording(tmp_path)
-    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace(
-        "31", "30"
-    )  # 29 / 15 s = 1.93333...
+    # 29 / 15 s = 1.93333...
+    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace("31", "30")
     (tmp_path / "walk.bvh").write_text(third.rstrip().rpartition("\n")[0] + "\n")
     (recipe,) = planned(tmp_path, text)
     packed = recipe.packed().motion
     assert packed is not None
     assert recipe.interval_s == 1.933333
     assert packed.duration_s == pytest.approx(29 / 15, abs=1e-6)
-    (later,) = planned(
-        tmp_path, text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666")
-    )
+    text = text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666")
+    (later,) = planned(tmp_path, text)
     assert later.interval_s == 1.666667
     assert later.packed().motion is not None
 
@@ -257,9 +241,7 @@ def test_settings_of_a_run_reach_the_sample_and_change_ids_where_they_are_not_th
 
 
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"recording 'walk.bvh' from 0 s is given twice; leave one out"
-    ):
+    with pytest.raises(InputError, match=r"'walk.bvh' from 0 s is given twice; leave one out"):
         planned(tmp_path, HEAD + recording(tmp_path) * 2)
 
 
@@ -362,9 +344,118 @@ def test_random_rooms_are_one_for_each_interval(tmp_path: Path) -> None:
     assert len({plan.parameters["scene_digest"] for plan in planned}) == 3
     assert {plan.kind[1] for plan in planned} == {"random"}
     assert all(plan.scene.walls for plan in planned)
-    assert [plan.identity for plan in plan_samples(read_spec(file))] == [
-        plan.identity for plan in planned
-    ]
+    again = plan_samples(read_spec(file))
+    assert [plan.identity for plan in again] == [plan.identity for plan in planned]
     file.write_text(text.replace("[each]", '[each]\nscene = ["living-room"]'))
     with pytest.raises(InputError, match="leave scene and radar_position_m under"):
         read_spec(file)
+
+
+PLAIN = {"mirror": False, "tempo": 1.0, "height": 1.0, "build": 1.0} | {
+    "drift_mps": 0.0,
+    "drift_deg": 0.0,
+}
+
+
+def test_a_mirrored_person_moves_the_other_side_alike() -> None:
+    kicker = synthetic_motion("kick", seed=1, duration_s=2.0)
+    other = mirrored(kicker)
+    times = np.linspace(0, 2, 50)
+    here, there = kicker.at(times)[0], other.at(times)[0]
+    for node in NODES:
+        twin = {"l": "r", "r": "l"}.get(node[0], "") + node[1:] if node[1] == "_" else node
+        place, opposite = (NODES.index(name) for name in (node, twin))
+        assert there[:, opposite] == pytest.approx(here[:, place] * [1, -1, 1], abs=1e-9)
+    assert mirrored(other).positions == pytest.approx(kicker.positions, abs=1e-12)
+
+
+def test_tempo_height_build_and_drift_are_those_that_are_said() -> None:
+    walker = synthetic_motion("walk", seed=1, duration_s=2.0)
+    how = PLAIN | {"tempo": 1.25, "height": 1.1, "build": 0.9, "drift_mps": 0.4, "drift_deg": 90.0}
+    other = vary(walker, how)
+    assert other.duration_s == pytest.approx(1.6)
+    assert other.girth == pytest.approx(walker.girth * 1.1 * 0.9)
+    times = np.linspace(0, 1.6, 40)
+    expected = 1.1 * walker.at(1.25 * times)[0] + 0.4 * times[:, None, None] * [0, 1, 0]
+    # PCHIP of a sum is not the sum of both, to some micrometres.
+    assert other.at(times)[0] == pytest.approx(expected, abs=2e-5)
+    assert vary(walker, PLAIN).positions == pytest.approx(walker.positions)
+
+
+def test_copies_never_reach_beyond_the_recording() -> None:
+    augmented = Augmented(1)
+    for seed in range(200):
+        drawn = augmented.draw(seed, 0.4, 1.6, 2.05)
+        assert drawn["start_s"] >= 0
+        assert drawn["start_s"] + 1.6 * drawn["varied"]["tempo"] <= 2.05 + 1e-9
+    assert len({augmented.draw(seed, 0.4, 1.6, 9.0)["start_s"] for seed in range(9)}) == 9
+
+
+def test_a_data_set_has_the_copies_beside_the_recording(
+    tmp_path: Path, small_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    walker = synthetic_motion("walk", seed=2, duration_s=1.5)
+    monkeypatch.setattr("rtradar.campaign.samples.load_motion", lambda path, skeleton: walker)
+    (tmp_path / "walk.bvh").touch()
+    shutil.copy(small_file, tmp_path)
+    text = (
+        "[windows]\nduration_s = 0.5\nstart_s = 0.5\n[augmented]\ncopies = 3\n[each]\n"
+        'fidelity = ["analytic"]\nradar = ["small.toml"]\n'
+        '[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\n'
+    )
+    (tmp_path / "set.toml").write_text(text)
+    plans = plan_samples(read_spec(tmp_path / "set.toml"))
+    assert len({plan.identity for plan in plans}) == 4
+    assert sum("varied" in plan.parameters for plan in plans) == 3
+    copy = next(plan for plan in plans if "varied" in plan.parameters)
+    assert len(make_sample(copy.packed()).sample.points)
+    (tmp_path / "set.toml").write_text(text.replace("copies = 3", "copies = 3\nmirror = true"))
+    with pytest.raises(InputError, match=r"\[augmented\] .*mirror"):
+        read_spec(tmp_path / "set.toml")
+
+
+FOUR = ("jumping_jack", "kick", "punch", "walk")
+
+
+@pytest.mark.parametrize(
+    ("name", "each", "settings"),
+    [
+        ("paper_400", 100, 1),
+        ("transfer_free_space", 50, 4),
+        ("transfer_room", 50, 2),
+        ("noise_100", 25, 1),
+    ],
+)
+def test_every_activity_has_as_many(name: str, each: int, settings: int) -> None:
+    found = plan_samples(read_spec(validation_folder() / f"{name}.toml"))
+    assert counts(found)["label"] == dict.fromkeys(FOUR, each * settings)
+    assert len(counts(found)["subject"]) == 20
+
+
+def test_both_sets_of_the_transfer_have_the_same_motions() -> None:
+    drawn = (
+        "recording tempo amplitude build height_m heading_deg snr_db person_position_m take seed"
+    )
+    free, room = (
+        {
+            recipe.parameters["recording"]: recipe
+            for recipe in plan_samples(read_spec(validation_folder() / f"transfer_{name}.toml"))
+        }
+        for name in ("free_space", "room")
+    )
+    assert free.keys() == room.keys()
+    for name in free:
+        differs = {
+            key for key in drawn.split() if free[name].parameters[key] != room[name].parameters[key]
+        }
+        assert differs <= {"person_position_m"}  # which is where the room says, and the same offset
+
+
+@pytest.mark.slow  # reads all of them
+def test_real_recordings_are_of_all_activities(
+    mocap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RTRADAR_MOCAP", str(mocap))
+    told = counts(plan_samples(read_spec(validation_folder() / "real_recordings.toml")))
+    assert tuple(told["label"]) == FOUR
+    assert told["source"] == {"recorded": 92}

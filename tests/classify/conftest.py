@@ -38,24 +38,18 @@ class MadeUpClouds(Collection):
         self._n_points, self._seed = n_points, seed
         self.rows: list[dict[str, Any]] = [
             {
-                "label": label,
-                "recording": f"{label}-{motion}",
+                "label": label, "recording": f"{label}-{motion}",
                 "subject": f"subject-{motion % subjects}",
                 "source": "recorded" if motion % 2 else "synthetic",
-                "start_s": 0.5,
-                "duration_s": 1.0,
-                "fidelity": ("analytic", "specular")[view % 2],
-                "scene": "free-space",
-                "radar": "paper-12ghz",
+                "start_s": 0.5, "duration_s": 1.0, "scene": "free-space", "radar": "paper-12ghz",
+                "fidelity": ("analytic", "specular")[view % 2], "snr_db": 20.0, "seed": view,
                 "heading_deg": float((motion * 37) % 11),
                 "person_position_m": [0.1 * motion, 0.0],
-                "snr_db": 20.0,
-                "seed": view,
             }
             for label in LABELS
             for motion in range(per_class)
             for view in range(views)
-        ]
+        ]  # fmt: skip
         self._name = "made up"
         self._about = [{"label": row["label"], "provenance": row} for row in self.rows]
 
@@ -68,9 +62,8 @@ class MadeUpClouds(Collection):
         random = np.random.default_rng([self._seed, index])
         time = random.uniform(0.5, 1.5, self._n_points)
         turns = 1 + LABELS.index(self.rows[index]["label"])
-        velocity = 2 * np.sin(2 * np.pi * turns * (time - 0.5)) + random.normal(
-            0, 0.1, self._n_points
-        )
+        velocity = 2 * np.sin(2 * np.pi * turns * (time - 0.5))
+        velocity += random.normal(0, 0.1, self._n_points)
         return np.stack([time, 4 + random.normal(0, 0.1, self._n_points), velocity], axis=1)
 
     def spatial(self, index: int) -> NDArray[np.float64]:
@@ -89,11 +82,7 @@ def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     names = [f"{index:03d}" for index in range(len(clouds))]
     for index, (name, row) in enumerate(zip(names, clouds.rows, strict=True)):
         provenance = {key: value for key, value in row.items() if key != "label"}
-        write_sample(
-            folder,
-            name,
-            Sample(clouds.points(index), row["label"], provenance),
-            clouds.spatial(index),
-        )
+        sample = Sample(clouds.points(index), row["label"], provenance)
+        write_sample(folder, name, sample, clouds.spatial(index))
     write_index(folder, names)
     return folder

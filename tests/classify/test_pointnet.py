@@ -1,11 +1,26 @@
+"""Small networks and what they learn from: order, training, varied clouds, people left out."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
 import pytest
 import torch
 from torch import nn
 
-from rtradar.classify.pointnet import PointNet, PointwiseLayer, PooledLayer, TransformNet
-from rtradar.classify.recipes import PAPER, Recipe
+from rtradar.classify.pointnet import (
+    PointNet,
+    PointwiseLayer,
+    PooledLayer,
+    TransformNet,
+    build_network,
+)
+from rtradar.classify.prepare import for_training
+from rtradar.classify.recipes import PAPER, RECIPES, Recipe
+from rtradar.classify.splits import make_splits
+from rtradar.classify.training import Examples, predict, train_network
 
 COARSE = PAPER.changed(precision="bfloat16")
 
@@ -29,9 +44,8 @@ def test_the_order_of_points_does_not_matter(recipe: Recipe) -> None:
     network.eval()
     points = clouds()
     with torch.no_grad():
-        torch.testing.assert_close(
-            network(points[:, torch.randperm(30)]), network(points), rtol=1e-4, atol=1e-5
-        )
+        turned = network(points[:, torch.randperm(30)])
+        torch.testing.assert_close(turned, network(points), rtol=1e-4, atol=1e-5)
 
 
 def test_a_repeated_point_changes_nothing() -> None:
@@ -43,10 +57,8 @@ def test_a_repeated_point_changes_nothing() -> None:
 
 @pytest.mark.parametrize("size", [3, 64])
 def test_transforms_begin_as_the_identity(size: int) -> None:
-    net = TransformNet(size, torch.float32)
-    torch.testing.assert_close(
-        net(clouds(n_features=size)), torch.eye(size).expand(4, size, size), rtol=0, atol=0
-    )
+    found = TransformNet(size, torch.float32)(clouds(n_features=size))
+    assert torch.equal(found, torch.eye(size).expand(4, size, size))
 
 
 def test_answers_are_probabilities_and_the_identity_is_not_skew() -> None:
@@ -62,10 +74,8 @@ class Plain(nn.Module):
     def __init__(self, layer: PointwiseLayer | PooledLayer) -> None:
         super().__init__()
         outputs, inputs = layer.linear.weight.shape
-        self.convolution, self.norm = (
-            nn.Conv1d(inputs, outputs, 1, bias=False),
-            nn.BatchNorm1d(outputs, momentum=None),
-        )
+        self.convolution = nn.Conv1d(inputs, outputs, 1, bias=False)
+        self.norm = nn.BatchNorm1d(outputs, momentum=None)
         self.double()
         with torch.no_grad():
             self.convolution.weight.copy_(layer.linear.weight[..., None])
@@ -116,3 +126,44 @@ def test_a_search_in_bfloat16_is_off_by_its_rounding_alone() -> None:
         weight, _ = exact.folded(x.flatten(0, 1))
         size = (x[:, :, None] * weight.abs()).sum(dim=3).amax(dim=1)
     assert (best - found <= 2 * 2**-8 * size).all()
+
+
+@pytest.mark.parametrize("name", ["small", "edges"])
+def test_the_order_of_points_does_not_matter_and_clouds_are_learnt(name: str) -> None:
+    torch.manual_seed(0)
+    recipe = RECIPES[name].changed(epochs=12, batch=8, points=48)
+    classes = torch.arange(32) % 2
+    points = torch.randn(32, 64, 3) * torch.tensor([0.4, 0.2, 1.0])
+    points[..., 2] += 2.0 * (classes[:, None] - 0.5) * points[..., 0].sign()
+    examples = Examples(points, classes, ("a", "b"))
+    network, history = train_network(examples, examples, recipe)
+    chances = predict(network, examples, recipe)
+    assert np.mean(chances.argmax(axis=1) == classes.numpy()) == 1
+    assert len(history) == 12
+    turned = Examples(points[:, :48].flip(1), classes, ("a", "b"))
+    assert predict(network, turned, recipe) == pytest.approx(chances, abs=1e-4)
+    assert build_network(2, recipe).training
+
+
+def test_varied_clouds_keep_their_size_and_their_middle_in_time_and_range() -> None:
+    torch.manual_seed(0)
+    points = torch.randn(5, 100, 3) + torch.tensor([0.8, 4.0, 0.0])
+    varied = for_training(points, "wide", "physical")
+    assert varied.shape == points.shape
+    assert torch.isfinite(varied).all()
+    assert varied[..., :2].mean(dim=1).abs().max() < 1e-5
+    assert not torch.allclose(varied, for_training(points, "wide", "physical"))
+
+
+def test_each_recorded_person_is_left_out_once_and_actors_are_always_learnt_from(
+    made_up: Callable[..., Any],
+) -> None:
+    clouds = made_up(per_class=6, subjects=6)
+    splits = make_splits(clouds, "leave-one-subject-out")
+    source, subject = clouds.column("source"), clouds.column("subject")
+    assert len(splits) == len(set(subject[source == "recorded"]))
+    for split in splits:
+        assert set(source[split.test]) == {"recorded"}
+        assert len(set(subject[split.test])) == 1
+        assert not set(subject[split.test]) & set(subject[split.train])
+        assert len(split.train) + len(split.test) == len(clouds)

@@ -45,20 +45,18 @@ def tables(draw: st.DrawFn) -> Table:
     """Recordings of one subject, label and source each; intervals may be equal or overlap."""
     rows = []
     for number in range(draw(st.integers(4, 14))):
-        recording = {
-            "recording": f"recording-{number}",
-            "label": draw(st.sampled_from(["kick", "walk"])),
-            "subject": draw(st.sampled_from("abcd")),
-            "source": draw(st.sampled_from(["synthetic", "recorded"])),
+        choices = {
+            "label": ["kick", "walk"],
+            "subject": "abcd",
+            "source": ["synthetic", "recorded"],
         }
+        recording = {name: draw(st.sampled_from(some)) for name, some in choices.items()}
+        recording["recording"] = f"recording-{number}"
         for _ in range(draw(st.integers(1, 4))):
-            interval = {
-                "start_s": draw(st.sampled_from([0.0, 0.5, 1.0, 2.0])),
-                "duration_s": draw(st.sampled_from([0.5, 1.0])),
-            }
-            seen_by = draw(
-                st.lists(st.sampled_from(["analytic", "specular"]), min_size=1, max_size=3)
-            )
+            choices = {"start_s": [0.0, 0.5, 1.0, 2.0], "duration_s": [0.5, 1.0]}
+            interval = {name: draw(st.sampled_from(some)) for name, some in choices.items()}
+            models = st.sampled_from(["analytic", "specular"])
+            seen_by = draw(st.lists(models, min_size=1, max_size=3))
             rows += [recording | interval | {"fidelity": fidelity} for fidelity in seen_by]
     return Table(draw(st.permutations(rows)))
 
@@ -66,13 +64,8 @@ def tables(draw: st.DrawFn) -> Table:
 @pytest.mark.parametrize("scheme", ["folds", "recording", "across:fidelity"])
 def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
     def row(name: str, content: str, label: str) -> dict[str, Any]:
-        told = {
-            "recording": name,
-            "recording_digest": content,
-            "label": label,
-            "fidelity": "specular",
-        }
-        return told | {"start_s": 0.0, "duration_s": 1.0}
+        told = {"recording": name, "recording_digest": content, "label": label}
+        return told | {"fidelity": "specular", "start_s": 0.0, "duration_s": 1.0}
 
     rows = []
     for label in ("kick", "walk"):
@@ -81,36 +74,25 @@ def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
             # once with another skeleton.
             one, other = f"{label}/{number}.amc", f"{number}-{label}.amc"
             content = f"{label}{number}"
-            rows += [
-                row(one, content, label),
-                row(other, content, label),
-                row(other, f"{content} and another .asf", label),
-            ]
-        rows += [
-            row(f"synthetic:{label}:{number}", "", label) for number in range(4)
-        ]  # these have none
+            rows += [row(one, content, label), row(other, content, label)]
+            rows += [row(other, f"{content} and another .asf", label)]
+        rows += [row(f"synthetic:{label}:{number}", "", label) for number in range(4)]
     table = Table(rows)
     assert len(set(recordings_of(table).tolist())) == 2 * (4 + 4)
     for split in make_splits(table, scheme, folds=4):
+        sides = (split.train, split.test)
         train, test = (
-            {
-                rows[index]["recording_digest"].split()[0]
-                for index in side
-                if rows[index]["recording_digest"]
-            }
-            for side in (split.train, split.test)
+            {rows[k]["recording_digest"].partition(" ")[0] for k in one} for one in sides
         )
-        assert not train & test
+        assert train & test <= {""}  # actors have none
 
 
 def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
     # Folds follow from the numbers: trainings that are gone on with shall find those that they
     # began with.
     names = np.random.default_rng(0).permutation([f"{number}.amc" for number in range(40)] * 3)
-    rows = [
-        {"recording": name, "recording_digest": f"{name[::-1]}", "label": "walk"}
-        for name in names.tolist()
-    ]
+    told = {"label": "walk"}
+    rows = [told | {"recording": n, "recording_digest": n[::-1]} for n in names.tolist()]
     assert recordings_of(Table(rows)).tolist() == np.unique(names, return_inverse=True)[1].tolist()
 
 
@@ -129,10 +111,8 @@ def test_no_moment_of_a_recording_is_on_both_sides(
     except InputError:
         return  # too few recordings for it, and said so
     recording, start = table.column("recording"), table.column("start_s")
-    end, kept_apart = (
-        start + table.column("duration_s"),
-        {"subject": "subject", "recording": "recording", "recorded": "source"},
-    )
+    end = start + table.column("duration_s")
+    kept_apart = {"subject": "subject", "recording": "recording", "recorded": "source"}
     for split in splits:
         assert not set(split.train) & set(split.test)
         for one in split.train:
@@ -145,9 +125,8 @@ def test_no_moment_of_a_recording_is_on_both_sides(
             assert set(table.column("fidelity")[split.train]) == {split.trained_on}
             assert not set(recording[split.train]) & set(recording[split.test])
     if scheme not in ("recorded", "across:fidelity"):
-        assert sorted(np.concatenate([split.test for split in splits]).tolist()) == list(
-            range(len(table))
-        )
+        asked = np.concatenate([split.test for split in splits])
+        assert sorted(asked.tolist()) == list(range(len(table)))
 
 
 def test_the_papers_folds_are_stratified(made_up: Callable[..., Any]) -> None:
@@ -160,11 +139,11 @@ def test_the_papers_folds_are_stratified(made_up: Callable[..., Any]) -> None:
 
 def test_the_seed_decides(made_up: Callable[..., Any]) -> None:
     clouds = made_up(per_class=20)
-    first, again, other = (make_splits(clouds, "folds", seed=seed) for seed in (1, 1, 2))
-    assert all(np.array_equal(one.test, two.test) for one, two in zip(first, again, strict=True))
-    assert not all(
-        np.array_equal(one.test, two.test) for one, two in zip(first, other, strict=True)
+    first, again, other = (
+        [split.test.tolist() for split in make_splits(clouds, "folds", seed=seed)]
+        for seed in (1, 1, 2)
     )
+    assert first == again != other
 
 
 def test_across_learns_from_every_value_and_asks_about_all(made_up: Callable[..., Any]) -> None:
@@ -173,13 +152,10 @@ def test_across_learns_from_every_value_and_asks_about_all(made_up: Callable[...
     assert [split.trained_on for split in splits] == ["analytic"] * 3 + ["specular"] * 3
     fidelity = clouds.column("fidelity")
     assert all(set(fidelity[split.test]) == {"analytic", "specular"} for split in splits)
-    assert all(
-        np.array_equal(one.test, two.test) for one, two in zip(splits[:3], splits[3:], strict=True)
-    )
-    assert set(values_of(clouds, "across:fidelity,scene")) == {
-        "analytic / free-space",
-        "specular / free-space",
-    }
+    asked = [split.test.tolist() for split in splits]
+    assert asked[:3] == asked[3:]
+    both = {"analytic / free-space", "specular / free-space"}
+    assert set(values_of(clouds, "across:fidelity,scene")) == both
 
 
 def test_intervals_that_overlap_are_one_moment() -> None:
@@ -196,9 +172,7 @@ def test_a_leak_is_never_handed_out() -> None:
     split = Split("fold 1", np.array([0, 1]), np.array([2, 3]))
     labels = np.array(["walk"] * 4)
     check(split, np.array([0, 1, 2, 3]), labels)
-    with pytest.raises(
-        InputError, match="1 intervals are on both sides, the first is that of cloud 1"
-    ):
+    with pytest.raises(InputError, match=r"1 intervals are on both sides, the first .* of cloud 1"):
         check(split, np.array([0, 2, 2, 3]), labels)
     with pytest.raises(InputError, match="no training cloud shows kick"):
         check(split, np.arange(4), np.array(["walk", "walk", "kick", "walk"]))
@@ -207,13 +181,8 @@ def test_a_leak_is_never_handed_out() -> None:
 
 
 def test_one_source_cannot_be_split_by_source() -> None:
-    row = {
-        "recording": "a",
-        "start_s": 0.0,
-        "duration_s": 1.0,
-        "label": "walk",
-        "source": "synthetic",
-    }
+    row = {"recording": "a", "start_s": 0.0, "duration_s": 1.0, "label": "walk"}
+    row |= {"source": "synthetic"}
     with pytest.raises(InputError, match="no cloud has source 'recorded'"):
         make_splits(Table([row]), "recorded")
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,19 +81,13 @@ def test_a_training_that_was_stopped_ends_as_one_that_was_not(
         train_network(examples, examples, recipe, seed=3, checkpoint=path, on_epoch=stop)
     assert load_checkpoint(path).epochs == 2
     seen: list[int] = []
-    again, taken_up = train_network(
-        examples,
-        examples,
-        recipe,
-        seed=3,
-        checkpoint=path,
-        on_epoch=lambda epoch, row: seen.append(epoch),
-    )
+    go_on = partial(train_network, examples, examples, recipe, seed=3, checkpoint=path)
+    again, taken_up = go_on(on_epoch=lambda epoch, row: seen.append(epoch))
     assert seen == [2, 3, 4]
     assert torch.equal(weights(again), weights(whole))
     assert [row["train_loss"] for row in taken_up] == [row["train_loss"] for row in history]
     # A third time there is nothing to do.
-    done, _ = train_network(examples, examples, recipe, seed=3, checkpoint=path)
+    done, _ = go_on()
     assert torch.equal(weights(done), weights(whole))
     assert load_checkpoint(path).optimiser == {}
 
@@ -182,11 +177,8 @@ def test_a_checkpoint_of_another_network_is_refused(examples: Examples, tmp_path
 
 def test_a_processor_without_bfloat16_is_not_asked_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     cpu = torch.device("cpu")
-    for known, wanted in (
-        ({}, "float32"),
-        ({"avx512_bf16": True}, "bfloat16"),
-        ({"avx512_bf16": False}, "float32"),
-    ):
+    named = {"avx512_bf16": True}, {"avx512_bf16": False}, {}
+    for known, wanted in zip(named, ("bfloat16", "float32", "float32"), strict=True):
         monkeypatch.setattr(torch.cpu, "get_capabilities", lambda known=known: known, raising=False)
         assert pick_precision(cpu) == wanted
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import trimesh
 
 from rtradar.clouds import save_cloud_npz, save_ply
 from rtradar.errors import InputError
@@ -20,17 +19,6 @@ def test_npz_reads_back(tmp_path, points) -> None:
         assert archive["points"].dtype == np.float64
         assert archive["axes"].tolist() == ["time", "range", "velocity"]
         assert archive["units"].tolist() == ["s", "m", "m/s"]
-
-
-def test_ply_is_read_by_another_library(tmp_path) -> None:
-    path = tmp_path / "cloud.ply"
-    save_ply(path, POINTS)
-    np.testing.assert_array_equal(trimesh.load(path).vertices, POINTS)
-    assert b"x = time [s], y = range [m], z = velocity [m/s]" in path.read_bytes()
-    save_ply(path, POINTS[:0])
-    text = path.read_bytes()
-    assert b"element vertex 0\n" in text
-    assert text.endswith(b"end_header\n")
 
 
 def test_npz_of_the_same_cloud_is_the_same_file(tmp_path) -> None:

@@ -46,17 +46,20 @@ def test_one_point_in_each_of_two_cells() -> None:
     np.testing.assert_array_equal(cloud.time, [0.75, 0.75])
 
 
-def test_peaks_are_paired_by_rank() -> None:
-    seen = spectra(hills({-0.3: 1.0, 0.2: 0.5}), hills({0.4: 0.4, -0.1: 0.9}), [1.0], [0.0])
-    around = spatial_points(seen, RADAR, 0.0).points - RADAR.position_m
-    np.testing.assert_allclose(around[:, 1:], [[-0.3, -0.1], [0.2, 0.4]], atol=1e-4)
-
-
-def test_the_strongest_stands_in_for_a_missing_peak() -> None:
-    # Two echoes at one height: the z-line has one peak, and both are there.
-    seen = spectra(hills({-0.3: 1.0, 0.2: 0.5, 0.5: 0.3}), hills({0.1: 0.9}), [1.0], [0.0])
-    around = spatial_points(seen, RADAR, 0.0).points - RADAR.position_m
-    np.testing.assert_allclose(around[:, 1:], [[-0.3, 0.1], [0.2, 0.1], [0.5, 0.1]], atol=1e-4)
+@pytest.mark.parametrize(
+    ("y", "z", "around"),
+    [
+        ({-0.3: 1.0, 0.2: 0.5}, {0.4: 0.4, -0.1: 0.9}, [[-0.3, -0.1], [0.2, 0.4]]),
+        # Three echoes at one height: the z-line has one peak, and all are there.
+        ({-0.3: 1.0, 0.2: 0.5, 0.5: 0.3}, {0.1: 0.9}, [[-0.3, 0.1], [0.2, 0.1], [0.5, 0.1]]),
+    ],
+)
+def test_peaks_are_paired_by_rank_and_the_strongest_stands_in_for_a_missing_one(
+    y: dict[float, float], z: dict[float, float], around: list[list[float]]
+) -> None:
+    seen = spectra(hills(y), hills(z), [1.0], [0.0])
+    found = spatial_points(seen, RADAR, 0.0).points - RADAR.position_m
+    np.testing.assert_allclose(found[:, 1:], around, atol=1e-4)
 
 
 def test_no_direction_no_point() -> None:
@@ -83,16 +86,11 @@ def test_one_line_alone_invents_no_coordinate_across_it(line: str) -> None:
         spatial_points(dataclasses.replace(seen, y=None, z=None), RADAR, 0.0)
 
 
-def test_nothing_detected() -> None:
-    none = np.zeros((0, len(SINES)), np.float32)
-    cloud = spatial_points(spectra(none, none, [], []), RADAR, 0.0)
-    assert cloud.points.shape == (0, 3)
-    assert cloud.power.shape == (0,)
-
-
-def test_a_silent_cell_has_no_point() -> None:
-    silent = np.zeros((1, len(SINES)), np.float32)
-    assert len(spatial_points(spectra(silent, silent, [4.0], [0.0]), RADAR, 0.0).points) == 0
+@pytest.mark.parametrize("cells", [0, 1])
+def test_nothing_detected_and_a_silent_cell_have_no_point(cells: int) -> None:
+    silent = np.zeros((cells, len(SINES)), np.float32)
+    cloud = spatial_points(spectra(silent, silent, [4.0] * cells, [0.0] * cells), RADAR, 0.0)
+    assert (cloud.points.shape, cloud.power.shape) == ((0, 3), (0,))
 
 
 def test_the_file_holds_the_cloud(tmp_path: Path) -> None:

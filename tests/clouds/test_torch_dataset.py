@@ -23,9 +23,8 @@ SIZES = (0, 5, 20, 12, 9)
 def write_collection(folder: Path) -> Collection:
     random = np.random.default_rng(0)
     for number, size in enumerate(SIZES):
-        told = {"subject": f"s{number}", "snr_db": 10.0 * number} | (
-            {"tempo": 1.5} if number else {}
-        )
+        told = {"subject": f"s{number}", "snr_db": 10.0 * number}
+        told |= {"tempo": 1.5} if number else {}
         sample = Sample(random.random((size, 3)), "walk" if number % 2 else "kick", told)
         write_sample(folder, f"s{number}", sample, random.random((2 * size, 3)))
     write_index(folder, [f"s{number}" for number in range(len(SIZES))])

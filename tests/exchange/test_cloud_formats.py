@@ -23,12 +23,8 @@ def clouds(tmp_path: Path) -> tuple[Path, np.ndarray, SpatialCloud]:
     """A folder with both clouds of a run, and what is in them."""
     random = np.random.default_rng(1)
     points = random.standard_normal((N, 3))
-    spatial = SpatialCloud(
-        random.standard_normal((N, 3)),
-        random.standard_normal(N),
-        random.random(N) * 1e-9,
-        random.random(N),
-    )
+    places, velocity = random.standard_normal((N, 3)), random.standard_normal(N)
+    spatial = SpatialCloud(places, velocity, random.random(N) * 1e-9, random.random(N))
     save_cloud_npz(tmp_path / "cloud_rdt.npz", points)
     save_ply(tmp_path / "cloud_rdt.ply", points)
     save_spatial_npz(tmp_path / "cloud_xyz.npz", spatial)
@@ -59,9 +55,8 @@ def test_round_trips(
     export(folder / f"there{suffix}", folder / "back.npz")
     back = read_cloud(folder / "back.npz")
     assert (back.names, back.units) == (first.names, first.units)
-    kept = (
-        first.values.astype(np.float32) if suffix == ".pcd" else first.values
-    )  # PCD: float32, and nothing else lost
+    # PCD: float32, and nothing else lost
+    kept = first.values.astype(np.float32) if suffix == ".pcd" else first.values
     np.testing.assert_array_equal(back.values, kept)
 
 
@@ -82,16 +77,9 @@ def test_pcd_is_laid_out_as_its_specification_says(
     head, body = (folder / "xyz.pcd").read_bytes().split(b"DATA binary\n")
     lines = [line for line in head.decode().splitlines() if not line.startswith("#")]
     assert lines == [
-        "VERSION 0.7",
-        "FIELDS x y z velocity power time",
-        "SIZE 4 4 4 4 4 4",
-        "TYPE F F F F F F",
-        "COUNT 1 1 1 1 1 1",
-        f"WIDTH {N}",
-        "HEIGHT 1",
-        "VIEWPOINT 0 0 0 1 0 0 0",
-        f"POINTS {N}",
-    ]
+        "VERSION 0.7", "FIELDS x y z velocity power time", "SIZE 4 4 4 4 4 4", "TYPE F F F F F F",
+        "COUNT 1 1 1 1 1 1", f"WIDTH {N}", "HEIGHT 1", "VIEWPOINT 0 0 0 1 0 0 0", f"POINTS {N}",
+    ]  # fmt: skip
     table = np.frombuffer(body, "<f4").reshape(N, 6)
     np.testing.assert_array_equal(table[:, :3], spatial.points.astype(np.float32))
     np.testing.assert_array_equal(table[:, 5], spatial.time.astype(np.float32))
@@ -105,9 +93,8 @@ def test_an_empty_cloud_stays_one(tmp_path: Path) -> None:
 
 
 def test_what_is_no_cloud_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"
-    )
+    ascii_ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"
+    (tmp_path / "a.ply").write_text(ascii_ply)
     (tmp_path / "b.pcd").write_text("VERSION .7\nDATA ascii\n")
     (tmp_path / "c.npz").write_bytes(b"PK")
     np.savez(tmp_path / "d.npz", points=np.zeros((4, 2)))
@@ -127,9 +114,8 @@ def test_what_is_no_cloud_is_refused(tmp_path: Path) -> None:
 def test_a_coordinate_that_is_not_measured_stays_so(tmp_path: Path, suffix: str, axis: int) -> None:
     places = np.arange(12.0).reshape(4, 3)
     places[:, axis] = np.nan
-    save_spatial_npz(
-        tmp_path / "cloud_xyz.npz", SpatialCloud(places, np.arange(4.0), np.ones(4), np.zeros(4))
-    )
+    cloud = SpatialCloud(places, np.arange(4.0), np.ones(4), np.zeros(4))
+    save_spatial_npz(tmp_path / "cloud_xyz.npz", cloud)
     export(tmp_path / "cloud_xyz.npz", tmp_path / f"out{suffix}")
     np.testing.assert_array_equal(read_cloud(tmp_path / f"out{suffix}").values[:, :3], places)
     if suffix != ".npz":

@@ -25,16 +25,9 @@ from rtradar.pipeline import process_samples
 from rtradar.radar import Radar
 
 RADAR = Radar(
-    name="small",
-    tx_y=2,
-    tx_z=1,
-    rx_y=4,
-    rx_z=4,
-    samples_per_chirp=16,
-    chirp_duration_s=1e-4,
-    frame_duration_s=3e-3,
-    frame_hop_s=1e-3,
-)
+    name="small", tx_y=2, tx_z=1, rx_y=4, rx_z=4, samples_per_chirp=16,
+    chirp_duration_s=1e-4, frame_duration_s=3e-3, frame_hop_s=1e-3,
+)  # fmt: skip
 
 CENTRES = (np.arange(30) + 0.5).reshape(10, 3) * 1e-4
 
@@ -45,18 +38,16 @@ def make_run(
     """A folder with IF samples and a summary; the samples (chirp, rx, sample) are returned."""
     random = np.random.default_rng(seed)
     shape = (chirps, RADAR.n_rx, RADAR.samples_per_chirp)
-    samples = (
-        (random.standard_normal((*shape, 2)) * size).astype(np.float32).view(np.complex64)[..., 0]
-    )
+    parts = (random.standard_normal((*shape, 2)) * size).astype(np.float32)
+    samples = parts.view(np.complex64)[..., 0]
     folder.mkdir(parents=True, exist_ok=True)
     array = zarr.create_array(
         folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64",
         config={"write_empty_chunks": True},
     )  # fmt: skip
     array[:] = samples
-    (folder / "summary.json").write_text(
-        json.dumps({"parameters": {"radar": dataclasses.asdict(RADAR)}})
-    )
+    summary = {"parameters": {"radar": dataclasses.asdict(RADAR)}}
+    (folder / "summary.json").write_text(json.dumps(summary))
     return samples
 
 
@@ -105,23 +96,18 @@ def test_int16_is_off_by_half_of_its_scale_at_most(
 ) -> None:
     folder, cube = run
     scale = export(folder, tmp_path / "cube.bin")["scale"]
-    parts, whole = (
-        cube.view(np.float32).reshape(*cube.shape, 2).astype(np.float64),
-        np.fromfile(tmp_path / "cube.bin", "<i2"),
-    )
+    parts = cube.view(np.float32).reshape(*cube.shape, 2).astype(np.float64)
     # By the documented layout alone, without our reader.
     about = json.loads((tmp_path / "cube.json").read_text())
     assert about["axes"] == ["chirp", "tx", "rx", "sample", "iq"]
-    whole = whole.reshape(about["shape"])
+    whole = np.fromfile(tmp_path / "cube.bin", "<i2").reshape(about["shape"])
     assert np.abs(whole).max() == 32767
     off = np.abs(whole * about["scale"] - parts)
     assert off.max() <= about["quantisation"] * (1 + 1e-12)
     assert off.max() > 0.9 * scale / 2  # it is rounded, not kept
     read = read_if(tmp_path / "cube.bin")
-    assert (
-        np.abs(read.samples.view(np.float32).reshape(parts.shape) - parts).max()
-        <= scale / 2 + 2**-24 * np.abs(parts).max()
-    )
+    off = np.abs(read.samples.view(np.float32).reshape(parts.shape) - parts)
+    assert off.max() <= scale / 2 + 2**-24 * np.abs(parts).max()
     assert read.radar == RADAR
 
 
@@ -138,9 +124,8 @@ def test_xarray_opens_netcdf(run: tuple[Path, np.ndarray], tmp_path: Path, engin
         assert "chirp_time" in data.if_real.coords
         assert data.if_real.attrs["units"] == "m"
         np.testing.assert_array_equal(data.tx_position, RADAR.tx)
-        np.testing.assert_array_equal(
-            data.rx_position[2], RADAR.rx[4:]
-        )  # the z-line listens to the Tx of the z-line
+        # The z-line listens to the Tx of the z-line.
+        np.testing.assert_array_equal(data.rx_position[2], RADAR.rx[4:])
         assert data.attrs["start_frequency_hz"] == 12e9
 
 
@@ -174,19 +159,11 @@ def test_octave_opens_mat(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
         "fwrite(f, [real(y(:))'; imag(y(:))'], 'single'); fclose(f);"
     )
     # Without a display it complains on leaving; what it printed counts.
-    found = subprocess.run(
-        ["octave-cli", "--norc", "--eval", script],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    assert found.stdout.split("\n")[:2] == ["10 3 4 16 ", "small"], found.stderr
-    assert [float(word) for word in found.stdout.split("\n")[2].split()] == [
-        12e9,
-        CENTRES[1, 2],
-        RADAR.tx[2, 0],
-    ]
+    words = ["octave-cli", "--norc", "--eval", script]
+    found = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    sizes, name, numbers, *_ = found.stdout.split("\n")
+    assert (sizes, name) == ("10 3 4 16 ", "small"), found.stderr
+    assert list(map(float, numbers.split())) == [12e9, CENTRES[1, 2], RADAR.tx[2, 0]]
     assert (tmp_path / "back.bin").read_bytes() == cube.tobytes()
 
 
@@ -247,10 +224,7 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path) 
         "    print(peak_memory_mb() - before)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)],
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True
     )
     # 46 MB are written and read, in blocks of 0.3 MB; the times of all chirps take 0.7 MB.
     grown = [float(line) for line in done.stdout.split()]
@@ -263,12 +237,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(
 ) -> None:
     folder, _ = run
     for source, out, says in (
-        (
-            folder,
-            "cube.xyz",
-            "no format has the suffix '.xyz'; "
-            "allowed: .mat, .nc, .bin, .npy, .zarr for IF samples, .npz, .ply, .pcd",
-        ),
+        (folder, "cube.xyz", "suffix '.xyz'; allowed: .mat, .nc, .bin, .npy, .zarr for IF samples"),
         (folder, "cube.ply", "is a folder; name the cloud in it"),
         (tmp_path, "cube.mat", "holds no IF samples"),
         (folder / "summary.json", "cube.mat", "is no folder"),
@@ -284,12 +253,8 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(
     (tmp_path / "cube.json").mkdir()
     with pytest.raises(InputError, match="a directory"):
         export(folder, tmp_path / "cube.bin")
-    for text in (
-        "{",
-        "{}",
-        '{"parameters": {"radar": {"tx_y": -1}}}',
-        '{"parameters": {"radar": {"colour": 1}}}',
-    ):
+    wrong = ('{"tx_y": -1}', '{"colour": 1}')
+    for text in ("{", "{}", *(f'{{"parameters": {{"radar": {one}}}}}' for one in wrong)):
         (folder / "summary.json").write_text(text)
         with pytest.raises(InputError, match="tells of no radar"):
             export(folder, tmp_path / "cube.mat")
@@ -410,9 +375,8 @@ def test_junk_is_refused_in_one_line(
         changed[at] = value
     junk = base / f"junk{suffix}"
     junk.write_bytes((base / f"good{suffix}").read_bytes())
-    junk.with_suffix(victim.suffix).write_bytes(
-        bytes(changed[: data.draw(st.integers(0, len(changed)))])
-    )
+    kept = changed[: data.draw(st.integers(0, len(changed)))]
+    junk.with_suffix(victim.suffix).write_bytes(bytes(kept))
     refusal = ""
     try:
         assert open_samples(junk)[:].ndim == 3  # what was hit does not matter to us
@@ -425,9 +389,8 @@ def test_the_command(
     run: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "cube.bin"
-    assert (
-        main(["export", str(run[0]), "--out", str(out), "--json", str(tmp_path / "said.json")]) == 0
-    )
+    words = ["export", str(run[0]), "--out", str(out), "--json", str(tmp_path / "said.json")]
+    assert main(words) == 0
     assert capsys.readouterr().out.startswith("chirp 10, tx 3, rx 4, sample 16; int16; see ")
     said = json.loads((tmp_path / "said.json").read_text())
     assert said["axes"] == ["chirp", "tx", "rx", "sample"]

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rtradar.paper.items import TEXTS, load_items
+from rtradar.paper.items import TEXTS, Sources, find_recordings, load_items
 from rtradar.paper.learning import SIZES, learning_figures, stored_result
-from rtradar.paper.sources import Sources, find_recordings
 
 NUMBERED = {"figure": 16, "table": 4, "equation": 19}
 

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from rtradar import paper
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.paper import AS_PAPER, make, make_paper, paper_warnings
+from rtradar.paper import AS_PAPER, make_paper, paper_warnings
 from rtradar.paper.formulas import radar_figures
-from rtradar.paper.items import TEXTS, load_items
+from rtradar.paper.items import TEXTS, Sources, load_items
 from rtradar.paper.learning import learning_figures
-from rtradar.paper.sources import Sources
 
 Parts = dict[str, Callable[[Sources], dict[str, Any]]]
 
@@ -46,7 +46,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     parts = {"radar": radar_figures, "learning": learning_figures}
     monkeypatch.setattr(
-        "rtradar.paper.make._parts", lambda: {name: part(name, one) for name, one in parts.items()}
+        "rtradar.paper._parts", lambda: {name: part(name, one) for name, one in parts.items()}
     )
     return ran
 
@@ -69,16 +69,13 @@ def test_page_and_numbers_have_the_items_that_are_measured(
     assert {path.name for path in out.iterdir()} <= set(content["files"])
 
 
-def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(
-    tmp_path: Path,
-) -> None:
-    folder = Path(make.__file__).parent
+def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(tmp_path: Path) -> None:
+    folder = Path(paper.__file__).parent
     code = "".join(path.read_text(encoding="utf-8") for path in folder.glob("*.py"))
     asked = Asked()
     assert all(item.filled(asked) is not None for item in load_items())
-    keys = {
-        re.sub(r"\\{[^}]*\\}", ".+", re.escape(key)) for key in re.findall(r'"([^"\s]+)"', code)
-    }
+    words = re.findall(r'"([^"\s]+)"', code)
+    keys = {re.sub(r"\\{[^}]*\\}", ".+", re.escape(key)) for key in words}
     known = re.compile("|".join(key for key in keys if re.search("[a-z]", key)))
     learnt = learning_figures(Sources(tmp_path, quick=True, full=False, recordings={}))
     assert [name for name in asked.names - learnt.keys() if not known.fullmatch(name)] == []
@@ -87,14 +84,14 @@ def test_every_brace_of_the_texts_is_a_figure_that_some_part_measures(
 def test_a_command_that_was_stopped_goes_on(
     counted: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    parts: Parts = make._parts()
+    parts: Parts = paper._parts()
 
     def stop(sources: Sources) -> dict[str, Any]:
         (sources.out / "table-4.png").touch()  # a picture that nobody has listed yet
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("rtradar.paper.make._parts", lambda: {**parts, "learning": stop})
+        patch.setattr("rtradar.paper._parts", lambda: {**parts, "learning": stop})
         with pytest.raises(KeyboardInterrupt):
             make_paper(tmp_path, quick=True)
     assert counted == ["radar"]
@@ -153,7 +150,5 @@ def test_a_run_as_the_paper_warns_of_each_fault(
     assert main([*words, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().err
     assert all(text in said for text in paper_warnings())
-    parameters: Mapping[str, Any] = json.loads((tmp_path / "summary.json").read_text())[
-        "parameters"
-    ]
+    parameters = json.loads((tmp_path / "summary.json").read_text())["parameters"]
     assert {name: parameters[name] for name in AS_PAPER} == AS_PAPER

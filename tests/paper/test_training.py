@@ -10,29 +10,15 @@ import pytest
 from rtradar.classify import study
 from rtradar.classify.recipes import LEAN, PAPER
 from rtradar.paper import learning, training
+from rtradar.paper.items import Sources
 from rtradar.paper.learning import learning_figures
-from rtradar.paper.sources import Sources
 
 pytest.importorskip("dask")
 
 SIZES = ("500", "1000")
-RADAR = """
-name = "two by two"
-tx_y = 1
-tx_z = 1
-rx_y = 2
-rx_z = 2
-idle_s = 312.5e-6
-"""
-SPEC = """
-seed = 0
-[windows]
-duration_s = 0.4
-[each]
-radar = ["radar.toml"]
-scene = ["free-space"]
-fidelity = ["analytic"]
-"""
+RADAR = 'name = "two by two"\ntx_y = 1\ntx_z = 1\nrx_y = 2\nrx_z = 2\nidle_s = 312.5e-6\n'
+SPEC = 'seed = 0\n[windows]\nduration_s = 0.4\n[each]\nradar = ["radar.toml"]\n'
+SPEC += 'scene = ["free-space"]\nfidelity = ["analytic"]\n'
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -14,16 +15,29 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.classify.weights import arrays_of
+from rtradar.classify.outcomes import Answers, calibration_error
 from rtradar.cli import main
 from rtradar.clouds.files import save_cloud_npz
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.recognition import Recogniser, predict_run
-from rtradar.recognition.description import EDGE_S, WINDOW_S, cut_windows
+from rtradar.recognition.recogniser import (
+    EDGE_S,
+    OUTLINE,
+    WINDOW_S,
+    cut_windows,
+    describe,
+    envelopes,
+    occupancy,
+    outline,
+)
+from rtradar.validate import validation_folder
+
+MAKER = runpy.run_path(str(validation_folder() / "measurements" / "shipped_weights.py"))
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -50,7 +64,7 @@ def test_the_forest_in_numpy_answers_as_scikit_learn_does(tmp_path: Path) -> Non
     forest = ExtraTreesClassifier(20, random_state=0).fit(described, random.integers(3, size=80))
     usual = {"mean": np.zeros(5), "inverse_covariance": np.eye(5), "most": 1.0}
     card = {"classes": ["a", "b", "c"], "temperature": 1.0, "usual": usual}
-    Recogniser(arrays_of(forest), card).save(tmp_path / "weights.npz")
+    Recogniser(MAKER["arrays_of"](forest), card).save(tmp_path / "weights.npz")
     recogniser = Recogniser.load(tmp_path / "weights.npz")
     assert recogniser.classes == ("a", "b", "c")
     asked = random.normal(size=(50, 5)).astype(np.float32)
@@ -137,3 +151,58 @@ def test_damaged_runs_are_one_line(tmp_path: Path, name: str, damage: bytes | No
 def test_no_extra_is_needed() -> None:
     asked = "import sys, rtradar.recognition; sys.exit(bool({'torch', 'sklearn'} & {*sys.modules}))"
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
+
+
+def test_a_temperature_mends_what_is_too_sure_of_itself() -> None:
+    random = np.random.default_rng(0)
+    honest = random.uniform(0.05, 0.95, 4000)
+    truth = (random.random(4000) > honest).astype(int)
+    names = np.arange(4000).astype(str)
+    both = np.stack([honest, 1 - honest], axis=1)
+    sure = Answers(MAKER["with_temperature"](both, 0.5), truth, names, names)
+    assert calibration_error(sure) > 0.1
+    assert MAKER["best_temperature"](sure) == pytest.approx(2, rel=0.1)
+    mended = sure._replace(probabilities=MAKER["with_temperature"](sure.probabilities, 2.0))
+    assert mended.probabilities == pytest.approx(both)
+    assert calibration_error(mended) < 0.03  # 4000 answers
+
+
+def window(n_points: int, seed: int = 0) -> NDArray[np.float64]:
+    """Points of somebody who swings, in 1.4 s."""
+    random = np.random.default_rng(seed)
+    time = random.uniform(0, 1.4, n_points)
+    velocity = 2 * np.sin(5 * time) + random.normal(0, 0.5, n_points)
+    return np.stack([time, 4 + 0.2 * np.cos(5 * time), velocity], axis=1)
+
+
+def test_a_description_has_three_parts() -> None:
+    points = window(500)
+    found = describe(points)
+    assert len(outline(points)) == OUTLINE
+    assert found == pytest.approx([*outline(points), *envelopes(points), *occupancy(points)])
+
+
+@given(st.floats(-10, 10), st.floats(-3, 3), st.integers(0, 9))
+def test_when_and_where_do_not_matter(later_s: float, farther_m: float, seed: int) -> None:
+    points = window(300, seed)
+    moved = points + np.array([later_s, farther_m, 0.0])
+    order = np.random.default_rng(seed).permutation(len(points))
+    assert describe(moved[order]) == pytest.approx(describe(points), abs=1e-8)  # rounding
+
+
+def test_cells_hold_all_points() -> None:
+    assert np.sum(occupancy(window(400)) ** 2) == pytest.approx(1)
+
+
+def test_a_shift_of_the_swing_leaves_the_statistics_of_envelopes() -> None:
+    time = np.repeat(np.arange(140) / 100 + 0.005, 10)
+    speeds = [np.sin(2 * np.pi * (time / 0.7 - late)) for late in (0.0, 1 / 7)]
+    first, second = (np.stack([time, np.full(1400, 4.0), speed], axis=1) for speed in speeds)
+    # Means, deviations, extremes and quartiles: the same slices in another order.
+    assert envelopes(second)[:66] == pytest.approx(envelopes(first)[:66], abs=1e-9)
+
+
+@pytest.mark.parametrize("n_points", [1, 2, 24])
+def test_few_or_equal_points_are_described(n_points: int) -> None:
+    for points in (window(n_points), np.tile([[0.5, 4.0, 1.0]], (n_points, 1))):
+        assert np.isfinite(describe(points)).all()

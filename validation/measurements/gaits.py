@@ -34,7 +34,7 @@ from people_data import long_enough
 from scipy.stats import t as student
 from sklearn.metrics import confusion_matrix
 
-from rtradar.classify.scores import Answers, balanced_accuracy, interval
+from rtradar.classify.outcomes import Answers, balanced_accuracy, interval
 from rtradar.classify.study import classes_of
 from rtradar.clouds.collection import Collection
 

@@ -22,12 +22,12 @@ import torch
 from numpy.typing import NDArray
 from people import Merged, answers_of, both, forest, left_out, linear, windows_of
 
+from rtradar.classify.outcomes import balanced_accuracy
 from rtradar.classify.prepare import PHYSICAL_SCALES, for_training, stack_clouds
-from rtradar.classify.scores import balanced_accuracy
 from rtradar.classify.splits import subjects_of
 from rtradar.classify.study import classes_of
 from rtradar.clouds.collection import Collection
-from rtradar.recognition.description import describe, envelopes, occupancy, outline
+from rtradar.recognition.recogniser import describe, envelopes, occupancy, outline
 
 Numbers = NDArray[np.float64]
 GROUPS = 13

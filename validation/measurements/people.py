@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from people_data import build
+from shipped_weights import ANSWERS
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier, VotingClassifier
 from sklearn.metrics import confusion_matrix
@@ -26,17 +27,15 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from rtradar.classify.baselines import axis_features
+from rtradar.classify.outcomes import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.prepare import stacked_for
 from rtradar.classify.recipes import EDGES, SMALL, SPECTROGRAM, Recipe
-from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
 from rtradar.classify.splits import subjects_of
 from rtradar.classify.study import classes_of
 from rtradar.classify.training import Examples, predict, train_network
-from rtradar.classify.weights import ANSWERS
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
-from rtradar.recognition.description import cut_windows, describe
-from rtradar.recognition.recogniser import OTHER
+from rtradar.recognition.recogniser import OTHER, cut_windows, describe
 
 
 class Merged(Collection):

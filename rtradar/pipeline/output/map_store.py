@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
-from rtradar.clouds.arrays import TABLES, Array
+from rtradar.clouds.sample_files import TABLES, Array
 from rtradar.errors import InputError
 from rtradar.pipeline.output.truth import Parts, truth_axes, truth_of
 from rtradar.system.hdf5 import LastingFile, netcdf_array

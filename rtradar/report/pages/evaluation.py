@@ -10,8 +10,15 @@ from typing import Any
 import numpy as np
 
 from rtradar.classify import outcomes as scores
-from rtradar.classify.outcomes import HISTORY, TABLE_4, Outcome
-from rtradar.classify.scores import Answers, balanced_accuracy, calibration_error, interval
+from rtradar.classify.outcomes import (
+    HISTORY,
+    TABLE_4,
+    Answers,
+    Outcome,
+    balanced_accuracy,
+    calibration_error,
+    interval,
+)
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.trainings import draw_confusion, draw_learning, draw_transfer

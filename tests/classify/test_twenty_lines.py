@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,18 +28,7 @@ def write_collection(folder: Path) -> None:
     write_index(folder, [f"s{number:02}" for number in range(16)])
 
 
-@pytest.fixture
-def one_thread() -> Iterator[None]:
-    """Small networks gain nothing from threads, which wait for each other where cores are busy."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
-def test_a_pointnet_trains(
-    one_thread: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_pointnet_trains(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_collection(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
     train, split = (
