@@ -21,8 +21,7 @@ from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
 from rtradar.scatter import MODELS, build_model
 from rtradar.scene import Wall, material
-from rtradar.system.registries import READERS
-from rtradar.system.registry import Registry
+from rtradar.system.registries import READERS, Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 REGISTRIES: tuple[Registry, ...] = (MODELS, READERS, PRESETS, DETECTORS)

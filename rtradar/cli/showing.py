@@ -1,6 +1,7 @@
-"""``rtradar list``, ``inspect`` and ``view``: what can be chosen, what a file means, what a run is.
+"""What shows names, files and runs, and examines rtradar itself.
 
-The lists are of names, each with a line of its own words.
+``rtradar list``, ``inspect`` and ``view``: what can be chosen, what a file means, what a run is.
+``rtradar doctor``, ``validate``, ``bench`` and ``paper``: does it work, is it right, how fast.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import show_page
+from rtradar.cli.values import say, show_page
 from rtradar.errors import ExtensionError, InputError
 from rtradar.system.checks import read_toml
 from rtradar.system.registries import READERS
 
 if TYPE_CHECKING:
-    from rtradar.system.registry import Registry
+    from rtradar.system.registries import Registry
 
 Described = Iterator[tuple[str, str]]
 """Names, each with its description."""
@@ -209,7 +210,7 @@ def view(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 
 def _own_page(folder: Path) -> Path:
     """Return the default place of the page; InputError if a file of others is there."""
-    from rtradar.report.pages.html import is_page
+    from rtradar.report.html import is_page
 
     page = folder / "view.html"
     if os.path.lexists(page) and not is_page(page):
@@ -217,3 +218,63 @@ def _own_page(folder: Path) -> Path:
             f"'{page}' is there, and no page of rtradar view; name another file (--out)"
         )
     return page
+
+
+# -- rtradar itself --------------------------------------------------------------------------------
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Do ``rtradar doctor``."""
+    from rtradar.doctor import report
+
+    return report(options.json)
+
+
+def validate(options: argparse.Namespace) -> int:
+    """Do ``rtradar validate``."""
+    from rtradar import validate as claims
+
+    return claims.validate(
+        quick=options.quick,
+        only=options.only,
+        json_path=options.json,
+        figures=options.figure,
+        readme=options.readme,
+    )
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Do ``rtradar bench``."""
+    from rtradar import bench as measured
+
+    plan = measured.plan_of(
+        quick=options.quick,
+        radars=options.radar,
+        fidelities=options.fidelity,
+        repeats=options.repeats,
+        duration_s=options.duration,
+        parts=None if options.only is None else (options.only,),
+    )
+    return measured.bench(plan, json_path=options.json, figure=options.figure)
+
+
+def paper(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
+    """Do ``rtradar paper``."""
+    if options.mocap is not None and not options.mocap.is_dir():
+        raise InputError(f"--mocap {options.mocap}: it is no folder; give that of the recordings")
+    from rtradar.paper.make import make_paper
+
+    content = make_paper(
+        options.out,
+        quick=options.quick,
+        full=options.full,
+        mocap=options.mocap,
+        overwrite=options.overwrite,
+    )
+    yield content
+    seconds = sum(part["wall_s"] for part in content["parts"].values())
+    say(options, f"{len(content['items'])} items of the paper, measured in {seconds:.0f} s")
+    page = options.out / "paper.html"
+    say(options, f"open {page}")
+    if options.open:
+        show_page(page)

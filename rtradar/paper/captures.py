@@ -19,7 +19,7 @@ from rtradar.errors import ValidityWarning
 from rtradar.paper.sources import ACTIVITIES, Sources
 from rtradar.pipeline import Result, run
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import add_colour_bar, bin_edges, few_ticks
+from rtradar.report.canvas import add_colour_bar, bin_edges, few_ticks
 from rtradar.system.figure_style import DIVERGING, LIGHT, dress, new_figure, save_figure
 
 Results = Mapping[str, Result]

@@ -13,9 +13,9 @@ from rtradar.paper.sources import Sources
 from rtradar.pipeline import simulate
 from rtradar.process import ca_cfar, os_cfar, power_map, range_spectrum
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import VELOCITY_LABEL, add_colour_bar, draw_levels
+from rtradar.report.canvas import VELOCITY_LABEL, add_colour_bar, draw_levels
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
-from rtradar.validate.claims import choose, claims, run_claim, validation_folder
+from rtradar.validate import choose, claims, run_claim, validation_folder
 
 _SCHEMES = ("SISO-CA", "SISO-OS", "MIMO-CA", "MIMO-OS")
 _RULES = {"true": "noise-free map", "rule": "paper's rule", "coded": "paper as coded"}

@@ -11,7 +11,7 @@ import numpy as np
 
 from rtradar.paper.items import CURVES, SIZES
 from rtradar.paper.sources import Sources
-from rtradar.report.figures.trainings import draw_confusion, draw_learning
+from rtradar.report.evaluation import draw_confusion, draw_learning
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
 
 

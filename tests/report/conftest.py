@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.clouds import SpatialCloud
-from rtradar.report.figures.plots import Plots
+from rtradar.report.plots import Plots
 from rtradar.system.figure_style import new_figure
 
 CHROMIUM = next(

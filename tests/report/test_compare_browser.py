@@ -10,7 +10,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline.output.view import load_run_view
-from rtradar.report.pages.comparison import comparison_data
+from rtradar.report.comparison import comparison_data
 
 pytestmark = pytest.mark.slow
 

@@ -27,21 +27,20 @@ from rtradar.process import (
     range_time,
     spectrogram,
 )
-from rtradar.report.figures import rooms, trainings
-from rtradar.report.figures.canvas import FieldUnit, draw_view
-from rtradar.report.figures.plots import Plots
-from rtradar.report.figures.rooms import (
-    GhostMark,
-    draw_before_after,
-    draw_range_azimuth_with_walls,
-    draw_room_plan,
-)
-from rtradar.report.pages import comparison, evaluation
-from rtradar.report.pages.comparison import (
+from rtradar.report import comparison, evaluation, rooms
+from rtradar.report.canvas import FieldUnit, draw_view
+from rtradar.report.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
     draw_rdt_clouds,
+)
+from rtradar.report.plots import Plots
+from rtradar.report.rooms import (
+    GhostMark,
+    draw_before_after,
+    draw_range_azimuth_with_walls,
+    draw_room_plan,
 )
 from rtradar.scene import Wall, material
 from rtradar.signal import synthesize
@@ -133,9 +132,9 @@ EVERY: dict[str, Callable[[], None]] = {
     ),
     "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
     "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
-    "confusion": lambda: trainings.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
-    "transfer": lambda: trainings.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
-    "learning": lambda: trainings.draw_learning(FILE, [HISTORY], NAME),
+    "confusion": lambda: evaluation.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
+    "transfer": lambda: evaluation.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
+    "learning": lambda: evaluation.draw_learning(FILE, [HISTORY], NAME),
 }
 
 
@@ -314,7 +313,7 @@ def test_ghosts_have_numbers_with_a_key(drawn: list[Figure]) -> None:
 
 
 def test_every_function_that_draws_is_among_those_drawn_below() -> None:
-    modules = (rooms, comparison, evaluation, trainings)
+    modules = (rooms, comparison, evaluation)
     own = {
         name
         for module in modules

@@ -9,7 +9,7 @@ import pytest
 from matplotlib import collections
 
 from rtradar.radar import Radar
-from rtradar.report.figures.rooms import draw_room_plan
+from rtradar.report.rooms import draw_room_plan
 from rtradar.scene import Furniture, Scene, material
 
 pytestmark = pytest.mark.drawn

@@ -21,10 +21,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.pages.html import InlinePage, grade
-from rtradar.report.pages.labels import quantity
-from rtradar.report.pages.run_page import write_report
-from rtradar.report.view.three_d import (
+from rtradar.report.html import InlinePage, grade, quantity
+from rtradar.report.run_page import write_report
+from rtradar.report.three_d import (
     MOST_POINTS,
     posed_figure,
     rdt_data,

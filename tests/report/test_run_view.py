@@ -14,7 +14,7 @@ from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.pipeline.output.snapshots import moving_meshes
-from rtradar.report.view.run_view import (
+from rtradar.report.run_view import (
     GROUPS,
     Levels,
     RunView,
@@ -22,8 +22,8 @@ from rtradar.report.view.run_view import (
     view_data,
     write_view,
 )
-from rtradar.report.view.snapshots import Snapshots
-from rtradar.report.view.three_d import drawn_sphere, semi_axis_poses
+from rtradar.report.snapshots import Snapshots
+from rtradar.report.three_d import drawn_sphere, semi_axis_poses
 
 pytestmark = pytest.mark.drawn
 

@@ -12,7 +12,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline.output.view import load_run_view, view
-from rtradar.report.view.run_view import RunView
+from rtradar.report.run_view import RunView
 from rtradar.scene import Furniture, material
 
 pytestmark = pytest.mark.slow

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures.canvas import (
+from rtradar.report.canvas import (
     FieldUnit,
     add_colour_bar,
     colour_limits,
     draw_levels,
+    fitted_limits,
     rdt_points,
 )
-from rtradar.report.figures.fitting import fitted_limits
-from rtradar.report.pages.html import write_page
-from rtradar.report.view.run_view import RunView
-from rtradar.report.view.three_d import posed_figure
+from rtradar.report.html import write_page
+from rtradar.report.run_view import RunView
+from rtradar.report.three_d import posed_figure
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading
 
 MOST_STEPS = 60
