@@ -15,15 +15,12 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rtradar.cli.values import say, show_page
 from rtradar.errors import ExtensionError, InputError
 from rtradar.system.checks import read_toml
-from rtradar.system.registries import READERS
-
-if TYPE_CHECKING:
-    from rtradar.system.registries import Registry
+from rtradar.system.registries import DETECTORS, MODELS, RADARS, READERS, Registry, scene_files
 
 Described = Iterator[tuple[str, str]]
 """Names, each with its description."""
@@ -42,7 +39,6 @@ def list_names(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 
 def _scenes() -> Described:
     from rtradar.scene import Scene
-    from rtradar.system.registries import scene_files
 
     for name in scene_files():
         yield name, Scene.load(name).description
@@ -51,7 +47,6 @@ def _scenes() -> Described:
 def _radars() -> Described:
     from rtradar.radar import Radar
     from rtradar.radar.display import brief_rows
-    from rtradar.system.registries import RADARS
 
     for name in RADARS:
         try:
@@ -71,18 +66,6 @@ def _materials() -> Described:
             f"{band.low_hz / 1e9:g} to {band.high_hz / 1e9:g} GHz" for band in material.bands
         )
         yield name, f"from {bands.replace('to inf GHz', 'GHz on')} ({material.source})"
-
-
-def _fidelities() -> Described:
-    from rtradar.system.registries import MODELS
-
-    return _documented(MODELS)
-
-
-def _detectors() -> Described:
-    from rtradar.system.registries import DETECTORS
-
-    return _documented(DETECTORS)
 
 
 def _activities() -> Described:
@@ -109,8 +92,8 @@ KINDS: Mapping[str, Callable[[], Described]] = {
     "scenes": _scenes,
     "radars": _radars,
     "materials": _materials,
-    "fidelities": _fidelities,
-    "detectors": _detectors,
+    "fidelities": lambda: _documented(MODELS),
+    "detectors": lambda: _documented(DETECTORS),
     "activities": _activities,
 }
 """What can be listed, and the function that gives the names."""
