@@ -243,17 +243,6 @@ def test_bad_input_gets_one_clear_line_and_leaves_nothing(
     assert not (tmp_path / "deep").exists()
 
 
-@pytest.mark.parametrize("content", [b"\x00\xff\xfe" * 200, b"", b":FULLY-SPECIFIED\n"])
-def test_files_that_are_no_motion(
-    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = _amc(tmp_path)
-    (tmp_path / "tiny.amc").write_bytes(content)
-    assert run(*words, "--out", tmp_path / "out") == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
 def test_real_recording_past_its_end(
     mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -211,6 +211,9 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
     (out / "history.csv").write_text(csv_text(head, history), encoding="utf-8")
 
 
+# -- pictures --------------------------------------------------------------------------------------
+
+
 def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:
     """Draw a box plot of the accuracies in each row: a box between quartiles, a dot each."""
     figure = new_figure(4.2, width_in=max(WIDTH_IN, 1.4 + 1.1 * len(rows)))
@@ -226,9 +229,6 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> 
     axes.set_ylim(min(0.0, *map(min, percent)), 102)
     dress(axes, title="Test accuracy")
     save_figure(figure, path)
-
-
-# -- pictures --------------------------------------------------------------------------------------
 
 
 def draw_confusion(

@@ -20,7 +20,7 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -284,20 +284,21 @@ def _read_json(directory: Directory, name: str) -> Any:
     return None
 
 
-def _owned(found: Mapping[str, int], listed: frozenset[str]) -> set[str]:
-    """Return the entries that the command may replace: regular files that the list names."""
+def _held(place: Directory, kind: OutputFiles) -> tuple[dict[str, int], set[str]]:
+    """Return what `_existing` does, and the names among it that the command may replace.
+
+    It may replace the regular files that the list names.
+    """
+    found, (listed, _) = _existing(place, kind), _read_list(place, kind)
     stores = tuple(name for name in listed if name.endswith("/"))
-    return {
-        name
-        for name, mode in found.items()
-        if stat.S_ISREG(mode)
-        and (name in listed or (name.startswith(stores) and _STORE.match(name)))
-    }
+    files = [name for name, mode in found.items() if stat.S_ISREG(mode)]
+    in_stores = {name for name in files if name.startswith(stores) and _STORE.match(name)}
+    return found, in_stores | listed.intersection(files)
 
 
 def _refuse_foreign(place: Directory, kind: OutputFiles, overwrite: bool) -> None:
-    found = _existing(place, kind)
-    foreign = sorted(found.keys() - _owned(found, _read_list(place, kind)[0]))
+    found, owned = _held(place, kind)
+    foreign = sorted(found.keys() - owned)
     odd = [
         name
         for name in foreign
@@ -333,8 +334,7 @@ def _check_made(work: Directory, kind: OutputFiles) -> None:
 
 def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
     """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
-    made = list(_all_files(work))
-    owned = _owned(_existing(place, kind), _read_list(place, kind)[0])
+    made, owned = list(_all_files(work)), _held(place, kind)[1]
     said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
     with work.open_file(_UNFINISHED, write=True) as file:
         file.write((json.dumps(said, indent=1) + "\n").encode())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench import Plan, model_cases, plan_of
+from rtradar.bench import Plan, plan_of
 from rtradar.cli import main
 
 
@@ -26,16 +26,6 @@ def test_a_quick_measurement_has_the_usual_model() -> None:
     plan = plan_of(quick=True)
     assert plan.fidelities == ("analytic-paper", "analytic", "specular")
     assert plan.growing_fidelity == "specular"
-
-
-def test_every_model_with_every_radar() -> None:
-    plan = Plan(("paper-12ghz", "paper-77ghz"), ("analytic-paper", "specular"), duration_s=1.0)
-    assert [(case.radar[6:8], case.fidelity) for case in model_cases(plan)] == [
-        ("12", "analytic-paper"),
-        ("12", "specular"),
-        ("77", "analytic-paper"),
-        ("77", "specular"),
-    ]
 
 
 @pytest.mark.parametrize(
