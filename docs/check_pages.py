@@ -28,7 +28,7 @@ from rtradar.scene import MATERIALS
 from rtradar.scene.tables import KEYS
 from rtradar.settings import RunSettings
 from rtradar.system.registries import ACTIVITY_NAMES, DETECTORS, MODELS, RADARS, scene_files
-from rtradar.validate.claims import claims
+from rtradar.validate import claims
 
 ROOT = Path(__file__).parents[1]
 PAGES = {

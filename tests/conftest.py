@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import gc
+import importlib.util
 import io
 import math
 import os
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from functools import cache, wraps
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import hypothesis
@@ -20,6 +23,7 @@ from matplotlib.figure import Figure
 import rtradar as rt
 from rtradar.system import figure_style, threads
 from rtradar.trace.backends.backend import Backend, available, select, use
+from rtradar.validate import validation_folder
 
 # The same examples every time, and no limit of time, because kernels are compiled when first used.
 hypothesis.settings.register_profile("rtradar", deadline=None, derandomize=True, database=None)
@@ -210,6 +214,23 @@ def beside_a_wall(small: rt.Radar) -> tuple[rt.Radar, rt.Scene]:
         thickness_m=0.01,
     )
     return small, rt.Scene(name="one wall", walls=(left,))
+
+
+@pytest.fixture(scope="session")
+def script() -> Callable[[str], ModuleType]:
+    """Load a script of the validation folder by its path there, such as ``cost/threads.py``."""
+
+    def load(place: str) -> ModuleType:
+        path = validation_folder() / place
+        spec = importlib.util.spec_from_file_location(f"validation_{path.stem}", path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[spec.name] = module  # dataclasses look their module up
+        spec.loader.exec_module(module)
+        return module
+
+    return load
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
-from rtradar.report.view.three_d import posed_figure, semi_axis_poses
+from rtradar.report.three_d import posed_figure, semi_axis_poses
 from rtradar.scatter.echo_models import build_model
 
 RADAR = dataclasses.replace(

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,6 +16,7 @@ from rtradar.cli import ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
+PIPES: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
 SOON_S = 10.0  # validation/robustness/interruptions.py asks 2 s of a quiet machine; tests share one
 
 
@@ -27,25 +29,12 @@ def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(
     tmp_path: Path, number: signal.Signals, says: str
 ) -> None:
     (tmp_path / "maps.h5").write_text("old")
-    command = [
-        sys.executable,
-        "-m",
-        "rtradar",
-        "run",
-        "synthetic:walk",
-        "--fidelity",
-        "analytic",
-        "--overwrite",
-        "--out",
-        str(tmp_path),
-    ]
-    handler = signal.signal(
-        signal.SIGINT, signal.default_int_handler
-    )  # what is ignored here would be ignored there
+    command = [sys.executable, "-m", "rtradar", "run", "synthetic:walk", "--fidelity", "analytic"]
+    command += ["--overwrite", "--out", str(tmp_path)]
+    # What is ignored here would be ignored there.
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        process = subprocess.Popen(command, **PIPES)
     finally:
         signal.signal(signal.SIGINT, handler)
     while not list(tmp_path.glob(".rtradar-*/maps.h5")):
@@ -85,12 +74,7 @@ with temporary_folder(inside=sys.argv[1]) as folder, atomic_file(sys.argv[1] + "
 
 
 def test_children_files_and_folders_go_too(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", CHILD, str(tmp_path)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = subprocess.Popen([sys.executable, "-c", CHILD, str(tmp_path)], **PIPES)
     assert process.stdout is not None
     child = int(process.stdout.readline())
     assert len(list(tmp_path.iterdir())) == 2

@@ -21,8 +21,7 @@ from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
 from rtradar.scatter import MODELS, build_model
 from rtradar.scene import Wall, material
-from rtradar.system.registries import READERS
-from rtradar.system.registry import Registry
+from rtradar.system.registries import READERS, Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 REGISTRIES: tuple[Registry, ...] = (MODELS, READERS, PRESETS, DETECTORS)
@@ -104,11 +103,8 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     said = summary["parameters"]
-    assert (said["fidelity"], said["radar"]["name"], said["detector"]) == (
-        "points",
-        "lane-60ghz",
-        "threshold",
-    )
+    named = said["fidelity"], said["radar"]["name"], said["detector"]
+    assert named == ("points", "lane-60ghz", "threshold")
     # 21 parts of 0.01 m^2, 3 to 5 m from the radar.
     assert 21 * 0.01 / 5**4 < summary["echo_power_m2"] < 21 * 0.01 / 3**4
     assert summary["detections"] > 20
@@ -118,11 +114,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
 @pytest.mark.parametrize(
     ("option", "name", "known"),
     [
-        (
-            "--fidelity",
-            "rough",
-            "specular, physical-optics, rays, reference, auto, points",
-        ),
+        ("--fidelity", "rough", "specular, physical-optics, rays, reference, auto, points"),
         ("--radar", "rough", "radhar, mars, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, ti-oob, threshold"),
         (None, "walk.rough", ".amc, .bvh, .c3d, .npz, .csv, .trc, .motion, .angles"),
@@ -143,24 +135,11 @@ def test_an_unknown_name_is_answered_with_all_that_there_are(
 @pytest.mark.parametrize(
     ("broken", "text", "said"),
     [
-        (
-            "outside_model.py",
-            "import nowhere_to_be_found",
-            "fidelity 'points' of package 'outside' failed: ModuleNotFoundError",
-        ),
-        ("outside_model.py", "Points = 3", "is a int, not a function or class"),
-        (
-            "outside_detector.py",
-            "def threshold(power, *, pfa, looks):\n    return power",
-            "gave float32",
-        ),
-        ("outside_detector.py", "def threshold(power):\n    return power > 1", "failed: TypeError"),
-        (
-            "outside_radar.py",
-            "def lane():\n    raise SystemExit('no')",
-            "radar 'lane-60ghz' of package 'outside' failed",
-        ),
-        ("outside_reader.py", "def read(path):\n    return path", "not a Motion"),
+        ("model", "import nowhere", "fidelity 'points' of package 'outside' failed: ModuleNotFou"),
+        ("model", "Points = 3", "is a int, not a function or class"),
+        ("detector", "def threshold(power, *, pfa, looks): return power", "gave float32"),
+        ("detector", "def threshold(power): return power > 1", "failed: TypeError"),
+        ("reader", "def read(path): return path", "not a Motion"),
     ],
 )
 def test_a_broken_package_is_one_line(
@@ -172,19 +151,17 @@ def test_a_broken_package_is_one_line(
     text: str,
     said: str,
 ) -> None:
-    here(tmp_path / "site", {broken: text})
-    assert (
-        main(["run", str(recording), *USED, "--duration", "0.2", "--out", str(tmp_path / "out")])
-        == 1
-    )
-    lines = [
-        line
-        for line in capsys.readouterr().err.splitlines()
-        if line and not line.startswith("rtradar: warning")
-    ]
-    assert len(lines) == 1
-    assert said in lines[0]
-    assert not (tmp_path / "out").exists()
+    here(tmp_path / "site", {f"outside_{broken}.py": text})
+    assert said in fails(capsys, tmp_path / "out", str(recording), *USED)
+
+
+def fails(capsys: Capture, out: Path, *words: str) -> str:
+    """Message of a run that fails, of one line, and that leaves nothing."""
+    assert main(["run", *words, "--duration", "0.2", "--out", str(out)]) == 1
+    lines = filter(None, capsys.readouterr().err.splitlines())
+    (said,) = (line for line in lines if not line.startswith("rtradar: warning"))
+    assert not out.exists()
+    return said
 
 
 PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
@@ -192,20 +169,10 @@ PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "model": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
     "reader": ("angles", "read(path)", ()),
     "radar": ("lane-60ghz", "lane()", USED[2:4]),
-    "detector": (
-        "threshold",
-        "threshold(power, *, pfa, looks)",
-        ("--radar", "lane-60ghz", *USED[4:]),
-    ),
+    "detector": ("threshold", "threshold(power, *, pfa, looks)", USED[2:]),
 }
-ENDS = [
-    "SystemExit('gone')",
-    "BaseException('gone')",
-    "Ended('gone')",
-    "Stopped('gone')",
-    "Silent()",
-    "GeneratorExit('gone')",
-]
+ENDS = ["SystemExit('gone')", "BaseException('gone')", "Ended('gone')", "Stopped('gone')"]
+ENDS += ["Silent()", "GeneratorExit('gone')"]
 CLASSES = """
 class Ended(BaseException): pass
 class Stopped(KeyboardInterrupt): pass
@@ -230,29 +197,8 @@ def test_a_package_may_raise_what_it_likes(
     text = f"def {head}:\n    raise {raised}\n" if called else f"raise {raised}\n"
     here(tmp_path / "site", {f"outside_{place}.py": CLASSES + text})
     motion = str(recording) if place == "reader" else "synthetic:walk"
-    assert (
-        main(
-            [
-                "run",
-                motion,
-                "--fidelity",
-                "analytic",
-                *asked,
-                "--duration",
-                "0.2",
-                "--out",
-                str(tmp_path / "out"),
-            ]
-        )
-        == 1
-    )
-    said = [
-        line
-        for line in capsys.readouterr().err.splitlines()
-        if line and not line.startswith("rtradar: warning")
-    ]
-    assert len(said) == 1
-    assert f"'{named}' of package 'outside' failed: {raised.partition('(')[0]}" in said[0]
+    said = fails(capsys, tmp_path / "out", motion, "--fidelity", "analytic", *asked)
+    assert f"'{named}' of package 'outside' failed: {raised.partition('(')[0]}" in said
     # The others of its kind still work.
     for registry in REGISTRIES:
         assert all(callable(registry[name]) for name in registry.built_in)
@@ -269,19 +215,16 @@ def test_ctrl_c_is_still_ctrl_c(tmp_path: Path, here: Install, capsys: Capture) 
     "text", [b"[rtradar.radars]\nno equals sign\n", b"[rtradar.radars]\n\xe9 = x:y\n"]
 )
 def test_entry_points_that_cannot_be_read_are_left_out(
-    tmp_path: Path, here: Install, text: bytes
+    tmp_path: Path, here: Install, monkeypatch: pytest.MonkeyPatch, text: bytes
 ) -> None:
     here(tmp_path / "site", {})
     about = tmp_path / "broken" / "broken-1.dist-info"
     about.mkdir(parents=True)
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
     (about / "entry_points.txt").write_bytes(text)
-    sys.path.insert(0, str(tmp_path / "broken"))
-    try:
-        with pytest.warns(UserWarning, match="package broken: its entry points cannot be read"):
-            assert rt.Radar.load("lane-60ghz").name == "lane-60ghz"
-    finally:
-        sys.path.remove(str(tmp_path / "broken"))
+    monkeypatch.syspath_prepend(str(tmp_path / "broken"))
+    with pytest.warns(UserWarning, match="package broken: its entry points cannot be read"):
+        assert rt.Radar.load("lane-60ghz").name == "lane-60ghz"
 
 
 def test_an_account_that_no_file_can_hold(registered: None) -> None:
@@ -370,10 +313,8 @@ class Wrong:
 
     def echoes(self, chirps: np.ndarray) -> object:
         good = self._model.echoes(chirps)
-        fields = {
-            name: getattr(good, name)
-            for name in ("length", "amplitude", "frequency", "tx", "part", "bounces")
-        }
+        names = "length", "amplitude", "frequency", "tx", "part", "bounces"
+        fields = {name: getattr(good, name) for name in names}
         match self._spoil:
             case "type":
                 return fields
@@ -411,28 +352,17 @@ def test_a_model_must_give_what_the_rest_relies_on(spoil: str, said: str) -> Non
         build_model("wrong", radar, body, depth=3)
 
 
-def test_every_built_in_name_is_there() -> None:
-    for registry in REGISTRIES:
-        assert all(callable(registry[name]) for name in registry.built_in)
-
-
-def test_two_of_one_name_are_refused_by_that_name(tmp_path: Path, here: Install) -> None:
+def test_two_of_one_name_are_refused_by_that_name(
+    tmp_path: Path, here: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
     files = files_of_the_how_to()
     here(tmp_path / "site", {})
-    taken = (
-        files["pyproject.toml"].replace("points =", "specular =").replace('"outside"', '"other"')
-    )
-    install(tmp_path / "other", {"pyproject.toml": taken})
-    sys.path.insert(0, str(tmp_path / "other"))
-    try:
-        with pytest.raises(
-            rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"
-        ):
-            MODELS.find("specular")
-        assert MODELS.find("analytic") is not None
-        with pytest.raises(
-            rt.ExtensionError, match="'threshold' is claimed by 'other' and by 'outside'"
-        ):
-            DETECTORS.find("threshold")
-    finally:
-        sys.path.remove(str(tmp_path / "other"))
+    taken = files["pyproject.toml"].replace("points =", "specular =")
+    install(tmp_path / "other", {"pyproject.toml": taken.replace('"outside"', '"other"')})
+    monkeypatch.syspath_prepend(str(tmp_path / "other"))
+    with pytest.raises(rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"):
+        MODELS.find("specular")
+    assert MODELS.find("analytic") is not None
+    said = "'threshold' is claimed by 'other' and by 'outside'"
+    with pytest.raises(rt.ExtensionError, match=said):
+        DETECTORS.find("threshold")

@@ -54,37 +54,16 @@ def test_what_takes_its_name_from_a_file_has_one_that_pages_can_hold(tmp_path: P
 @pytest.mark.skipif(sys.platform == "win32", reason="names there are Unicode")
 def test_a_run_into_such_a_folder_and_its_page(tmp_path: Path) -> None:
     folder = os.fsencode(tmp_path)
-    radar = put(
-        folder,
-        b".toml",
-        "tx_y = 2\nrx_y = 2\ntx_z = 0\nrx_z = 0\n"
-        "chirp_duration_s = 250e-6\nframe_duration_s = 0.05\n",
-    )
+    text = "tx_y = 2\nrx_y = 2\ntx_z = 0\nrx_z = 0\nchirp_duration_s = 250e-6\n"
+    radar = put(folder, b".toml", f"{text}frame_duration_s = 0.05\n")
     out, page = (os.path.join(folder, NAME + ending) for ending in (b"", b".html"))
-    run = [
-        b"run",
-        b"synthetic:walk",
-        b"--duration",
-        b"0.2",
-        b"--fidelity",
-        b"analytic",
-        b"--radar",
-        os.fsencode(radar),
-        b"--out",
-        out,
-    ]
+    run = [b"run", b"synthetic:walk", b"--duration", b"0.2", b"--fidelity", b"analytic"]
+    run += [b"--radar", os.fsencode(radar), b"--out", out]
     for words in (run, [b"view", out, b"--out", page]):
-        done = subprocess.run(
-            [os.fsencode(sys.executable), b"-m", b"rtradar", *words],
-            capture_output=True,
-            cwd=tmp_path,
-        )
+        command = [os.fsencode(sys.executable), b"-m", b"rtradar", *words]
+        done = subprocess.run(command, capture_output=True, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert rb"caf\udce9" in done.stdout
-    assert (
-        json.loads(Path(os.fsdecode(out), "summary.json").read_text())["parameters"]["radar"][
-            "name"
-        ]
-        == "caf?"
-    )
+    summary = json.loads(Path(os.fsdecode(out), "summary.json").read_text())
+    assert summary["parameters"]["radar"]["name"] == "caf?"
     assert "caf?" in Path(os.fsdecode(page)).read_text(encoding="utf-8")

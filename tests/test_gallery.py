@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,20 +26,9 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def ran(name: str, out: Path, cwd: Path, **more: str) -> tuple[str, Path]:
     """Output of a script, and its picture; only ``more`` names a folder of recordings."""
     own = {key: value for key, value in os.environ.items() if key != "RTRADAR_MOCAP"}
-    own |= {
-        "MPLBACKEND": "agg",
-        "RTRADAR_GALLERY_OUT": str(out),
-        "RTRADAR_GALLERY_S": "0.5",
-        **more,
-    }
-    done = subprocess.run(
-        [sys.executable, GALLERY / f"{name}.py"],
-        cwd=cwd,
-        env=own,
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
+    own |= {"MPLBACKEND": "agg", "RTRADAR_GALLERY_OUT": str(out), "RTRADAR_GALLERY_S": "0.5"}
+    options: Any = {"cwd": cwd, "env": own | more, "capture_output": True, "text": True}
+    done = subprocess.run([sys.executable, GALLERY / f"{name}.py"], timeout=600, **options)
     assert done.returncode == 0, done.stderr
     return done.stdout, out / f"{name}.png"
 
@@ -55,9 +45,8 @@ def test_there_is_one_for_each_step() -> None:
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_it_runs_where_its_page_is_made(name: str) -> None:
-    assert (
-        "__file__" not in (GALLERY / f"{name}.py").read_text()
-    )  # sphinx-gallery runs a script's text, and defines no such name
+    # sphinx-gallery runs a script's text, and defines no such name.
+    assert "__file__" not in (GALLERY / f"{name}.py").read_text()
 
 
 @pytest.mark.slow

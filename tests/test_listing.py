@@ -14,14 +14,8 @@ from rtradar.scene import MATERIALS
 from rtradar.system.registries import DETECTORS, MODELS, RADARS, scene_files
 
 Capture = pytest.CaptureFixture[str]
-NAMES = {
-    "scenes": scene_files(),
-    "radars": RADARS,
-    "materials": MATERIALS,
-    "fidelities": MODELS,
-    "detectors": DETECTORS,
-    "activities": ACTIVITIES,
-}
+NAMES = {"scenes": scene_files(), "radars": RADARS, "materials": MATERIALS}
+NAMES |= {"fidelities": MODELS, "detectors": DETECTORS, "activities": ACTIVITIES}
 
 
 @pytest.mark.parametrize("kind", NAMES)
@@ -51,10 +45,8 @@ def test_what_a_package_adds_is_listed_also_where_it_is_broken(
     monkeypatch.setitem(DETECTORS._registered, "steep", steep)
     monkeypatch.setitem(RADARS._registered, "broken", broken)
     assert main(["list", "detectors"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split(maxsplit=1) == [
-        "steep",
-        "Detector of steep slopes.",
-    ]
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.split(maxsplit=1) == ["steep", "Detector of steep slopes."]
     assert main(["list", "radars"]) == 0
     assert "radar 'broken' failed" in capsys.readouterr().out
 

@@ -7,6 +7,7 @@ traceback.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
@@ -26,6 +27,7 @@ import zarr
 
 import rtradar as rt
 from rtradar.cli import main
+from rtradar.exchange import read_if
 from rtradar.system import files
 from rtradar.system.files import open_regular, read_bytes
 from rtradar.system.hdf5 import stored
@@ -95,6 +97,8 @@ ODD: dict[str, Make] = {
     "UTF-16": lambda path: path.write_bytes("a = 1\n".encode("utf-16")) and None,
     "zeros": lambda path: path.write_bytes(bytes(5000)) and None,
 }
+
+MARK = "byte order mark"
 
 NAMES: dict[str, Callable[[str], str]] = {
     "empty": lambda ending: "",
@@ -183,10 +187,8 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, imported: None) -> It
 def test_a_given_path_that_is_something_else(
     there: Path, capfd: pytest.CaptureFixture[str], given: str, kind: str
 ) -> None:
-    if given in ("a radar", "a radar to measure", "a scene") and kind in (
-        "no bytes",
-        "byte order mark",
-    ):
+    described = given in ("a radar", "a radar to measure", "a scene")
+    if described and kind in ("no bytes", MARK):
         pytest.skip("that leaves everything as it is by default")
     ending, words = GIVEN[given]
     path = there / f"odd{ending}"
@@ -237,14 +239,11 @@ def folders(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "set" / "x.bvh").write_text("HIERARCHY\n")
     (root / "clouds").mkdir()
     write_index(root / "clouds", ["one"])
-    sample = Sample(np.ones((9, 3)), "walk", {"recording": "r"})
-    write_sample(root / "clouds", "one", sample, np.zeros((0, 3)))
-    plan = {
-        "data": [], "clouds": 2, "fingerprint": "", "made": "", "classes": ["kick", "walk"],
-        "split": "folds", "folds": 2, "seed": 0, "trainings": ["1"],
-        "recipe": RECIPES["lean"].as_dict(),
-    }  # fmt: skip
-    write_plan(root / "trained", plan)
+    one = Sample(np.ones((9, 3)), "walk", {"recording": "r"})
+    write_sample(root / "clouds", "one", one, np.zeros((0, 3)))
+    plan = {"data": [], "clouds": 2, "fingerprint": "", "made": "", "classes": ["kick", "walk"]}
+    plan |= {"split": "folds", "recipe": RECIPES["lean"].as_dict(), "folds": 2, "seed": 0}
+    write_plan(root / "trained", plan | {"trainings": ["1"]})
     (root / "trained" / "training-01").mkdir()
     column, words = np.array([0, 1]), np.array(["", ""])
     history = [dict.fromkeys(HISTORY, 0.5)]
@@ -253,44 +252,26 @@ def folders(small_run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-VIEW: Words = ["view", "run", "--out", "out.html"]
-INSIDE: dict[str, Words] = {
+RUN_FILES = "summary.json", "view.npz", "cloud_rdt.npz", "cloud_xyz.npz", "maps.h5"
+READ_BY: dict[str, tuple[str, ...]] = {
+    "view run --out out.html": tuple(f"run/{name}" for name in RUN_FILES),
+    "export run --out out.nc": tuple(f"run/if.zarr{of}" for of in ("", "/zarr.json", "/c/0/0/0")),
     **{
-        f"run/{name}": VIEW
-        for name in ("summary.json", "view.npz", "cloud_rdt.npz", "cloud_xyz.npz", "maps.h5")
-    },
-    "run/if.zarr": ["export", "run", "--out", "out.nc"],
-    "run/if.zarr/zarr.json": ["export", "run", "--out", "out.nc"],
-    "run/if.zarr/c/0/0/0": ["export", "run", "--out", "out.nc"],
-    **{
-        f"scene/box.{ending}": [
-            "run",
-            "synthetic:walk",
-            "--scene",
-            f"scene/{ending}.toml",
-            "--out",
-            "out",
-        ]
+        f"run synthetic:walk --scene scene/{ending}.toml --out out": (f"scene/box.{ending}",)
         for ending in ("obj", "stl", "ply", "glb")
     },
-    **{
-        f"set/{name}": ["dataset", "build", "set/set.toml", "--out", "out"]
-        for name in ("radar.toml", "scene.toml", "x.bvh")
-    },
-    "clouds/collection.json": ["train", "clouds", "--out", "out"],
-    "clouds/one.npz": ["train", "clouds", "--out", "out"],
-    "trained/plan.json": ["evaluate", "trained", "--out", "out"],
-    "trained/training-01/outcome.json": ["evaluate", "trained", "--out", "out"],
+    "dataset build set/set.toml --out out": ("set/radar.toml", "set/scene.toml", "set/x.bvh"),
+    "train clouds --out out": ("clouds/collection.json", "clouds/one.npz"),
+    "evaluate trained --out out": ("trained/plan.json", "trained/training-01/outcome.json"),
+}
+INSIDE: dict[str, Words] = {
+    name: [*command.split()] for command, names in READ_BY.items() for name in names
 }
 
 FINE = {
-    ("set/scene.toml", "no bytes"),
-    ("set/scene.toml", "byte order mark"),
-    ("set/radar.toml", "no bytes"),
-    ("set/radar.toml", "byte order mark"),
+    *((f"set/{n}.toml", empty) for n in ("scene", "radar") for empty in ("no bytes", MARK)),
     # A missing part of the samples is zero, as in zarr.
-    ("run/if.zarr/c/0/0/0", "nothing"),
-    ("run/if.zarr/c/0/0/0", "directory"),
+    *(("run/if.zarr/c/0/0/0", kind) for kind in ("nothing", "directory")),
 }
 """Not wrong at all."""
 
@@ -378,26 +359,12 @@ def test_a_link_inside_of_hdf5_is_not_followed(tmp_path: Path) -> None:
 
 
 def test_a_samples_folder_of_links_is_not_followed(tmp_path: Path) -> None:
-    radar = rt.Radar(
-        tx_y=1,
-        tx_z=0,
-        rx_y=2,
-        rx_z=0,
-        samples_per_chirp=4,
-        chirp_duration_s=1e-3,
-        frame_duration_s=4e-3,
-    )
-    import dataclasses
-
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "summary.json").write_text(
-        json.dumps({"parameters": {"radar": dataclasses.asdict(radar)}})
-    )
-    zarr.create_array(
-        tmp_path / "run" / "if.zarr", data=np.ones((2, 2, 4), "<c8"), chunks=(1, 2, 4)
-    )
-    os.mkfifo(tmp_path / "run" / "if.zarr" / "c" / "pipe")
-    from rtradar.exchange import read_if
-
+    small = {"samples_per_chirp": 4, "chirp_duration_s": 1e-3, "frame_duration_s": 4e-3}
+    radar = rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, **small)
+    told = {"parameters": {"radar": dataclasses.asdict(radar)}}
+    (tmp_path / "summary.json").write_text(json.dumps(told))
+    samples = np.ones((2, 2, 4), "<c8")
+    zarr.create_array(tmp_path / "if.zarr", data=samples, chunks=(1, 2, 4))
+    os.mkfifo(tmp_path / "if.zarr" / "c" / "pipe")
     with guarded(), pytest.raises(rt.InputError, match="pipe"):
-        read_if(tmp_path / "run")
+        read_if(tmp_path)

@@ -23,7 +23,7 @@ from rtradar.scatter.echo_models import models_that
 from rtradar.scene.moving import _KINDS as MOTIONS
 from rtradar.settings import RunSettings
 from rtradar.system.registries import BOARDS, DETECTORS, READERS, scene_files
-from rtradar.validate.claims import claims
+from rtradar.validate import claims
 
 ROOT = Path(__file__).parents[1]
 MULTIPLEXING = get_args(get_type_hints(rt.Radar)["multiplexing"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -12,19 +12,11 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.process import os_cfar
 from rtradar.scatter import build_model
-from rtradar.validate import validation_folder
 
 
 @pytest.fixture(scope="module")
-def paper() -> ModuleType:
-    spec = importlib.util.spec_from_file_location(
-        "paper_numpy", validation_folder() / "other_methods" / "paper_numpy.py"
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def paper(script: Callable[[str], ModuleType]) -> ModuleType:
+    return script("other_methods/paper_numpy.py")
 
 
 @pytest.mark.parametrize("name", ["paper-12ghz", "paper-77ghz"])

@@ -35,10 +35,8 @@ def needed() -> set[str]:
             if child not in found:
                 found.add(child)
                 waiting.append((child, ""))
-    return {name for name in found if installed(name)} - {
-        "rtradar",
-        "pip",
-    }  # pip is what reads the constraints
+    # pip is what reads the constraints.
+    return {name for name in found if installed(name)} - {"rtradar", "pip"}
 
 
 def installed(name: str) -> bool:
@@ -50,9 +48,7 @@ def installed(name: str) -> bool:
 
 
 def test_every_package_has_one_pinned_version() -> None:
-    lines = [
-        line for line in CONSTRAINTS.read_text().splitlines() if line and not line.startswith("#")
-    ]
+    lines = [line for line in CONSTRAINTS.read_text().splitlines() if re.match("[^#]", line)]
     pins = dict(line.split("==") for line in lines)
     assert len(pins) == len(lines)
     missing = sorted(needed() - {plain(name) for name in pins})

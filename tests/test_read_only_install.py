@@ -38,13 +38,10 @@ if __name__ == "__main__":
 def read_only(tmp_path: Path) -> Command:
     """Python from a copy of the package, by a user who may write to his working folder alone."""
     install, work = tmp_path / "install", tmp_path / "work"
-    shutil.copytree(
-        Path(rtradar.__file__).parent,
-        install / "rtradar",
-        ignore=shutil.ignore_patterns("__pycache__"),
-    )
+    package = Path(rtradar.__file__).parent
+    shutil.copytree(package, install / package.name, ignore=shutil.ignore_patterns("__pycache__"))
     for folder in ("radars", "scenes", "meshes"):
-        there = Path(rtradar.__file__).parents[1] / folder
+        there = package.parent / folder
         if there.is_dir():
             shutil.copytree(there, install / folder)
     work.mkdir()
@@ -56,45 +53,26 @@ def read_only(tmp_path: Path) -> Command:
     (work / "compiles_two.py").chmod(0o444)
     # Root may write everywhere, unless he gives up this right.
     right = "-dac_override,-dac_read_search"
-    without = (
-        ["setpriv", f"--bounding-set={right}", f"--inh-caps={right}"]
-        if os.name == "posix" and os.geteuid() == 0
-        else []
-    )
+    is_root = os.name == "posix" and os.geteuid() == 0
+    without = ["setpriv", f"--bounding-set={right}", f"--inh-caps={right}"] if is_root else []
+    write = [sys.executable, "-c", f"open({str(home / 'x')!r}, 'w')"]
     try:
-        held = subprocess.run(
-            [*without, sys.executable, "-c", f"open({str(home / 'x')!r}, 'w')"],
-            capture_output=True,
-            text=True,
-        )
+        held = subprocess.run([*without, *write], capture_output=True, text=True)
     except OSError:
         pytest.skip("there is no setpriv here")
     if "PermissionError" not in held.stderr:
         pytest.skip("nothing keeps this user from writing")
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if not name.startswith(("XDG_", "NUMBA_", "MPL", "DRJIT_CACHE"))
-    }
-    environment |= {
-        "HOME": str(home),
-        "TMPDIR": str(work),
-        "PYTHONPATH": str(install),
-        "PYTHONDONTWRITEBYTECODE": "1",
-    }
+    caches = ("XDG_", "NUMBA_", "MPL", "DRJIT_CACHE")
+    environment = {key: own for key, own in os.environ.items() if not key.startswith(caches)}
+    environment |= {"HOME": str(home), "TMPDIR": str(work), "PYTHONPATH": str(install)}
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
 
     def run(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
         (work / "__pycache__").mkdir(exist_ok=True)
         (work / "__pycache__").chmod(0o555)
+        own = {"cwd": work, "env": {**environment, **more}, "check": False}
         command = [*without, sys.executable, *words]
-        return subprocess.run(
-            command,
-            cwd=work,
-            env={**environment, **more},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        return subprocess.run(command, capture_output=True, text=True, **own)
 
     return run
 
@@ -104,9 +82,8 @@ def test_compiling_without_a_cache_is_told_once(read_only: Command) -> None:
     done = read_only("compiles_two.py")
     assert done.stdout.splitlines()[-2:] == ["2 3.0 0", "2 3.0 0"]
     (line,) = done.stderr.splitlines()
-    assert line.startswith(
-        "rtradar: warning: compiled code is not kept (no folder for it can be written)"
-    )
+    said = "rtradar: warning: compiled code is not kept (no folder for it can be written)"
+    assert line.startswith(said)
     assert "NUMBA_CACHE_DIR" in line
 
 
@@ -126,17 +103,8 @@ def test_commands_import_all_that_they_need(read_only: Command) -> None:
 
 @pytest.mark.slow
 def test_a_run_a_view_and_the_doctor(read_only: Command) -> None:
-    words = [
-        "run",
-        "synthetic:walk",
-        "--duration",
-        "0.15",
-        "--fidelity",
-        "analytic",
-        "--out",
-        "out",
-    ]
-    done = read_only("-m", "rtradar", *words)
+    words = ["run", "synthetic:walk", "--duration", "0.15", "--fidelity", "analytic"]
+    done = read_only("-m", "rtradar", *words, "--out", "out")
     assert done.returncode == 0
     (line,) = done.stderr.splitlines()
     assert "NUMBA_CACHE_DIR" in line

@@ -31,6 +31,9 @@ def test_the_options_of_run_are_the_fields_of_its_settings() -> None:
         ({"noise_power_m2": "a"}, "noise_power_m2 = 'a'"),
         ({"path_tolerance_db": "-35"}, "path_tolerance_db = '-35'; it must lie"),
         ({"seed": 0.5}, "seed = 0.5"),
+        ({"keep_all": "false"}, "keep_all = 'false'; it must be true or false"),
+        ({"variant": math.nan}, "variant = nan; allowed:"),
+        ({"start_s": None}, "start_s = None; it must be"),
     ],
 )
 def test_values_without_a_meaning_are_refused_in_one_line(

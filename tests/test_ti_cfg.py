@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rtradar.cli.samples import _radar_and_layout
+from rtradar.cli.captures import _radar_and_layout
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange import Dca1000Layout
 from rtradar.radar import Radar

@@ -41,14 +41,16 @@ def calls_of(tree: ast.AST) -> list[tuple[str, dict[str, Any]]]:
     return found
 
 
+UNSAFE = ("pickle", "cPickle", "dill", "joblib", "shelve", "marshal", "cloudpickle")
+
+
 def unsafe(source: str) -> list[str]:
     """What in a source could load a pickle, or run what a file says."""
     tree = ast.parse(source)
-    imports = [node for node in ast.walk(tree) if isinstance(node, ast.Import)]
-    modules = [alias.name for node in imports for alias in node.names]
-    modules += [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    loaders = ("pickle", "cPickle", "dill", "joblib", "shelve", "marshal", "cloudpickle")
-    found = [name for name in modules if name.split(".")[0] in loaders]
+    nodes = list(ast.walk(tree))
+    modules = [alias.name for one in nodes if isinstance(one, ast.Import) for alias in one.names]
+    modules += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    found = [name for name in modules if name.split(".")[0] in UNSAFE]
     for name, words in calls_of(tree):
         last = name.rpartition(".")[2]
         loads = last in ("load", "read_array") and name.split(".")[0] in ("np", "numpy", "torch")
@@ -67,8 +69,8 @@ def unsafe(source: str) -> list[str]:
 @pytest.mark.slow
 def test_no_source_can_load_a_pickle() -> None:
     assert len(SOURCES) > 100
-    found = {path.as_posix(): unsafe(path.read_text(encoding="utf-8")) for path in SOURCES}
-    found = {name: wrong for name, wrong in found.items() if wrong}
+    every = {path.as_posix(): unsafe(path.read_text(encoding="utf-8")) for path in SOURCES}
+    found = {path: wrong for path, wrong in every.items() if wrong}
     # Numba's machine code is kept as Numba keeps it: who can write there can run code anyway.
     (compiled,) = found
     assert compiled.endswith("rtradar/kernels/jit.py")
@@ -126,10 +128,8 @@ ABOUT = np.frombuffer(
 
 def test_a_pickle_in_a_cloud_is_not_run(tmp_path: Path) -> None:
     harm = tmp_path / "harm"
-    collection_of(
-        tmp_path,
-        {"about.npy": npy(ABOUT), "points.npy": npy(np.array([[Harm(harm)] * 3], dtype=object))},
-    )
+    harmful = npy(np.array([[Harm(harm)] * 3], dtype=object))
+    collection_of(tmp_path, {"about.npy": npy(ABOUT), "points.npy": harmful})
     clouds = Collection(tmp_path)
     with pytest.raises(InputError, match="is damaged"):
         clouds.points(0)
@@ -143,13 +143,8 @@ def test_a_pickle_in_a_cloud_is_not_run(tmp_path: Path) -> None:
 def test_a_cloud_that_promises_more_than_it_holds_is_damaged(
     tmp_path: Path, shape: tuple[int, ...]
 ) -> None:
-    collection_of(
-        tmp_path,
-        {
-            "about.npy": npy(ABOUT),
-            "points.npy": npy([0.0] * 3, descr="<f8", fortran_order=False, shape=shape),
-        },
-    )
+    promised = npy([0.0] * 3, descr="<f8", fortran_order=False, shape=shape)
+    collection_of(tmp_path, {"about.npy": npy(ABOUT), "points.npy": promised})
     with pytest.raises(InputError, match="is damaged"):
         Collection(tmp_path).points(0)
 
@@ -285,12 +280,8 @@ ASF = (
     ":hierarchy\nbegin\nroot first\nend\n"
 )
 TOML = 'name = "x"\nsamples_per_chirp = 128\nposition_m = [-4.0, 1.0, 1.0]\n'
-HOSTILE = st.sampled_from(
-    [
-        "", "nan", "1e308", "-1e308", "5e-324", "1e-300", "\xb2", "9" * 5000, "-1", "0", "{", "}",
-        "[", ":", "\0", "\n", "root", "inf", "order",
-    ]
-)  # fmt: skip
+WORDS = "nan 1e308 -1e308 5e-324 1e-300 \xb2 -1 0 { } [ : \0 root inf order"
+HOSTILE = st.sampled_from([*WORDS.split(), "", "\n", "9" * 5000])
 
 
 @st.composite
@@ -337,8 +328,8 @@ def one_line_or_well(read: Any, *paths: Path) -> None:
 def test_bent_files_give_one_line_or_are_read(
     tmp_path: Path, bvh: str, amc: str, asf: str, toml: str, index: str
 ) -> None:
-    texts = {"x.bvh": bvh, "x.amc": amc, "x.asf": asf, "x.toml": toml, "collection.json": index}
-    for name, text in texts.items():
+    files = {"x.bvh": bvh, "x.amc": amc, "x.asf": asf, "x.toml": toml, "collection.json": index}
+    for name, text in files.items():
         (tmp_path / name).write_bytes(text.encode("latin-1"))
     (tmp_path / "good.asf").write_text(ASF)
     (tmp_path / "good.amc").write_text(AMC)
@@ -364,7 +355,7 @@ def test_files_to_bend_are_good(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        # int() takes no superscript, which str.isdigit() takes, and not so many digits.
+        # int() takes no superscript, which str.isdigit() takes; and not so many digits.
         ("\n2\n", "\n\xb2\n", "has 0 values|not in the skeleton"),
         ("\n2\n", "\n" + "2" * 5000 + "\n", "not in the skeleton"),
         ("450", "1e308", "1e[+]09 at most"),

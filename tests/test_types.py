@@ -18,19 +18,9 @@ def test_a_program_of_a_user_has_types_throughout() -> None:
     # From cold, mypy reads the packages below for 20 s.
     cache = ROOT / ".mypy_cache" / "program"
     program = str(ROOT / "tests" / "typed_program.py")
+    command = [sys.executable, "-m", "mypy", "--strict", f"--cache-dir={cache}", "--config-file="]
+    own = os.environ | {"MYPYPATH": "", "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "mypy",
-            "--strict",
-            f"--cache-dir={cache}",
-            "--config-file=",
-            program,
-        ],
-        cwd=ROOT / "tests",
-        env=os.environ | {"MYPYPATH": "", "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
+        [*command, program], cwd=ROOT / "tests", env=own, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr

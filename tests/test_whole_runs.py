@@ -23,6 +23,7 @@ LESS = {  # levels that take minutes for a second, with few rays and facets
     "rays": ("--model-option", "rays_per_wavelength=1"),
     "reference": ("--model-option", "facets=320"),
 }
+BANDAI = "bandai_namco_CC-BY-NC/dataset-1_kick_normal"
 SHORT = ("--duration", "0.06", "--snr-db", "30")
 
 
@@ -57,18 +58,12 @@ def test_a_run_in_every_scene(name: str, small_file: Path, tmp_path: Path) -> No
     assert ("room" in summary) == (name != "free-space")
     place = np.array(scene.radar_position_m or (-4.0, 1.0, 1.0))[:2]
     distance = float(np.linalg.norm(place - np.array(scene.person_position_m)))
-    assert (
-        fraction_at(tmp_path / "out", distance) > 0.3
-    )  # some rooms show their person over walls, too
+    # Some rooms show their person over walls, too.
+    assert fraction_at(tmp_path / "out", distance) > 0.3
 
 
 @pytest.mark.parametrize(
-    "recording",
-    [
-        "cmu/02_01.amc --skeleton cmu/02.asf",
-        "cmu/135_02.c3d",
-        "bandai_namco_CC-BY-NC/dataset-1_kick_normal_001.bvh",
-    ],
+    "recording", ["cmu/02_01.amc --skeleton cmu/02.asf", "cmu/135_02.c3d", f"{BANDAI}_001.bvh"]
 )
 def test_a_run_of_a_recording(
     recording: str, mocap: Path, small_file: Path, tmp_path: Path
@@ -138,12 +133,9 @@ HERE = {"run", "dataset", "train", "evaluate", "predict"}  # commands of the tes
 def test_every_other_command(
     command: str, small_file: Path, small_run: Path, tmp_path: Path
 ) -> None:
-    words = [
-        word.replace("RUN", str(small_run))
-        .replace("FILE", str(small_file))
-        .replace("OUT", str(tmp_path / "out"))
-        for word in ON_A_RUN[command]
-    ]
+    words = ON_A_RUN[command]
+    for name, path in {"RUN": small_run, "FILE": small_file, "OUT": tmp_path / "out"}.items():
+        words = [word.replace(name, str(path)) for word in words]
     if command in ("compare", "bench"):
         words += ["--radar", str(small_file)]
     if command in ("compare", "process", "paper"):
@@ -155,9 +147,6 @@ def test_every_other_command(
 
 
 def test_no_command_is_left_out() -> None:
-    (commands,) = (
-        action.choices
-        for action in parser()._actions
-        if isinstance(action, argparse._SubParsersAction)
-    )
+    actions = parser()._actions
+    (commands,) = (one.choices for one in actions if isinstance(one, argparse._SubParsersAction))
     assert set(commands) == HERE | {words[0] for words in ON_A_RUN.values()}

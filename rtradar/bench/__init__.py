@@ -1,4 +1,4 @@
-"""``rtradar bench``: time of every stage, beside other models, the paper's method and bounds."""
+"""``rtradar bench``: time of every stage, beside other models and the paper's method."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, BinaryIO
 
-from rtradar.bench.floors import Rates, Work, floors, measure_rates
-from rtradar.bench.report import draw, tables
+import numpy as np
+
 from rtradar.bench.runs import (
     CHEAPEST,
     IF_STAGE,
@@ -27,18 +27,21 @@ from rtradar.bench.runs import (
     spread,
 )
 from rtradar.errors import InputError
+from rtradar.pipeline.timing import NOT_TO_CLOUD
 from rtradar.radar import Radar
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import affordable_models
+from rtradar.system.figure_style import dress, new_figure, save_figure
 from rtradar.system.files import atomic_file, check_place, temporary_folder, write_json
+from rtradar.system.templates import aligned, templates
 
 __all__ = ["Plan", "bench", "plan_of"]
 
 Row = dict[str, Any]
 
 PARTS = ("models", "growth")
-"""Parts that may be measured alone: models with baseline and bounds, and growth with the size of
-the problem."""
+"""Parts that may be measured alone: models with their baseline, and growth with the size of the
+problem."""
 
 _VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba")
 
@@ -81,18 +84,7 @@ class Plan:
             if not all(names) or len(set(names)) < len(names):
                 raise InputError(f"{option} {','.join(names)}: name each once, with commas between")
         for name in self.fidelities:
-            MODELS.refuse_gone(name)
-        for option, names, what, allowed in (
-            ("--fidelity", self.fidelities, "model", MODELS),
-            ("--only", self.parts, "part", PARTS),
-        ):
-            for name in names:
-                if name not in allowed:
-                    raise InputError(
-                        f"{option} {name}: there is no such {what}; allowed: {', '.join(allowed)}"
-                    )
-        if self.repeats < 1:
-            raise InputError(f"--repeats {self.repeats}: it must be a whole number, at least 1")
+            MODELS.check(name)
         for radar in map(Radar.load, self.radars):
             if self.duration_s < radar.frame_duration_s:
                 raise InputError(
@@ -173,14 +165,13 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
 def measure(plan: Plan) -> dict[str, Any]:
     """Measure all that the plan asks for, and give it as plain values.
 
-    The keys are ``settings``, ``machine``, ``rates``, ``models``, ``paper`` and ``growth``.
+    The keys are ``settings``, ``machine``, ``models``, ``paper`` and ``growth``.
     `RunError` where a run fails.
     """
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
     found: dict[str, Any] = {
         "settings": asdict(plan) | {"motion": MOTION},
         "machine": {"system": platform.platform(), "cores": os.cpu_count(), "versions": versions},
-        "rates": {},
         "models": [],
         "paper": {"trouble": "", "radars": {}},
         "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": []},
@@ -196,14 +187,13 @@ def measure(plan: Plan) -> dict[str, Any]:
 
 def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     radars = {name: Radar.load(name) for name in plan.radars}
-    rates = {name: measure_rates(radar) for name, radar in radars.items()}
     baselines = {
         name: measure_baseline(name, plan.repeats, quick=plan.quick) for name in plan.radars
     }
     runs = runner.measure(model_cases(plan), plan.repeats, "models")
     cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST}
     for case, own in runs.items():
-        row = _model_row(case, own, radars[case.radar], rates[case.radar])
+        row = _model_row(case, own, radars[case.radar])
         first = case.radar == plan.radars[0]
         row["first_use"] = _first_use(runner.first[case.fidelity], own) if first else None
         reference = cheapest.get(case.radar)
@@ -212,28 +202,24 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         )
         row["paper_over"] = _paper_over(baselines[case.radar], radars[case.radar], row)
         found["models"].append(row)
-    found["rates"] = {radars[name].name: own._asdict() for name, own in rates.items()}
     known = {radars[name].name: own for name, own in baselines.items() if own is not None}
     missing = "there is no paper_numpy.py among the validation scripts; use a checkout, or install "
     found["paper"] = {"trouble": "" if known else missing + "rtradar again", "radars": known}
     found["growth"]["chirps"] = _chirp_rows(found["models"])
 
 
-def _model_row(case: Case, runs: list[Run], radar: Radar, rates: Rates) -> Row:
+def _model_row(case: Case, runs: list[Run], radar: Radar) -> Row:
     """What was measured of one model with one radar, without comparisons."""
     summary = runs[0].summary
-    work = Work.of(radar, summary)
-    least, none = floors(work, rates), {"floor": None, "rule": ""}
-    stages = by_stage([run.stages for run in runs])
     return {
         "radar": radar.name,
         "fidelity": case.fidelity,
         "capture_s": summary["capture_s"],
-        "work": work._asdict(),
+        "chirps": summary["chirps"],
         "process_s": spread([run.process_s for run in runs]),
         "warmup_s": spread([run.summary["warmup_s"] for run in runs]),
         **_costs(runs),
-        "stages": {name: seconds | least.get(name, none) for name, seconds in stages.items()},
+        "stages": by_stage([run.stages for run in runs]),
     }
 
 
@@ -266,7 +252,7 @@ def _paper_over(baseline: Row | None, radar: Radar, row: Row) -> dict[str, float
     """
     if baseline is None:
         return None
-    frames = row["work"]["chirps"] / radar.chirps_per_frame
+    frames = row["chirps"] / radar.chirps_per_frame
     ours_if = sum(row["stages"][name]["median"] for name in ("scatter", "signal"))
     return {
         "to_cloud": frames * baseline["total"]["median"] / row["to_cloud_s"]["median"],
@@ -283,7 +269,7 @@ def _chirp_rows(models: list[Row]) -> list[Row]:
             "radar": row["radar"],
             "of_radar": of["radar"],
             "fidelity": row["fidelity"],
-            "chirps": row["work"]["chirps"] / of["work"]["chirps"],
+            "chirps": row["chirps"] / of["chirps"],
             "to_cloud": row["to_cloud_s"]["median"] / of["to_cloud_s"]["median"],
             "peak_memory": row["peak_memory_mb"] / of["peak_memory_mb"],
         }
@@ -301,3 +287,76 @@ def with_duration(plan: Plan, runner: Runner) -> list[Row]:
         {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_costs(own)}
         for case, own in runs.items()
     ]
+
+
+# -- tables and figure -----------------------------------------------------------------------------
+
+
+def tables(found: dict[str, Any]) -> str:
+    """All tables of what `measure` found."""
+    template = templates(Path(__file__).parent, escaped=False).get_template("tables.md")
+    given = {"not_to_cloud": NOT_TO_CLOUD, "cheapest": CHEAPEST}
+    stages = [(*one, _stages(one[1])) for one in _by_radar(found["models"])]
+    return aligned(template.render(found | given, stages=stages)).rstrip()
+
+
+def _by_radar(models: list[Row]) -> list[tuple[str, list[Row]]]:
+    radars = dict.fromkeys(row["radar"] for row in models)
+    return [(radar, [row for row in models if row["radar"] == radar]) for radar in radars]
+
+
+def _stages(models: list[Row]) -> list[tuple[str, list[float | None]]]:
+    """Label of each stage, and its median by each model that has it."""
+    lines = []
+    for name in dict.fromkeys(name for row in models for name in row["stages"]):
+        label = f"{name} (not to the cloud)" if name in NOT_TO_CLOUD else name
+        lines.append((label, [row["stages"].get(name, {}).get("median") for row in models]))
+    return [*lines, ("all to the cloud", [row["to_cloud_s"]["median"] for row in models])]
+
+
+def draw(found: dict[str, Any], file: BinaryIO) -> None:
+    """Draw what `measure` found, as PNG."""
+    radars, growth = _by_radar(found["models"]), found["growth"]
+    rows = max(1, len(radars) + bool(growth["duration"]))
+    figure = new_figure(3.4 * rows, width_in=11)
+    places = list(figure.subplots(rows, 1, squeeze=False)[:, 0])
+    for axes, (radar, models) in zip(places, radars, strict=False):
+        _bars(axes, models, radar)
+    if growth["duration"]:
+        _growing(places[-1], growth["duration"], growth["fidelity"])
+    save_figure(figure, file)
+
+
+def _bars(axes: Any, models: list[Row], radar: str) -> None:
+    """Stages side by side, hatched unless they lead to the cloud."""
+    from matplotlib import colormaps
+
+    colours = colormaps["tab20"]
+    names = list(dict.fromkeys(name for row in models for name in row["stages"]))
+    names.sort(key=lambda name: name in NOT_TO_CLOUD)  # stays in order otherwise
+    rows, left = range(len(models)), np.zeros(len(models))
+    for place, name in enumerate(names):
+        medians = [row["stages"].get(name, {"median": 0.0})["median"] for row in models]
+        style = {"color": colours(place % colours.N), "label": name}
+        style |= {"hatch": "//"} if name in NOT_TO_CLOUD else {}
+        axes.barh(rows, medians, 0.7, left, **style)
+        left += medians
+    axes.set_yticks(rows, [row["fidelity"] for row in models])
+    axes.invert_yaxis()
+    capture_s = models[0]["capture_s"]
+    axes.set(ylabel="model", xlabel=f"time of a run of {capture_s:.2f} s of radar, median [s]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    dress(axes, title=f"{radar} (hatched: does not lead to the cloud)", grid=False)
+
+
+def _growing(axes: Any, rows: list[Row], fidelity: str) -> None:
+    """Time and peak memory over the length of the recording."""
+    x = [row["duration_s"] for row in rows]
+    for name, label in (("to_cloud_s", "to the cloud"), ("whole_s", "whole run")):
+        axes.plot(x, [row[name]["median"] for row in rows], "o-", label=label)
+    axes.set(xlabel="recording [s]", ylabel="time [s]", xlim=(0, None), ylim=(0, None))
+    axes.legend(loc="upper left")
+    dress(axes, title=f"`{fidelity}`")
+    memory, beside = [row["peak_memory_mb"] for row in rows], axes.twinx()
+    beside.plot(x, memory, "s--", color="0.5", markersize=4)
+    beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))

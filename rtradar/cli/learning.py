@@ -87,7 +87,7 @@ def train(options: argparse.Namespace) -> None:
 def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar evaluate``."""
     from rtradar.classify.study import load_study
-    from rtradar.report.pages.evaluation import EVALUATION_FILES, write_evaluation
+    from rtradar.report.evaluation import EVALUATION_FILES, write_evaluation
     from rtradar.system.output_folder import atomic_folder
 
     studies = [load_study(folder) for folder in options.trained]

@@ -1,6 +1,7 @@
-"""``rtradar list``, ``inspect`` and ``view``: what can be chosen, what a file means, what a run is.
+"""What shows names, files and runs, and examines rtradar itself.
 
-The lists are of names, each with a line of its own words.
+``rtradar list``, ``inspect`` and ``view``: what can be chosen, what a file means, what a run is.
+``rtradar doctor``, ``validate``, ``bench`` and ``paper``: does it work, is it right, how fast.
 """
 
 from __future__ import annotations
@@ -14,15 +15,12 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rtradar.cli.values import show_page
+from rtradar.cli.values import say, show_page
 from rtradar.errors import ExtensionError, InputError
 from rtradar.system.checks import read_toml
-from rtradar.system.registries import READERS
-
-if TYPE_CHECKING:
-    from rtradar.system.registry import Registry
+from rtradar.system.registries import DETECTORS, MODELS, RADARS, READERS, Registry, scene_files
 
 Described = Iterator[tuple[str, str]]
 """Names, each with its description."""
@@ -41,7 +39,6 @@ def list_names(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 
 def _scenes() -> Described:
     from rtradar.scene import Scene
-    from rtradar.system.registries import scene_files
 
     for name in scene_files():
         yield name, Scene.load(name).description
@@ -50,7 +47,6 @@ def _scenes() -> Described:
 def _radars() -> Described:
     from rtradar.radar import Radar
     from rtradar.radar.display import brief_rows
-    from rtradar.system.registries import RADARS
 
     for name in RADARS:
         try:
@@ -70,18 +66,6 @@ def _materials() -> Described:
             f"{band.low_hz / 1e9:g} to {band.high_hz / 1e9:g} GHz" for band in material.bands
         )
         yield name, f"from {bands.replace('to inf GHz', 'GHz on')} ({material.source})"
-
-
-def _fidelities() -> Described:
-    from rtradar.system.registries import MODELS
-
-    return _documented(MODELS)
-
-
-def _detectors() -> Described:
-    from rtradar.system.registries import DETECTORS
-
-    return _documented(DETECTORS)
 
 
 def _activities() -> Described:
@@ -108,8 +92,8 @@ KINDS: Mapping[str, Callable[[], Described]] = {
     "scenes": _scenes,
     "radars": _radars,
     "materials": _materials,
-    "fidelities": _fidelities,
-    "detectors": _detectors,
+    "fidelities": lambda: _documented(MODELS),
+    "detectors": lambda: _documented(DETECTORS),
     "activities": _activities,
 }
 """What can be listed, and the function that gives the names."""
@@ -209,7 +193,7 @@ def view(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 
 def _own_page(folder: Path) -> Path:
     """Return the default place of the page; InputError if a file of others is there."""
-    from rtradar.report.pages.html import is_page
+    from rtradar.report.html import is_page
 
     page = folder / "view.html"
     if os.path.lexists(page) and not is_page(page):
@@ -217,3 +201,63 @@ def _own_page(folder: Path) -> Path:
             f"'{page}' is there, and no page of rtradar view; name another file (--out)"
         )
     return page
+
+
+# -- rtradar itself --------------------------------------------------------------------------------
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Do ``rtradar doctor``."""
+    from rtradar.doctor import report
+
+    return report(options.json)
+
+
+def validate(options: argparse.Namespace) -> int:
+    """Do ``rtradar validate``."""
+    from rtradar import validate as claims
+
+    return claims.validate(
+        quick=options.quick,
+        only=options.only,
+        json_path=options.json,
+        figures=options.figure,
+        readme=options.readme,
+    )
+
+
+def bench(options: argparse.Namespace) -> int:
+    """Do ``rtradar bench``."""
+    from rtradar import bench as measured
+
+    plan = measured.plan_of(
+        quick=options.quick,
+        radars=options.radar,
+        fidelities=options.fidelity,
+        repeats=options.repeats,
+        duration_s=options.duration,
+        parts=None if options.only is None else (options.only,),
+    )
+    return measured.bench(plan, json_path=options.json, figure=options.figure)
+
+
+def paper(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
+    """Do ``rtradar paper``."""
+    if options.mocap is not None and not options.mocap.is_dir():
+        raise InputError(f"--mocap {options.mocap}: it is no folder; give that of the recordings")
+    from rtradar.paper import make_paper
+
+    content = make_paper(
+        options.out,
+        quick=options.quick,
+        full=options.full,
+        mocap=options.mocap,
+        overwrite=options.overwrite,
+    )
+    yield content
+    seconds = sum(part["wall_s"] for part in content["parts"].values())
+    say(options, f"{len(content['items'])} items of the paper, measured in {seconds:.0f} s")
+    page = options.out / "paper.html"
+    say(options, f"open {page}")
+    if options.open:
+        show_page(page)

@@ -138,7 +138,7 @@ def _shown(folder: Path, item: Item) -> dict[str, Any]:
 
 
 def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> None:
-    from rtradar.report.pages.html import write_page
+    from rtradar.report.html import write_page
 
     seconds = sum(part["wall_s"] for part in content["parts"].values())
     about = f"Who moves: {sources.named}. Measured in {seconds:.0f} s"

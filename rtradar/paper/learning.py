@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtradar.paper.items import CURVES, SIZES, Sources
-from rtradar.report.figures.trainings import draw_confusion, draw_learning
+from rtradar.report.evaluation import draw_confusion, draw_learning
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
 
 

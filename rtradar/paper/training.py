@@ -18,7 +18,7 @@ from rtradar.classify.training import pick_device, pick_precision
 from rtradar.clouds.collection import Collection
 from rtradar.paper.items import CURVES, SIZES
 from rtradar.system.seeds import stream
-from rtradar.validate.claims import validation_folder
+from rtradar.validate import validation_folder
 
 _FIRST_TRIAL = PAPER.changed(rate=1e-6, stop_below=0.0)
 

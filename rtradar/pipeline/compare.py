@@ -38,8 +38,8 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import FieldUnit, field_unit
-from rtradar.report.pages import comparison
+from rtradar.report import comparison
+from rtradar.report.canvas import FieldUnit, field_unit
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene

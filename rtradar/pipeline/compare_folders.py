@@ -22,8 +22,8 @@ from rtradar.pipeline.compared import (
 )
 from rtradar.pipeline.output.view import run_maps, run_points, run_summary
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
-from rtradar.report.figures.canvas import field_unit
-from rtradar.report.pages import comparison
+from rtradar.report import comparison
+from rtradar.report.canvas import field_unit
 from rtradar.system.checks import printable
 from rtradar.system.output_folder import atomic_folder, check_whole
 

@@ -19,9 +19,8 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.truth import compared_echoes
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import VELOCITY_LABEL, thinned
-from rtradar.report.figures.fitting import above_floor
-from rtradar.report.pages import comparison
+from rtradar.report import comparison
+from rtradar.report.canvas import VELOCITY_LABEL, above_floor, thinned
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles
 

@@ -20,15 +20,14 @@ from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.radar import Radar
-from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages.html import InlinePage
-from rtradar.report.pages.labels import signal_to_noise
+from rtradar.report.canvas import central_limits
+from rtradar.report.html import InlinePage, signal_to_noise
 from rtradar.scatter.link_budget import LinkBudget
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from rtradar.report.figures.plots import Plots
+    from rtradar.report.plots import Plots
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,7 +115,7 @@ class Result:
 
         Each method returns Matplotlib axes, in the units of the field.
         """
-        from rtradar.report.figures.plots import Plots  # Matplotlib is slow to import
+        from rtradar.report.plots import Plots  # Matplotlib is slow to import
 
         return Plots(self.maps, self.points, self.spatial, self.radar, self.summary)
 
@@ -140,7 +139,7 @@ class Result:
             the folder are missing or damaged.
         """
         from rtradar.pipeline.output.view import assembled, load_run_view
-        from rtradar.report.view.run_view import write_view
+        from rtradar.report.run_view import write_view
 
         if self._table is not None:
             capture = self._table.capture
@@ -201,7 +200,7 @@ class Result:
         return text_card("Result", self._title, self._rows() | self._made())
 
     def _repr_html_(self) -> str:
-        from rtradar.report.figures.plots import Plots
+        from rtradar.report.plots import Plots
         from rtradar.system.figure_style import new_figure, png_of
 
         picture = None

@@ -30,7 +30,7 @@ from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.report.view.snapshots import save_snapshots
+from rtradar.report.snapshots import save_snapshots
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, settings_of, takes_settings
 from rtradar.system.checks import check_path

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
@@ -72,12 +71,11 @@ def _is_of(kind: type, own: tuple[type, ...], value: object) -> bool:
 
 def check_number(where: str, key: str, value: object, least: float, most: float) -> float:
     """Return a finite number from ``least`` to ``most`` as a float."""
-    number = _number(value)
-    if number is None or not least <= number <= most:
+    if not is_real(value) or not least <= value <= most:
         raise InputError(
             f"{where}: {key} = {brief(value)}; it must be a number from {least:g} to {most:g}"
         )
-    return number
+    return float(value)
 
 
 def check_path(what: str, value: object, *, or_name: bool = False) -> Path:
@@ -109,17 +107,6 @@ def array_to_fill(
         f"{where}: out has shape {out.shape}, type {out.dtype}; "
         f"it must have {shape}, {np.dtype(dtype)}, C-contiguous, writeable"
     )
-
-
-def _number(value: object) -> float | None:
-    """Return a finite number as a float, and None for anything else."""
-    if not is_real(value):
-        return None
-    try:
-        number = float(value)
-    except OverflowError:  # an integer that no float can hold
-        return None
-    return number if math.isfinite(number) else None
 
 
 # -- tables of TOML files --------------------------------------------------------------------------

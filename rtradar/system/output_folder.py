@@ -20,7 +20,7 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -32,13 +32,10 @@ from rtradar.system.files import DISK_ERRORS, cleanup_on_exit, uninterruptible
 
 _PREFIX, _NEW_PREFIX = ".rtradar-", ".rtradar-new-"  # of work folders, and those of `new_folder`
 _DIGITS = r"[0-9a-f]{16}"
-_WORK = re.compile(re.escape(_PREFIX) + _DIGITS)
 _MARKER = ".made-by-rtradar"
 _UNFINISHED = ".unfinished"
 _MOST_LIST_BYTES = 100_000_000
 _STORE = re.compile(r"(.*\.zarr/)")
-
-_HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
 
 
 @dataclass(frozen=True)
@@ -147,9 +144,10 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         f"'{out}' was renamed, moved or removed while the command wrote into it; "
                         "give a folder that stays (--out)"
                     ) from None
-                if why := _disk_error(error):
+                if isinstance(error, OSError) and error.errno in DISK_ERRORS:
                     raise InputError(
-                        f"cannot write to '{out}': {why}; make room, or give another folder (--out)"
+                        f"cannot write to '{out}': {error.strerror}; "
+                        "make room, or give another folder (--out)"
                     ) from None
                 raise
 
@@ -269,16 +267,14 @@ def _entries(names: Iterable[str]) -> list[str]:
     return sorted({store[1] if (store := _STORE.match(name)) else name for name in names})
 
 
-def _read_list(directory: Directory, kind: OutputFiles) -> tuple[frozenset[str], str]:
-    """Return ``files`` and ``unfinished`` of the list of a folder, each empty if there is none."""
+def _read_list(directory: Directory, kind: OutputFiles) -> tuple[frozenset[str], object]:
+    """Return ``files`` and ``unfinished`` of the list of a folder, if there is one."""
     content = _read_json(directory, kind.listing)
     files = content.get("files") if isinstance(content, dict) else None
     if not isinstance(files, list) or kind.listing not in files:
-        return frozenset(), ""
-    unfinished = content.get("unfinished")
-    is_work = isinstance(unfinished, str) and _WORK.fullmatch(unfinished)
+        return frozenset(), None
     names = frozenset(name for name in files if isinstance(name, str))
-    return names, unfinished if is_work else ""
+    return names, content.get("unfinished")
 
 
 def _read_json(directory: Directory, name: str) -> Any:
@@ -288,20 +284,21 @@ def _read_json(directory: Directory, name: str) -> Any:
     return None
 
 
-def _owned(found: Mapping[str, int], listed: frozenset[str]) -> set[str]:
-    """Return the entries that the command may replace: regular files that the list names."""
+def _held(place: Directory, kind: OutputFiles) -> tuple[dict[str, int], set[str]]:
+    """Return what `_existing` does, and the names among it that the command may replace.
+
+    It may replace the regular files that the list names.
+    """
+    found, (listed, _) = _existing(place, kind), _read_list(place, kind)
     stores = tuple(name for name in listed if name.endswith("/"))
-    return {
-        name
-        for name, mode in found.items()
-        if stat.S_ISREG(mode)
-        and (name in listed or (name.startswith(stores) and _STORE.match(name)))
-    }
+    files = [name for name, mode in found.items() if stat.S_ISREG(mode)]
+    in_stores = {name for name in files if name.startswith(stores) and _STORE.match(name)}
+    return found, in_stores | listed.intersection(files)
 
 
 def _refuse_foreign(place: Directory, kind: OutputFiles, overwrite: bool) -> None:
-    found = _existing(place, kind)
-    foreign = sorted(found.keys() - _owned(found, _read_list(place, kind)[0]))
+    found, owned = _held(place, kind)
+    foreign = sorted(found.keys() - owned)
     odd = [
         name
         for name in foreign
@@ -337,8 +334,7 @@ def _check_made(work: Directory, kind: OutputFiles) -> None:
 
 def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
     """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
-    made = list(_all_files(work))
-    owned = _owned(_existing(place, kind), _read_list(place, kind)[0])
+    made, owned = list(_all_files(work)), _held(place, kind)[1]
     said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
     with work.open_file(_UNFINISHED, write=True) as file:
         file.write((json.dumps(said, indent=1) + "\n").encode())
@@ -377,7 +373,7 @@ def _discard(place: Directory, work: Directory) -> None:
     place.remove_tree(gone)
 
 
-def _remove_leftovers(place: Directory, but: str | None = None, *, prefix: str = _PREFIX) -> None:
+def _remove_leftovers(place: Directory, but: object = None, *, prefix: str = _PREFIX) -> None:
     """Remove work folders of killed commands: those whose marker holds their own inode number.
 
     A folder that came from elsewhere, or that the user made, has no such marker, and stays.
@@ -393,16 +389,6 @@ def _remove_leftovers(place: Directory, but: str | None = None, *, prefix: str =
                 is_marked = file.read(100) == str(status.st_ino).encode()
             if status.st_uid == os.geteuid() and is_marked and folder.lock():
                 place.remove_tree(name)
-
-
-def _disk_error(error: BaseException) -> str:
-    """Return the message of an error of the disk; empty for any other error."""
-    if not isinstance(error, OSError | RuntimeError):
-        return ""
-    number: int | None = getattr(error, "errno", None)
-    if number is None and (match := _HDF5_ERRNO.search(str(error))):
-        number = int(match[1])
-    return os.strerror(number) if number and number in DISK_ERRORS else ""
 
 
 def one_of(names: Sequence[str]) -> str:

@@ -16,6 +16,8 @@ from rtradar.system.checks import brief
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, for workers that share cores."""
 
+_CORES = os.cpu_count() or 1  # once, for the system reads a file to tell
+
 _PARTS = 4
 """Parts of its work that each thread gets, so that a slower one has fewer."""
 
@@ -36,13 +38,7 @@ def thread_limit() -> int | None:
 
 def thread_count() -> int:
     """Threads that `thread_map` has: as many as this process may use."""
-    return thread_limit() or _cores()
-
-
-@lru_cache(maxsize=1)
-def _cores() -> int:
-    # The system reads a file to tell.
-    return os.cpu_count() or 1
+    return thread_limit() or _CORES
 
 
 def thread_environment(threads: int) -> dict[str, str]:

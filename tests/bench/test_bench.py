@@ -11,7 +11,6 @@ import pytest
 
 import rtradar.bench
 from rtradar.bench import runs
-from rtradar.bench.floors import Rates
 from rtradar.bench.runs import (
     Case,
     Run,
@@ -27,7 +26,6 @@ from rtradar.pipeline.timing import to_cloud_s
 pytestmark = pytest.mark.drawn
 
 CHIRPS = 1596 * 3  # three frames of the paper's radar
-RATES = Rates(1e10, 1e8, 1e10, 1e6, 1e6, 1e6, 1e6)
 BASELINE = {
     "stages": {"echoes and IF": spread([8.0]), "cfar": spread([2.0])},
     "total": spread([10.0]),
@@ -50,9 +48,6 @@ def summary(scatter_s: float) -> dict[str, Any]:
         "warmup_s": 0.25,
         "capture_s": 0.3,
         "chirps": CHIRPS,
-        "windows": 9,
-        "detections": 1000,
-        "part_power_m2": {f"part {number}": 1.0 for number in range(21)},
         "peak_memory_mb": 400.0,
     }
 
@@ -70,7 +65,6 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
         return Run(scatter + 3.5 + 0.25 + 1.0 + (7.0 if first else 0.0), summary(scatter))
 
     monkeypatch.setattr(Runner, "run", run)
-    monkeypatch.setattr(rtradar.bench, "measure_rates", lambda radar: RATES)
     monkeypatch.setattr(rtradar.bench, "measure_baseline", lambda radar, repeats, quick: BASELINE)
     return done
 
@@ -79,19 +73,12 @@ def test_all_that_is_measured_is_in_the_json(
     machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2"]
-    words += [
-        "--only",
-        "models",
-        "--json",
-        str(tmp_path / "b.json"),
-        "--figure",
-        str(tmp_path / "b.png"),
-    ]
+    words += ["--only", "models", "--json", str(tmp_path / "b.json")]
+    words += ["--figure", str(tmp_path / "b.png")]
     assert main(words) == 0
     found = json.loads((tmp_path / "b.json").read_text())
-    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
+    assert list(found) == ["settings", "machine", "models", "paper", "growth"]
     assert found["settings"]["repeats"] == 2
-    assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
     rows = found["models"]
     assert [(row["radar"], row["fidelity"]) for row in rows] == [
         (radar, fidelity)
@@ -105,8 +92,7 @@ def test_all_that_is_measured_is_in_the_json(
     assert specular["over_analytic"] == 2.0  # 8 s over 4 s
     assert specular["paper_over"] == {"to_cloud": 30.0 / 8.0, "if": 24.0 / 7.0}
     assert specular["stages"]["elsewhere"]["median"] == 0.5
-    assert specular["stages"]["signal"]["floor"] == pytest.approx(2 * 21 * CHIRPS * 8 * 256 / 1e10)
-    assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0, "floor": None, "rule": ""}
+    assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0}
     assert [row["first_use"] is None for row in rows] == [False, False, False, True, True, True]
     assert found["growth"]["chirps"][0] == {
         "radar": "paper-77ghz",
@@ -120,6 +106,8 @@ def test_all_that_is_measured_is_in_the_json(
     said = capsys.readouterr()
     assert "| paper-12ghz | `specular`" in said.out
     assert "8.00 s" in said.out
+    assert "| paper-77ghz: stage" in said.out
+    assert "| all to the cloud" in said.out
     assert said.err == ""  # no progress bar where there is no terminal
 
 

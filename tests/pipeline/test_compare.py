@@ -14,7 +14,7 @@ import pytest
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.report.pages.comparison import _spread
+from rtradar.report.comparison import _spread
 
 MODELS = ("analytic-paper", "analytic", "specular")
 

@@ -14,7 +14,7 @@ import pytest
 from rtradar.errors import InputError
 from rtradar.pipeline.output.view import load_run_view, view
 from rtradar.radar import Radar
-from rtradar.report.view.snapshots import Snapshots, save_snapshots
+from rtradar.report.snapshots import Snapshots, save_snapshots
 
 RADAR = Radar(
     tx_y=1,

@@ -18,7 +18,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.pipeline.output.view import load_run_view, view
-from rtradar.report.view.run_view import COLOURS
+from rtradar.report.run_view import COLOURS
 from rtradar.system import figure_style
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.clouds import SpatialCloud
-from rtradar.report.figures.plots import Plots
+from rtradar.report.plots import Plots
 from rtradar.system.figure_style import new_figure
 
 CHROMIUM = next(
@@ -34,6 +34,7 @@ CHROMIUM = next(
 TIMEOUT_S = 300.0
 """What ends a test that hangs; a loaded machine without a GPU draws a picture in seconds."""
 SIZE = (1000, 760)
+FRAME = "requestAnimationFrame"
 
 
 class Browser:
@@ -52,31 +53,19 @@ class Browser:
             "--disable-component-update", "--use-angle=swiftshader",
             "--enable-unsafe-swiftshader", "--remote-debugging-pipe", f"--user-data-dir={profile}",
         ]  # fmt: skip
-        self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-c",
-                move,
-                str(read_commands),
-                str(write_answers),
-                str(CHROMIUM),
-                *flags,
-            ],
-            pass_fds=(read_commands, write_answers),
-            start_new_session=True,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        files = read_commands, write_answers
+        command = [sys.executable, "-c", move, *map(str, files), str(CHROMIUM), *flags]
+        silent = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+        options: Any = {"pass_fds": files, "start_new_session": True, **silent}
+        self._process = subprocess.Popen(command, **options)
         os.close(read_commands)
         os.close(write_answers)
         self._deadline = time.monotonic() + TIMEOUT_S
         self._buffer, self._last, self._session = b"", 0, ""
         self.events: list[dict[str, Any]] = []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)[
-            "sessionId"
-        ]
+        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
+        self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
 
@@ -90,9 +79,8 @@ class Browser:
     def send(self, method: str, **params: object) -> int:
         """Ask for something without waiting until it is done."""
         self._last += 1
-        message = {"id": self._last, "method": method, "params": params} | (
-            {"sessionId": self._session} if self._session else {}
-        )
+        message = {"id": self._last, "method": method, "params": params}
+        message |= {"sessionId": self._session} if self._session else {}
         os.write(self._commands, json.dumps(message).encode() + b"\0")
         return self._last
 
@@ -132,9 +120,8 @@ class Browser:
     def open(self, address: str, scheme: str = "light", width: int = SIZE[0]) -> None:
         self._deadline = time.monotonic() + TIMEOUT_S
         self.look(scheme, width)
-        self.call(
-            "Page.navigate", url="about:blank"
-        )  # for the same file with another #t is no new page
+        # For the same file with another #t is no new page.
+        self.call("Page.navigate", url="about:blank")
         self.events.clear()
         self.call("Page.navigate", url=address)
         self.wait("document.documentElement?.dataset.ready === 'true'")
@@ -160,15 +147,12 @@ class Browser:
         """Pixels of an element (row, column, rgb), 0 to 1."""
         self.place(element)
         # Two frames of the browser, so that what was scrolled to is painted.
-        self.evaluate(
-            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-        )
+        self.evaluate(f"new Promise((done) => {FRAME}(() => {FRAME}(done)))")
         x, y, width, height = self.place(element)
         data = self.call("Page.captureScreenshot", format="png")["data"]
         image = matplotlib.image.imread(io.BytesIO(base64.b64decode(data)))
-        return np.asarray(
-            image[int(y) : int(y + height), int(x) : int(x + width), :3], dtype=np.float64
-        )
+        rows, columns = slice(int(y), int(y + height)), slice(int(x), int(x + width))
+        return np.asarray(image[rows, columns, :3], dtype=np.float64)
 
     def drag(self, element: str, by: int) -> None:
         """With the mouse, from the middle of an element to the right."""
@@ -176,11 +160,9 @@ class Browser:
         x, y = x + width / 2, y + height / 2
 
         def mouse(kind: str, at: float, buttons: int) -> None:
-            press = (
-                {"button": "left", "clickCount": 1}
-                if kind != "mouseMoved"
-                else {"button": "left" if buttons else "none"}
-            )
+            press: dict[str, object] = {"button": "left" if buttons else "none"}
+            if kind != "mouseMoved":
+                press = {"button": "left", "clickCount": 1}
             # Chromium answers after the next picture, which may take seconds.
             self.send("Input.dispatchMouseEvent", type=kind, x=at, y=y, buttons=buttons, **press)
 
@@ -199,18 +181,13 @@ class Browser:
 
     def faults(self) -> list[dict[str, Any]]:
         """Errors that the page threw or logged."""
-        return [
-            event
-            for event in self.events
-            if event["method"] == "Runtime.exceptionThrown"
-            or (
-                event["method"] == "Runtime.consoleAPICalled"
-                and event["params"]["type"] in ("error", "assert")
-            )
-            or (
-                event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] == "error"
-            )
-        ]
+        wrong: dict[str, Callable[[Any], bool]] = {
+            "Runtime.exceptionThrown": lambda params: True,
+            "Runtime.consoleAPICalled": lambda params: params["type"] in ("error", "assert"),
+            "Log.entryAdded": lambda params: params["entry"]["level"] == "error",
+        }
+        events = (one for one in self.events if one["method"] in wrong)
+        return [one for one in events if wrong[one["method"]](one["params"])]
 
     def requests(self) -> list[str]:
         """Addresses that the page asked for."""
@@ -250,19 +227,15 @@ def plots_of() -> Drawer:
         n_range, n_velocity = radar.samples_per_chirp, given.pop("n_velocity", 8)
         parameters = given.pop("parameters", {})
         points = given.pop("points", rng.uniform([0, 0.3, -1], [1, 0.6, 1], (10, 3)))
-        spatial = given.pop(
-            "spatial", SpatialCloud(points, points[:, 2], points[:, 0] + 1, points[:, 0])
-        )
+        cloud = SpatialCloud(points, points[:, 2], points[:, 0] + 1, points[:, 0])
+        spatial = given.pop("spatial", cloud)
         power = given.pop("power", rng.exponential(size=(n_range, n_velocity)))
-        angles = np.linspace(-1, 1, 8)
+        angles, of_spectrogram = np.linspace(-1, 1, 8), ("spectrogram_time", "spectrogram_velocity")
         values: dict[str, tuple[tuple[str, ...], Any]] = {
             "range_doppler": (("time", "range", "velocity"), power[None]),
             "detections": (("time", "range", "velocity"), given.pop("mask", power > 2)[None]),
             "range_time": (("slow_time", "range"), np.ones((8, n_range))),
-            "spectrogram": (
-                ("spectrogram_time", "spectrogram_velocity"),
-                np.ones((16, n_velocity)),
-            ),
+            "spectrogram": (of_spectrogram, np.ones((16, n_velocity))),
             "range_azimuth": (("time", "range", "azimuth"), np.ones((1, n_range, 8))),
         }
         axes = {
@@ -279,9 +252,7 @@ def plots_of() -> Drawer:
                 axes[name] = value
             else:
                 values[name] = (values[name][0], value)
-        maps = xr.Dataset(values, axes, {"title": title})
-        return Plots(
-            maps, points, spatial, radar, {"parameters": parameters}, new_figure=new_figure
-        )
+        maps, summary = xr.Dataset(values, axes, {"title": title}), {"parameters": parameters}
+        return Plots(maps, points, spatial, radar, summary, new_figure=new_figure)
 
     return made

@@ -44,20 +44,16 @@ def test_at_rest(browser: Any, report: tuple[str, int]) -> None:
     assert asked[0].startswith(address)
     assert not [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
     # Plotly offers to send the data to its own site unless it is told not to.
-    buttons = browser.evaluate(
-        "[...document.querySelectorAll('.modebar-btn')].map((button) => button.dataset.title)"
-    )
+    titles = "(document.querySelectorAll('.modebar-btn'), (button) => button.dataset.title)"
+    buttons = browser.evaluate(f"Array.from{titles}")
     assert len(buttons) == 3 * 5 + 2 * 4  # of the views in 3D, and of the maps
     assert not [title for title in buttons if "share" in title.lower() or "cloud" in title.lower()]
-    assert (
-        browser.evaluate("document.querySelector('h1').textContent")
-        == "synthetic:<script>walk</script>"
-    )
+    heading = browser.evaluate("document.querySelector('h1').textContent")
+    assert heading == "synthetic:<script>walk</script>"
     shown = "[...document.images].filter((image) => image.complete && image.naturalWidth > 0)"
     assert browser.evaluate(f"{shown}.length") == pictures
-    sections = browser.evaluate(
-        "[...document.querySelectorAll('section[id]')].map((one) => one.id)"
-    )
+    named = "Array.from(document.querySelectorAll('section[id]'), (one) => one.id)"
+    sections = browser.evaluate(named)
     assert sections == ["figure", "spatial", "maps", "limits", "parameters", "cost"]
     for scheme in ("light", "dark"):
         browser.look(scheme)

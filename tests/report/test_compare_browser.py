@@ -10,7 +10,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline.output.view import load_run_view
-from rtradar.report.pages.comparison import comparison_data
+from rtradar.report.comparison import comparison_data
 
 pytestmark = pytest.mark.slow
 
@@ -49,9 +49,8 @@ def test_one_slider_moves_body_maps_and_difference(browser: Any, folder: Path, w
     for step in (0, steps - 1):
         browser.set("moment", step)
         browser.wait(f"document.getElementById('scene-figure').dataset.frame === '{step}'")
-        ours, reference = (
-            np.maximum(one.low_db + one.step_db * one.level[step], low) for one in thinned
-        )
+        decibels = (one.low_db + one.step_db * one.level[step] for one in thinned)
+        ours, reference = (np.maximum(one, low) for one in decibels)
         np.testing.assert_allclose(rows(browser, "map-0"), ours, atol=1e-4)
         np.testing.assert_allclose(rows(browser, "map-1"), reference, atol=1e-4)
         np.testing.assert_allclose(rows(browser, "difference-0"), ours - reference, atol=1e-4)

@@ -27,21 +27,20 @@ from rtradar.process import (
     range_time,
     spectrogram,
 )
-from rtradar.report.figures import rooms, trainings
-from rtradar.report.figures.canvas import FieldUnit, draw_view
-from rtradar.report.figures.plots import Plots
-from rtradar.report.figures.rooms import (
-    GhostMark,
-    draw_before_after,
-    draw_range_azimuth_with_walls,
-    draw_room_plan,
-)
-from rtradar.report.pages import comparison, evaluation
-from rtradar.report.pages.comparison import (
+from rtradar.report import comparison, evaluation, rooms
+from rtradar.report.canvas import FieldUnit, draw_view
+from rtradar.report.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
     draw_rdt_clouds,
+)
+from rtradar.report.plots import Plots
+from rtradar.report.rooms import (
+    GhostMark,
+    draw_before_after,
+    draw_range_azimuth_with_walls,
+    draw_room_plan,
 )
 from rtradar.scene import Wall, material
 from rtradar.signal import synthesize
@@ -65,11 +64,11 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Every figure that is saved, instead of its file."""
     figures: list[Figure] = []
     # As it was then, for afterwards it is emptied.
-    monkeypatch.setattr(
-        figure_style,
-        "write_png",
-        lambda figure, _: figures.append(pickle.loads(pickle.dumps(figure))),
-    )
+
+    def keep(figure: Figure, _: object) -> None:
+        figures.append(pickle.loads(pickle.dumps(figure)))
+
+    monkeypatch.setattr(figure_style, "write_png", keep)
     monkeypatch.setattr(figure_style, "write_pdf", lambda *_: None)
     return figures
 
@@ -110,6 +109,7 @@ WALL = Wall(
 ROOM = rt.Scene(walls=(WALL,))
 GHOST = GhostMark(1, 0.3, 0.0)
 HISTORY = [{f"{side}_{name}": 0.5 for side in ("train", "test") for name in ("loss", "accuracy")}]
+AXES = ("", np.arange(8.0)), ("", np.arange(16.0))
 EVERY: dict[str, Callable[[], None]] = {
     "before_after": lambda: draw_before_after(
         FILE, {"As received": (POWER, MASK)}, [GHOST], {1: NAME}, RADAR, NAME
@@ -123,19 +123,13 @@ EVERY: dict[str, Callable[[], None]] = {
     "power_over_time": lambda: draw_power_over_time(FILE, np.arange(8.0), ALONE, UNIT, NAME, NAME),
     "part_power": lambda: draw_part_power(FILE, [NAME] * 8, ALONE, ALONE, UNIT, NAME),
     "maps": lambda: draw_maps(
-        FILE,
-        {"a": POWER, NAME: POWER},
-        UNIT.label("one channel"),
-        ("", np.arange(8.0)),
-        ("", np.arange(16.0)),
-        NAME,
-        POWER > 0,
+        FILE, {"a": POWER, NAME: POWER}, UNIT.label("one channel"), *AXES, NAME, POWER > 0
     ),
     "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
     "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
-    "confusion": lambda: trainings.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
-    "transfer": lambda: trainings.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
-    "learning": lambda: trainings.draw_learning(FILE, [HISTORY], NAME),
+    "confusion": lambda: evaluation.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
+    "transfer": lambda: evaluation.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
+    "learning": lambda: evaluation.draw_learning(FILE, [HISTORY], NAME),
 }
 
 
@@ -182,13 +176,9 @@ def test_every_velocity_axis_says_its_sign(
     ROOMS["before_after"](RADAR)
     draw_rdt_clouds(FILE, {"a": POINTS, "b": POINTS}, "run")
     for figure in [*figures, *drawn]:
-        axes = [
-            getattr(one, f"get_{side}label")()
-            for one in figure.axes
-            for side in "xyz"
-            if hasattr(one, f"get_{side}label")
-        ]
-        velocity = {label.replace("\n", " ") for label in axes if "elocity" in label}
+        getters = (getattr(one, f"get_{side}label", str) for one in figure.axes for side in "xyz")
+        labels = (get() for get in getters)
+        velocity = {label.replace("\n", " ") for label in labels if "elocity" in label}
         # The narrow axis of a cloud has its sign on the colour bar.
         assert velocity - {"Velocity [m/s]"} == {"Velocity [m/s] (positive: receding)"}
 
@@ -249,18 +239,14 @@ def test_a_sphere_reads_its_own_cross_section(
         part=zero,
         bounces=zero + 1,
     )
-    spectra = range_spectrum(
-        synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64),
-        radar,
-        window_functions=windows,
-    )
+    samples = synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64)
+    spectra = range_spectrum(samples, radar, window_functions=windows)
     cube = spectra.reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
     power = power_map(cube, radar, window_functions=windows)
     mask = power > power.max() * 1e-4
     angles = frame_angles(cube, mask, radar, windows)
-    columns = spectrogram(
-        cube[:, 0, 0], radar, window=radar.cycles_per_frame, window_functions=windows
-    )
+    cycles = radar.cycles_per_frame
+    columns = spectrogram(cube[:, 0, 0], radar, window=cycles, window_functions=windows)
     over_time, _ = range_time(spectra, radar)
     given = {
         "n_velocity": power.shape[1],
@@ -314,7 +300,7 @@ def test_ghosts_have_numbers_with_a_key(drawn: list[Figure]) -> None:
 
 
 def test_every_function_that_draws_is_among_those_drawn_below() -> None:
-    modules = (rooms, comparison, evaluation, trainings)
+    modules = (rooms, comparison, evaluation)
     own = {
         name
         for module in modules
@@ -341,9 +327,8 @@ def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path
     """Without the collector of cycles, whose coming is chance."""
 
     def renderers() -> int:
-        return sum(
-            type(one) is RendererAgg for one in gc.get_objects()
-        )  # proxies would answer isinstance
+        # Proxies would answer isinstance.
+        return sum(type(one) is RendererAgg for one in gc.get_objects())
 
     gc.collect()
     gc.disable()

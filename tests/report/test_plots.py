@@ -15,8 +15,8 @@ from matplotlib.text import Text
 
 import rtradar as rt
 from rtradar.clouds import SpatialCloud
-from rtradar.report.figures.fitting import above_floor, fitted_limits
-from rtradar.report.figures.plots import Plots
+from rtradar.report.canvas import above_floor, fitted_limits
+from rtradar.report.plots import Plots
 from rtradar.system.figure_style import DARK, fit, new_figure, theme_of
 
 RADAR = rt.Radar(samples_per_chirp=64, tx_y=1, tx_z=0, rx_y=2, rx_z=0)
@@ -200,7 +200,7 @@ def test_what_a_radar_does_not_measure_is_no_picture(plots_of: Callable[..., Plo
 def test_a_part_of_the_points_is_drawn_and_all_are_counted(
     plots_of: Callable[..., Plots], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtradar.report.figures.plots._DOTS", 4)
+    monkeypatch.setattr("rtradar.report.plots._DOTS", 4)
     title = plots_of(RADAR).spatial().get_title("left").replace("\n", " ")
     assert title.startswith("Spatial cloud, 10 points (4 drawn: one in 3 of those at most 40 dB")
 

@@ -9,7 +9,7 @@ import pytest
 from matplotlib import collections
 
 from rtradar.radar import Radar
-from rtradar.report.figures.rooms import draw_room_plan
+from rtradar.report.rooms import draw_room_plan
 from rtradar.scene import Furniture, Scene, material
 
 pytestmark = pytest.mark.drawn
@@ -26,27 +26,14 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
         return collection(corners, **words)
 
     monkeypatch.setattr(collections, "PolyCollection", counted)
-    chair = Furniture(
-        name="chair",
-        mesh="chair",
-        material=material("wood"),
-        position_m=(2.0, 0.0, 0.0),
-        yaw_deg=30.0,
-    )
-    draw_room_plan(
-        tmp_path / "plan.png",
-        Scene(furniture=(chair,)),
-        Radar(),
-        {"person": np.zeros((3, 2))},
-        {},
-        {},
-        "title",
-    )
+    place = {"position_m": (2.0, 0.0, 0.0), "yaw_deg": 30.0}
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), **place)
+    scene, tracks = Scene(furniture=(chair,)), {"person": np.zeros((3, 2))}
+    draw_room_plan(tmp_path / "plan.png", scene, Radar(), tracks, {}, {}, "title")
     every = chair.triangles().corners[..., :2]
     (corners,) = drawn
-    assert (
-        len(corners) < len(every) / 3
-    )  # each face takes as long; all of them took most of a run's time in a hall of chairs
+    # Each face takes as long; all of them took most of a run's time in a hall of chairs.
+    assert len(corners) < len(every) / 3
 
     def area(triangles: np.ndarray) -> float:
         sides = triangles[:, 1:] - triangles[:, :1]

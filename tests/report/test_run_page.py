@@ -21,10 +21,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.pages.html import InlinePage, grade
-from rtradar.report.pages.labels import quantity
-from rtradar.report.pages.run_page import write_report
-from rtradar.report.view.three_d import (
+from rtradar.report.html import InlinePage, grade, quantity
+from rtradar.report.run_page import write_report
+from rtradar.report.three_d import (
     MOST_POINTS,
     posed_figure,
     rdt_data,
@@ -71,13 +70,9 @@ def body() -> Body:
 
 
 def summary() -> dict[str, Any]:
+    parameters = {"motion": EVIL, "snr_db": 20.0, "pfa": 1e-6}
     return {
-        "parameters": {
-            "motion": EVIL,
-            "snr_db": 20.0,
-            "pfa": 1e-6,
-            "radar": dataclasses.asdict(RADAR),
-        },
+        "parameters": parameters | {"radar": dataclasses.asdict(RADAR)},
         "versions": {"numpy": "<2.4>"},
         "fidelity": "specular",
         "stages": {"scatter": 3.0, "cfar": 1.0},
@@ -91,11 +86,8 @@ def summary() -> dict[str, Any]:
 
 
 def write(path: Path, **changes: Any) -> Elements:
-    given: dict[str, Any] = {
-        "summary": summary(),
-        "pictures": {},
-        "rdt_points": np.array([[0.1, 4.0, -1.0]]),
-    } | changes
+    given: dict[str, Any] = {"summary": summary(), "pictures": {}}
+    given |= {"rdt_points": np.array([[0.1, 4.0, -1.0]])} | changes
     write_report(path, radar=RADAR, **given)
     return Elements(path.read_text(encoding="utf-8"))
 
@@ -104,9 +96,14 @@ def floats(text: str) -> NDArray[np.float32]:
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
-    image = tmp_path / "map.png"
-    matplotlib.image.imsave(image, np.zeros((3, 5)))
+@pytest.fixture
+def image(tmp_path: Path) -> Path:
+    """A picture."""
+    matplotlib.image.imsave(tmp_path / "map.png", np.zeros((3, 5)))
+    return tmp_path / "map.png"
+
+
+def test_no_text_from_outside_becomes_markup(tmp_path: Path, image: Path) -> None:
     page = write(tmp_path / "r.html", pictures={EVIL: image})
     tags = [tag for tag, _ in page.elements]
     # The data, plotly.js and the viewer; the one picture.
@@ -117,9 +114,9 @@ def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
     assert "<2.4>" in page.text
 
 
-def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(tmp_path: Path) -> None:
-    image = tmp_path / "map.png"
-    matplotlib.image.imsave(image, np.zeros((3, 5)))
+def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(
+    tmp_path: Path, image: Path
+) -> None:
     page = write(tmp_path / "r.html", pictures={"A map": image})
     policy = ""
     for tag, attributes in page.elements:
@@ -287,21 +284,15 @@ def test_a_limit_is_a_warning_where_it_matters(share: float | None, kind: str) -
     assert grade({"name": "beyond_range", "share": share, "message": "m"}) == kind
 
 
-def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
-    image = tmp_path / "map.png"
-    matplotlib.image.imsave(image, np.zeros((3, 5)))
+def test_sections_come_in_order_and_are_linked(tmp_path: Path, image: Path) -> None:
     ghost = {"path": "body > left", "range_m": 5.25, "velocity_mps": -1.5, "azimuth_deg": 20.0}
     room = {
         "paths": [
             {"path": "body", "order": 0, "kept": ["head"], "dropped": [], "why": ""},
             {"path": "body > left", "order": 1, "kept": [], "dropped": ["head"], "why": "weak"},
         ],
-        "clutter": {
-            "signal_to_clutter_db": -26.9,
-            "after_removal_db": 12.3,
-            "kept": [{"name": "left", "kind": "mirror", "power_m2": 1.0}],
-            "dropped": [],
-        },
+        "clutter": {"signal_to_clutter_db": -26.9, "after_removal_db": 12.3}
+        | {"kept": [{"name": "left", "kind": "mirror", "power_m2": 1.0}], "dropped": []},
         "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
     }
     page = write(tmp_path / "r.html", summary=summary() | {"room": room}, pictures={"A map": image})
@@ -329,13 +320,8 @@ def test_an_inline_page_is_saved_whole_or_refused(tmp_path: Path) -> None:
 
 
 def test_people_have_a_row_each(tmp_path: Path) -> None:
-    one = {
-        "name": "walk <1>",
-        "position_m": [0.5, -1.0],
-        "heading_deg": 30.0,
-        "material": "skin",
-        "snr_db": 17.26,
-    }
+    one = {"name": "walk <1>", "position_m": [0.5, -1.0], "heading_deg": 30.0}
+    one |= {"material": "skin", "snr_db": 17.26}
     page = write(tmp_path / "r.html", summary={"people": [one, one | {"snr_db": None}]})
     row = "walk <1>(0.5, -1) m, 30°skin"
     assert f"Place, headingMaterialSNR{row}17.3 dB{row}-" in re.sub(r"\s*\n", "", page.text)

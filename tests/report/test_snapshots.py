@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.report.view.snapshots import Snapshots, load_snapshots, save_snapshots
+from rtradar.report.snapshots import Snapshots, load_snapshots, save_snapshots
 
 pytestmark = pytest.mark.drawn
 

@@ -12,12 +12,13 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline.output.view import load_run_view, view
-from rtradar.report.view.run_view import RunView
+from rtradar.report.run_view import RunView
 from rtradar.scene import Furniture, material
 
 pytestmark = pytest.mark.slow
 
 FIGURE = "document.getElementById('scene-figure')"
+VIEWS = ("figure", "map", "rdt", "spectrogram")
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +29,8 @@ def seen(
 ) -> tuple[str, RunView]:
     """Address of the page, and what it was made of."""
     folder, (radar, room) = tmp_path_factory.mktemp("seen"), beside_a_wall
-    chair = Furniture(
-        name="chair", mesh="chair", material=material("wood"), position_m=(1.0, -1.0, 0.0)
-    )
+    place = {"position_m": (1.0, -1.0, 0.0)}
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), **place)
     room = dataclasses.replace(room, name="one wall & <b>", furniture=(chair,))
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
     rt.run(motion, radar, room, out=folder, fidelity="analytic", clutter_removal="mean")
@@ -51,10 +51,10 @@ def values(browser: Any, view: str, trace: int, name: str) -> Any:
     return found if name == "text" else np.array(found, dtype=float)
 
 
-def centres(browser: Any) -> Any:
-    """Mean of the vertices of each part as drawn (part, 3)."""
-    places = np.stack([values(browser, "figure", 0, axis) for axis in "xyz"], axis=1)
-    return places.reshape(21, -1, 3).mean(axis=1)
+def places(browser: Any, trace: int, *shape: int) -> Any:
+    """Points of a trace of the body (..., 3)."""
+    found = [values(browser, "figure", trace, axis) for axis in "xyz"]
+    return np.stack(found, axis=1).reshape(*shape, 3)
 
 
 def test_opens_without_an_error_or_a_request_and_moves(
@@ -68,7 +68,7 @@ def test_opens_without_an_error_or_a_request_and_moves(
     assert asked[0].startswith(address)
     assert not [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
     assert "one wall & <b>" in browser.evaluate("document.querySelector('.sub').textContent")
-    for name in ("figure", "map", "rdt", "spectrogram"):
+    for name in VIEWS:
         assert browser.evaluate(f"document.getElementById('scene-{name}').dataset.drawn") == "true"
         picture = browser.picture(f"scene-{name}")
         assert (picture.min(axis=2) < 0.8).sum() > 1000, name
@@ -78,53 +78,35 @@ def test_opens_without_an_error_or_a_request_and_moves(
         go(browser, step)
         # The body where the run had it: vertices of a sphere sum up to its centre, in float32 of
         # some metres.
-        np.testing.assert_allclose(centres(browser), snapshots.poses[step, :, 0], atol=1e-5)
+        centres = places(browser, 0, 21, -1).mean(axis=1)
+        np.testing.assert_allclose(centres, snapshots.poses[step, :, 0], atol=1e-5)
         time = snapshots.times[step]
-        assert browser.evaluate("document.getElementById('clock').textContent").startswith(
-            f"{time:.2f} / "
-        )
+        clock = browser.evaluate("document.getElementById('clock').textContent")
+        assert clock.startswith(f"{time:.2f} / ")
         # Direct paths: antenna, specular point, gap, for each echo above the floor.
         own = np.flatnonzero(linked.seen[step] & snapshots.direct)
-        lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(
-            len(own), 3, 3
-        )
-        np.testing.assert_allclose(
-            lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6
-        )
+        lines = places(browser, 5, len(own), 3)
+        np.testing.assert_allclose(lines[:, 0], [radar.position_m] * len(own), atol=1e-6)
         np.testing.assert_allclose(lines[:, 1], snapshots.corners[step, own, 0], atol=1e-6)
         # Over the wall: antenna, wall and body or body and wall, antenna, gap.
         ghosts = np.flatnonzero(linked.seen[step] & ~snapshots.direct)
-        lines = np.stack([values(browser, "figure", 6, axis) for axis in "xyz"], axis=1).reshape(
-            len(ghosts), 5, 3
-        )
+        lines = places(browser, 6, len(ghosts), 5)
         np.testing.assert_allclose(lines[:, 1:3], snapshots.corners[step, ghosts], atol=1e-6)
         # The map of this window, and its echoes where they show.
-        shown = browser.evaluate(
-            "document.getElementById('scene-map').data[0].z.map((row) => Array.from(row))"
-        )
-        levels = linked.range_doppler
-        np.testing.assert_allclose(
-            shown, levels.low_db + levels.step_db * levels.level[step], atol=1e-4
-        )
-        np.testing.assert_allclose(
-            values(browser, "map", 1, "x"), linked.shown_velocity()[step, own], atol=1e-5
-        )
-        np.testing.assert_allclose(
-            values(browser, "map", 1, "y"), snapshots.range_m[step, own], atol=1e-5
-        )
+        rows = "document.getElementById('scene-map').data[0].z.map((row) => Array.from(row))"
+        levels, velocity = linked.range_doppler, linked.shown_velocity()[step, own]
+        decibels = levels.low_db + levels.step_db * levels.level[step]
+        np.testing.assert_allclose(browser.evaluate(rows), decibels, atol=1e-4)
+        for axis, expected in (("x", velocity), ("y", snapshots.range_m[step, own])):
+            np.testing.assert_allclose(values(browser, "map", 1, axis), expected, atol=1e-5)
         # The cursor on the spectrogram, and the points of this window in the cloud.
-        cursor = browser.evaluate(
-            "document.getElementById('scene-spectrogram').layout.shapes[0].x0"
-        )
-        assert cursor == pytest.approx(time, abs=1e-4)
+        cursor = "document.getElementById('scene-spectrogram').layout.shapes[0].x0"
+        assert browser.evaluate(cursor) == pytest.approx(time, abs=1e-4)
         near = np.abs(linked.rdt_points[:, 0] - time) <= radar.frame_duration_s / 2
-        assert len(values(browser, "rdt", 1, "x")) == pytest.approx(
-            near.sum(), abs=2
-        )  # float32 at the ends of the window
+        # Float32 at the ends of the window.
+        assert len(values(browser, "rdt", 1, "x")) == pytest.approx(near.sum(), abs=2)
         assert near.sum() > 10
-        pictures.append(
-            [browser.picture(f"scene-{name}") for name in ("figure", "map", "rdt", "spectrogram")]
-        )
+        pictures.append([browser.picture(f"scene-{name}") for name in VIEWS])
     for first, second in zip(*pictures, strict=True):
         assert (np.abs(first - second).max(axis=2) > 0.2).sum() > 50
     assert not browser.faults()
@@ -136,20 +118,14 @@ def save(browser: Any, tmp_path: Path) -> None:
     browser.evaluate("document.getElementById('save').click()")
     saved: list[Path] = []
     while not saved:
-        browser.evaluate(
-            "new Promise((done) => setTimeout(done, 200))"
-        )  # within the browser's own deadline
+        # Within the browser's own deadline.
+        browser.evaluate("new Promise((done) => setTimeout(done, 200))")
         saved = list(tmp_path.glob("*.png"))
     picture = matplotlib.image.imread(saved[0])
     width = browser.evaluate("document.querySelector('.linked').getBoundingClientRect().width")
     assert picture.shape[1] == pytest.approx(2 * width, abs=2)
-    rows, columns = picture.shape[0] // 2, picture.shape[1] // 2
-    for quarter in (
-        picture[:rows, :columns],
-        picture[:rows, columns:],
-        picture[rows:, :columns],
-        picture[rows:, columns:],
-    ):
+    halves = np.array_split(picture, 2)
+    for quarter in (one for half in halves for one in np.array_split(half, 2, axis=1)):
         assert (quarter[..., :3].min(axis=2) < 0.8).sum() > 3000
 
 
@@ -166,10 +142,8 @@ def test_colours_are_of_part_power_or_velocity_and_are_saved(
         browser.set("colour", mode, "change")
         browser.wait(f"document.documentElement.dataset.colour === '{mode}'")
         np.testing.assert_allclose(values(browser, "map", 1, "marker.color"), wanted, atol=1e-4)
-        painted = values(browser, "figure", 0, "intensity").reshape(21, -1)[
-            snapshots.echo_part[own], 0
-        ]
-        np.testing.assert_allclose(painted, wanted, atol=1e-4)
+        painted = values(browser, "figure", 0, "intensity").reshape(21, -1)[:, 0]
+        np.testing.assert_allclose(painted[snapshots.echo_part[own]], wanted, atol=1e-4)
         assert browser.evaluate("document.getElementById('groups').hidden")
         assert browser.evaluate(f"{FIGURE}.data[0].showscale")
     browser.set("colour", "part", "change")

@@ -36,6 +36,7 @@ def test_nothing_else_is_a_number(thing: object) -> None:
     assert not is_whole(thing)
 
 
+NO_TOML = b"name = ", b"a = 6\na = 7", b"\0", b"\xff\xfe", b'a = "\xe9"', b"[a", b"12"
 READERS: dict[str, Any] = {"radar": rt.Radar.load, "scene": rt.Scene.load, "data set": read_spec}
 
 
@@ -44,18 +45,7 @@ READERS: dict[str, Any] = {"radar": rt.Radar.load, "scene": rt.Scene.load, "data
     ("text", "says"),
     [
         (None, "No such file"),
-        *(
-            (text, "is not TOML: ")
-            for text in (
-                b"name = ",
-                b"a = 6\na = 7",
-                b"\0",
-                b"\xff\xfe",
-                b'a = "\xe9"',
-                b"[a",
-                b"12",
-            )
-        ),
+        *((text, "is not TOML: ") for text in NO_TOML),
         (b"#" * 1_000_001, "larger than 1 MB"),
         (b"nam = 1", "unknown key 'nam'"),
         (b"[seeed]\ntx_y = 1", "unknown key 'seeed'"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import product
 from typing import Any
@@ -68,20 +69,10 @@ USERS: dict[str, Callable[[Any], object]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [
-        -1,
-        2**63,
-        pytest.param(10**5000, id="huge"),
-        1.5,
-        True,
-        None,
-        "7",
-        np.int64(-3),
-        float("nan"),
-    ],
-)
+HUGE = pytest.param(10**5000, id="huge")
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, HUGE, 1.5, True, None, "7", np.int64(-3), math.nan])
 @pytest.mark.parametrize("user", USERS)
 def test_what_is_no_seed_is_told_in_one_line(user: str, seed: object) -> None:
     with pytest.raises(

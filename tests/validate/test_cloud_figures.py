@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from rtradar.validate import validation_folder
-
 
 @pytest.fixture(scope="module")
-def figures() -> ModuleType:
-    path = validation_folder() / "measurements" / "cloud_figures.py"
-    spec = importlib.util.spec_from_file_location("cloud_figures", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def figures(script: Callable[[str], ModuleType]) -> ModuleType:
+    return script("measurements/cloud_figures.py")
 
 
 def test_distances_are_frame_by_frame_and_of_both_clouds(figures: ModuleType) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -14,7 +13,6 @@ import rtradar as rt
 from rtradar.body.people import body_of_people
 from rtradar.motion.skeleton import NODES
 from rtradar.settings import RunSettings
-from rtradar.validate import validation_folder
 
 KINECT = {
     "spine_base": "root",
@@ -35,24 +33,16 @@ KINECT = {
 
 
 @pytest.fixture(scope="module")
-def mars() -> ModuleType:
-    path = validation_folder() / "measurements" / "mars_clouds.py"
-    spec = importlib.util.spec_from_file_location("mars_clouds", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+def mars(script: Callable[[str], ModuleType]) -> ModuleType:
+    return script("measurements/mars_clouds.py")
 
 
 def take_of(mars: ModuleType, turn_deg: float) -> Any:
     """A punch before a camera, as if it were a take; the person is turned from the camera."""
     motion = rt.synthetic_motion("punch", duration_s=1.6)
     angle = np.radians(turn_deg)
-    about = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
+    cosine, sine = np.cos(angle), np.sin(angle)
+    about = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     nodes = motion.at(np.arange(16) * 0.1)[0][:, [NODES.index(name) for name in KINECT.values()]]
     x, y, z = np.moveaxis(nodes @ about.T + [2.0, -0.3, -0.9], -1, 0)
     joints = np.stack([-y, x, z], axis=-1)  # right, away, up
@@ -76,12 +66,8 @@ def test_the_person_stands_where_the_camera_has_them(
     np.testing.assert_allclose(joints[0] - [0, 0, height_m], [away, -right, up], atol=0.01)
     hips = [NODES.index(name) for name in ("l_hip", "r_hip")]
     ours = joints[hips[0]] - joints[hips[1]]
-    theirs = np.diff(
-        take.joints[
-            round(at_s * 10), [list(KINECT).index("hip_right"), list(KINECT).index("hip_left")]
-        ],
-        axis=0,
-    )[0]
+    hips = [list(KINECT).index(name) for name in ("hip_right", "hip_left")]
+    theirs = np.diff(take.joints[round(at_s * 10), hips], axis=0)[0]
     facing = np.array([theirs[1], -theirs[0]])
     # Half a frame lies between both, in which the hips of a punch turn.
     np.testing.assert_allclose(ours[:2], facing, atol=0.05)

@@ -15,8 +15,7 @@ import pytest
 from rtradar import validate
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.validate import BEGIN, END, KEYS, markdown, write_readme
-from rtradar.validate.claims import Claim, Outcome
+from rtradar.validate import BEGIN, END, KEYS, Claim, Outcome, markdown, write_readme
 from rtradar.validate.rows import Row, used_up
 
 GOOD = """

@@ -12,7 +12,7 @@ from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
 from rtradar.pipeline.output.view import load_run_view
-from rtradar.report.view.run_view import view_data
+from rtradar.report.run_view import view_data
 
 MAPS = {
     "time": np.array([0.002, 0.004]),

@@ -15,8 +15,8 @@ from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.prepared_room import PreparedRoom
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
-from rtradar.report.figures import rooms
-from rtradar.report.figures.plots import Plots
+from rtradar.report import rooms
+from rtradar.report.plots import Plots
 from rtradar.scatter.multipath.path_summary import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure

@@ -13,8 +13,8 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.pipeline.output.echo_table import EchoTable, Look
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.radar import Radar
-from rtradar.report.view.snapshots import Snapshots
-from rtradar.report.view.three_d import semi_axis_poses
+from rtradar.report.snapshots import Snapshots
+from rtradar.report.three_d import semi_axis_poses
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Object, Scene

@@ -19,9 +19,9 @@ from rtradar.pipeline.output.map_store import read_maps
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import FieldUnit, field_unit, thinned
-from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
-from rtradar.report.view.snapshots import DAMAGE, Snapshots, load_snapshots, refused
+from rtradar.report.canvas import FieldUnit, field_unit, thinned
+from rtradar.report.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
+from rtradar.report.snapshots import DAMAGE, Snapshots, load_snapshots, refused
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json
 from rtradar.system.hdf5 import stored
@@ -86,7 +86,7 @@ def view(
         write_view(page, run_view, name=printable(Path(folder).resolve().name), colour=colour)
         shown["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
     if still is not None:
-        from rtradar.report.view.still import draw_still
+        from rtradar.report.still import draw_still
 
         step = run_view.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
         draw_still(still, run_view, step, colour=colour)

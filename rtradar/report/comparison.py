@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures.canvas import (
+from rtradar.report.canvas import (
     FieldUnit,
     add_colour_bar,
     colour_limits,
     draw_levels,
+    fitted_limits,
     rdt_points,
 )
-from rtradar.report.figures.fitting import fitted_limits
-from rtradar.report.pages.html import write_page
-from rtradar.report.view.run_view import RunView
-from rtradar.report.view.three_d import posed_figure
+from rtradar.report.html import write_page
+from rtradar.report.run_view import RunView
+from rtradar.report.three_d import posed_figure
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading
 
 MOST_STEPS = 60
@@ -146,9 +146,10 @@ def write_comparison(
     measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts;
     ``views`` are the data of the maps of each model, the reference last.
     """
-    values = {"fidelities": summary["fidelities"], "models": [*views], "unit": unit}
+    values = {"summary": summary, "rows": rows, "pictures": pictures, "unit": unit}
+    values |= {"fidelities": summary["fidelities"], "models": [*views]}
     scripts = ("plots.js", "figure.js", "compare.js")
-    _write(path, summary, rows, pictures, values, data=comparison_data(views), scripts=scripts)
+    write_page(path, "compare.html", values, data=comparison_data(views), scripts=scripts)
 
 
 def write_folders(
@@ -162,20 +163,8 @@ def write_folders(
         (key, *(str(values.get(name, "")) for name in summary["folders"]))
         for key, values in summary["differ"].items()
     ]
-    values = {"folders": summary["folders"], "differ": differ}
-    _write(path, summary, rows, pictures, values)
-
-
-def _write(
-    path: Path,
-    summary: Mapping[str, Any],
-    rows: Sequence[Sequence[str]],
-    pictures: Mapping[str, Path],
-    values: Mapping[str, Any],
-    **options: Any,
-) -> None:
-    shared = {"summary": summary, "rows": rows, "pictures": pictures}
-    write_page(path, "compare.html", shared | dict(values), **options)
+    values = {"summary": summary, "rows": rows, "pictures": pictures}
+    write_page(path, "compare.html", values | {"folders": summary["folders"], "differ": differ})
 
 
 def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Evaluation of classifiers: its tables, pictures and numbers."""
+"""Evaluation of classifiers: its tables, numbers, and pictures of trainings."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rtradar.classify import outcomes as scores
 from rtradar.classify.outcomes import (
@@ -21,9 +22,17 @@ from rtradar.classify.outcomes import (
 )
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
-from rtradar.report.figures.trainings import draw_confusion, draw_learning, draw_transfer
+from rtradar.report.canvas import add_colour_bar
 from rtradar.system.checks import printable
-from rtradar.system.figure_style import LIGHT, WIDTH_IN, dress, new_figure, save_figure
+from rtradar.system.figure_style import (
+    LIGHT,
+    STYLE,
+    WIDTH_IN,
+    dress,
+    new_figure,
+    save_figure,
+    write_heading,
+)
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles
 from rtradar.system.templates import templates
@@ -113,7 +122,9 @@ def scores_of(answers: Answers) -> dict[str, Any]:
 
 def score_table(judged: Sequence[tuple[str, Answers]]) -> str:
     """Format balanced accuracies [%] of clouds and of recordings."""
-    template = templates(Path(__file__).parent, escaped=False).get_template("scores.txt")
+    template = templates(Path(__file__).with_name("pages"), escaped=False).get_template(
+        "scores.txt"
+    )
     width = max(len("balanced, in %"), *(len(title) for title, _ in judged))
     found = [(title, scores_of(answers)) for title, answers in judged]
     return template.render(width=width, judged=found).rstrip()
@@ -207,6 +218,9 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
     (out / "history.csv").write_text(csv_text(head, history), encoding="utf-8")
 
 
+# -- pictures --------------------------------------------------------------------------------------
+
+
 def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:
     """Draw a box plot of the accuracies in each row: a box between quartiles, a dot each."""
     figure = new_figure(4.2, width_in=max(WIDTH_IN, 1.4 + 1.1 * len(rows)))
@@ -221,4 +235,85 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> 
     axes.set(ylabel="Test accuracy [%]", xlabel="Classifier")
     axes.set_ylim(min(0.0, *map(min, percent)), 102)
     dress(axes, title="Test accuracy")
+    save_figure(figure, path)
+
+
+def draw_confusion(
+    path: Path, counts: NDArray[np.int64], classes: Sequence[str], title: str
+) -> None:
+    """Draw a confusion matrix ``counts (truth, answer)``, coloured by the fraction of the class."""
+    percent = 100 * counts / np.maximum(1, counts.sum(axis=1, keepdims=True))
+    cells = [
+        [f"{count}\n{value:.0f} %" for count, value in zip(*row, strict=True)]
+        for row in zip(counts, percent, strict=True)
+    ]
+    labels = "Answered", "Shown", "Fraction of the clouds that show it [%]"
+    _draw_matrix(path, percent, cells, classes, labels, title)
+
+
+def draw_transfer(
+    path: Path,
+    values: Sequence[str],
+    mean: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    title: str,
+) -> None:
+    """Draw accuracies ``(trained_on, tested_on)`` of a column's values, NaN where there is none."""
+
+    def cell(value: float, error: float) -> str:
+        text = "" if np.isnan(value) else f"{100 * value:.0f}"
+        return text if np.isnan(error) else f"{text}\n±{100 * error:.0f}"
+
+    rows = zip(mean, spread, strict=True)
+    cells = [[cell(*pair) for pair in zip(*row, strict=True)] for row in rows]
+    labels = "Asked about", "Trained on", "Test accuracy [%]"
+    _draw_matrix(path, 100 * mean, cells, values, labels, title)
+
+
+def draw_learning(path: Path, histories: Sequence[Sequence[dict[str, float]]], title: str) -> None:
+    """Draw loss and accuracy over epochs: a thin line a training, a thick one for their mean."""
+    figure = new_figure(3.4)
+    left, right = figure.subplots(1, 2)
+    for axes, name, label, factor in (
+        (left, "loss", "Negative log-likelihood [nat]", 1),
+        (right, "accuracy", "Accuracy [%]", 100),
+    ):
+        for side, colour in zip(("train", "test"), LIGHT.cycle, strict=False):
+            curves = [[factor * row[f"{side}_{name}"] for row in history] for history in histories]
+            epochs = np.arange(1, min(map(len, curves)) + 1)
+            curves = [curve[: len(epochs)] for curve in curves]
+            for curve in curves:
+                axes.plot(epochs, curve, color=colour, linewidth=0.5, alpha=0.35)
+            axes.plot(epochs, np.mean(curves, axis=0), color=colour, label=side)
+        axes.set(xlabel="Epoch", ylabel=label)
+        axes.legend()
+        dress(axes)
+    write_heading(figure, title)
+    save_figure(figure, path)
+
+
+def _draw_matrix(
+    path: Path,
+    percent: NDArray[np.float64],
+    cells: Sequence[Sequence[str]],
+    names: Sequence[str],
+    labels: tuple[str, str, str],
+    title: str,
+) -> None:
+    size = 2.6 + 0.85 * len(names)
+    figure = new_figure(size, width_in=max(WIDTH_IN, size + 0.9))
+    figure.set_layout_engine("compressed")
+    axes = figure.subplots()
+    image = axes.imshow(percent, cmap="Blues", vmin=0, vmax=100)
+    for row, line in enumerate(cells):
+        for column, text in enumerate(line):
+            tint = "white" if percent[row, column] > 55 else "black"
+            axes.text(
+                column, row, text, ha="center", va="center", color=tint, fontsize=STYLE["font.size"]
+            )
+    axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    axes.set(xlabel=labels[0], ylabel=labels[1])
+    dress(axes, title=title, grid=False)
+    add_colour_bar(image, [axes], labels[2], extend="neither")
     save_figure(figure, path)

@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull, QhullError
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import (
+from rtradar.report.canvas import (
     VELOCITY_LABEL,
     add_colour_bar,
     angle_label,
@@ -26,8 +26,9 @@ from rtradar.report.figures.canvas import (
     draw_levels,
     draw_view,
     field_unit,
+    fitted_limits,
+    masking_note,
 )
-from rtradar.report.figures.fitting import fitted_limits, masking_note
 from rtradar.scene import Furniture, Scene
 from rtradar.scene.plan import (
     draw_plan,

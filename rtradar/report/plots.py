@@ -15,24 +15,22 @@ from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import (
+from rtradar.report.canvas import (
     COUNTS,
+    HANDFUL,
     VELOCITY_LABEL,
     FieldUnit,
+    above_floor,
     add_colour_bar,
     angle_label,
     angle_view,
     draw_view,
     field_unit,
-    rdt_points,
-    thinned,
-)
-from rtradar.report.figures.fitting import (
-    HANDFUL,
-    above_floor,
     fitted_limits,
     masking_note,
     place_limits,
+    rdt_points,
+    thinned,
 )
 from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of

@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike
 
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import field_unit
-from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages.html import write_page
-from rtradar.report.pages.labels import signal_to_noise
-from rtradar.report.view.run_view import RunView, linked_views, view_data
-from rtradar.report.view.three_d import rdt_data, spatial_data
+from rtradar.report.canvas import central_limits, field_unit
+from rtradar.report.html import signal_to_noise, write_page
+from rtradar.report.run_view import RunView, linked_views, view_data
+from rtradar.report.three_d import rdt_data, spatial_data
 
 ROOM_PICTURES = ("plan.png", "range_azimuth_walls.png", "clutter_removal.png")
 """Files of pictures that belong to a room, in the order of the section."""

@@ -14,7 +14,7 @@ from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.report.figures.fitting import place_limits
+from rtradar.report.canvas import place_limits
 
 MOST_POINTS = 20_000
 """Largest number of points of a cloud that a browser still rotates smoothly."""

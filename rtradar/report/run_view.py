@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import FieldUnit, field_unit
-from rtradar.report.figures.fitting import central_limits
-from rtradar.report.pages.html import write_page
-from rtradar.report.view.snapshots import Snapshots
-from rtradar.report.view.three_d import (
+from rtradar.report.canvas import FieldUnit, central_limits, field_unit
+from rtradar.report.html import write_page
+from rtradar.report.snapshots import Snapshots
+from rtradar.report.three_d import (
     packed,
     posed_figure,
     rdt_data,

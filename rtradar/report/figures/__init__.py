@@ -1,1 +1,0 @@
-"""Pictures of maps, clouds, rooms and classifiers as PNG files."""

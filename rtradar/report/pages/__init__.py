@@ -1,1 +1,0 @@
-"""Pages in one file each, which open without a network."""

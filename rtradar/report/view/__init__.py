@@ -1,1 +1,0 @@
-"""The linked view of a run: its data, its page and its stills."""
