@@ -14,8 +14,8 @@ from rtradar.body.people import body_of_people
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.inside import Inside, objects_inside
 from rtradar.scatter.link_budget import LinkBudget, link_budget
+from rtradar.scatter.validity import Inside, objects_inside
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.settings import RunSettings
 from rtradar.system.registries import scene_files

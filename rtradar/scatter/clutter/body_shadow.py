@@ -58,8 +58,7 @@ from rtradar.scatter.clutter.point_shadow import (
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import KeyframeCache, chirp_poses, keyframe_step
 from rtradar.scene import Object
 
 Array = NDArray[np.float64]

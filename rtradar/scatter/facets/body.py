@@ -21,16 +21,14 @@ from rtradar.scatter.facets.radiation import (
     Links,
     Seen,
     as_amplitude,
+    body_facets,
     directions_apart,
+    ellipsoid_facets,
     radiated,
+    subdivisions_for,
     visible,
 )
-from rtradar.scatter.facets.surfaces import (
-    body_facets,
-    ellipsoid_facets,
-    subdivisions_for,
-)
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.trace.backends.backend import Backend, select, use
 from rtradar.trace.body_tracer import BodyTracer
 

@@ -25,11 +25,10 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
-from rtradar.scatter.common.poses import owners_of
+from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, owners_of
 from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.radiation import edge_facets
 from rtradar.scatter.facets.skin import SkinFacets
-from rtradar.scatter.facets.surfaces import edge_facets
 from rtradar.system.threads import thread_map
 
 _KEPT_KEYFRAMES = 2048
@@ -124,7 +123,7 @@ class Envelope:
         missing = []
         for index in sorted(around):
             if index in self._intervals:
-                self._interval(index)  # now the last to be dropped
+                self._intervals[index]  # now the last to be dropped
             else:
                 missing.append(index)
         self.prepare_keyframes(
@@ -135,9 +134,6 @@ class Envelope:
         for index, interval in zip(missing, found, strict=True):
             self._intervals.keep(index, interval)
 
-    def _interval(self, index: int) -> _Interval:
-        return self._intervals.get(index, lambda: self._divided(index, *self._ends(index)))
-
     def keyframe(self, index: int) -> Sample:
         """All parts at one keyframe."""
         index = min(index, self._end)
@@ -146,8 +142,8 @@ class Envelope:
     def course(self, index: int) -> Course:
         """Cubics from place to place of an interval, with the slopes of parabolas through three."""
         self.prepare_courses([index])
-        here, after = self._interval(index), self._interval(index + 1)
-        before = self._interval(index - 1) if index > 0 else here
+        here, after = self._intervals[index], self._intervals[index + 1]
+        before = self._intervals[index - 1] if index > 0 else here
         return Course(here.ratio, _slopes(before, here, after, inside=index > 0), here.known)
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:

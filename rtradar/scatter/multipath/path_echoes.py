@@ -19,7 +19,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
-from rtradar.scatter.multipath.wall_interaction import Passage, Passages, WallResponse
+from rtradar.scatter.multipath.slabs import Passage, Passages, WallResponse
 from rtradar.system.threads import in_threads
 
 Array = NDArray[np.float64]

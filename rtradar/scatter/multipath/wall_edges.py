@@ -24,10 +24,10 @@ from scipy.special import fresnel
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.multipath.furniture_faces import SolidFace
 from rtradar.scatter.multipath.image_paths import (
     Face,
     Leg,
+    SolidFace,
     corners,
     height,
     image,

@@ -8,9 +8,8 @@ import pytest
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
-from rtradar.scatter.clutter.wall_returns import rough_returns
-from rtradar.scatter.multipath.slab_series import WHOLE
-from rtradar.scatter.multipath.wall_interaction import after_slab
+from rtradar.scatter.clutter.static_clutter import rough_returns
+from rtradar.scatter.multipath.slabs import WHOLE, after_slab
 from rtradar.scene import Scene, Wall, material, slab
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.occluders import Occluders
@@ -83,14 +82,6 @@ def test_each_wall_has_its_own() -> None:
     assert np.abs(one.points - other.points).max() > 0.01
     phases = [np.exp(1j * np.angle(echoes.amplitude)) for echoes in (one, other)]
     assert np.abs(phases[0] - phases[1]).max() > 1
-
-
-def test_sums_over_phases_are_speckle() -> None:
-    (echoes,) = rough(replace(RADAR, bandwidth_hz=4e9), wall())
-    values = echoes.amplitude[0, 0, 0] / np.abs(echoes.amplitude[0, 0, 0])
-    # A hundred and more phases at random: their mean is below 3 / sqrt(n).
-    assert len(values) > 100
-    assert abs(values.mean()) < 3 / np.sqrt(len(values))
 
 
 def test_smooth_walls_and_walls_from_behind() -> None:

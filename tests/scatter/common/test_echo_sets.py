@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 import rtradar as rt
-from rtradar.scatter.common.echo_sets import together
+from rtradar.scatter.common.interpolation import together
 
 RADAR = dataclasses.replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2)
 

@@ -9,7 +9,7 @@ import trimesh
 
 from rtradar.radar import Radar
 from rtradar.scatter.echo_models import build_model
-from rtradar.scatter.multipath.furniture_faces import faces_of, reflecting_faces
+from rtradar.scatter.multipath.image_paths import faces_of, reflecting_faces
 from rtradar.scene import Furniture, Scene, Wall, material, reflection
 from rtradar.trace.backends.backend import Backend
 

@@ -1,7 +1,6 @@
 """Echoes over walls against the image theorem, paths by hand, and images at every chirp."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,9 @@ from rtradar.body.body import Poses
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.multipath.image_paths import images, wall_paths
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Surface, Wall, material, room_walls
 
 Array = NDArray[np.float64]
@@ -57,33 +55,6 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
 
 
 # -- the image theorem -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("polarization", ["v", "h"])
-@pytest.mark.parametrize("side", ["floor", "left"])
-def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
-    side: str, polarization: str, one: Make, wall: Make, room: Any
-) -> None:
-    body = one()
-    radar = replace(Radar.preset("paper-12ghz"), polarization=polarization)
-    model = room(radar, body, wall(side), order=2)
-    chirps = np.arange(24)
-    echoes = model.echoes(chirps)
-    number = model.path_names.index(f"{side} > body > {side}")
-    turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
-    shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
-    at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    length, amplitude, _ = solve_specular_points(
-        Geometry(at.tx, at.rx, at.centres @ turn + shift, turn @ at.frames, at.semi_axes),
-        polarization=Polarization(polarization),  # type: ignore[arg-type]
-    )
-    # Of third order in the distance of a receiver from the middle of its line: 4 cm.
-    np.testing.assert_allclose(echoes.length[..., number], length[..., 0], rtol=0, atol=1e-7)
-    # Between the ends of a line of antennas the polarisation is drawn straight, and the return is
-    # that of one specular point.
-    np.testing.assert_allclose(echoes.amplitude[0, ..., number], amplitude[..., 0], rtol=0.01)
-    assert echoes.bounces[number] == 3
-    assert echoes.part[number] == 0
 
 
 def test_floor_out_and_a_side_wall_back_by_hand(

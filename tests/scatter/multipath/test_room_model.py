@@ -12,16 +12,13 @@ from numpy.typing import NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.radar import Radar
-from rtradar.scatter import build_model
-from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import chirp_poses, keyframe_step
 from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
-from rtradar.scatter.multipath.room_keyframes import KEYFRAMES_S
+from rtradar.scatter.multipath.keyframes import KEYFRAMES_S
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.trace.backends.backend import Backend
 
@@ -298,27 +295,6 @@ def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
         )
     number = model.path_names.index("left > body")
     assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
-
-
-@pytest.mark.parametrize("name", ["perfect-conductor", "skin"])
-def test_the_person_alone_is_specular_in_free_space(
-    name: str, one: Make, wall: Make, room: Any
-) -> None:
-    body, radar, chirps = (
-        one(velocity=(-1.0, 0.0, 0.0)),
-        Radar.preset("paper-12ghz"),
-        np.arange(100),
-    )
-    model = room(radar, body, wall("floor", "concrete"), materials=[name])
-    free = build_model("specular", radar, body, materials=[name]).echoes(chirps)
-    alone = model.person.echoes(chirps)
-    np.testing.assert_array_equal(alone.length, free.length)
-    np.testing.assert_array_equal(alone.amplitude, free.amplitude)
-    # Its direct echo in the room is the same, for the floor is beside it.
-    direct = model.echoes(chirps).amplitude[1, ..., 0]
-    # In the room the reflection of skin follows the sweep and the ends of the lines, here it is
-    # that of the middle.
-    np.testing.assert_allclose(direct, free.amplitude[0, ..., 0], rtol=2e-3)
 
 
 def test_skin_over_a_wall_is_weaker_by_its_reflection(

@@ -18,13 +18,14 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
 from rtradar.scatter.common.polarization import (
+    POLARIZATIONS,
     Polarization,
     antenna_field,
     bisector,
     unit,
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
-from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scatter.multipath.slabs import WallResponse
 from rtradar.scene import Material, Object, reflection
 from rtradar.trace.occluders import Occluders
 
@@ -127,7 +128,7 @@ class RigidLegs:
         across = unit(np.cross(way, normals))
         te = np.sum(antenna_field(way, self._polarization) * across, axis=-1) ** 2
         eta = made_of.eta(np.array([radar.centre_frequency_hz]))
-        in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+        in_te, in_tm = (reflection(eta, cosine, kind) for kind in POLARIZATIONS)
         # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
         return np.asarray(total * (in_tm - te * (in_te + in_tm)))
 

@@ -15,7 +15,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.models.specular import Specular
-from rtradar.scatter.multipath.slab_series import Term, room_series
+from rtradar.scatter.multipath.slabs import Term, room_series
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material, slab
 from rtradar.scene.slab import slab_passes
 
