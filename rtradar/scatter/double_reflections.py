@@ -254,19 +254,17 @@ class DoubleReflections:
         """Pairs (pair, 2), weights (chirp, pair), and where to begin (chirp, pair, 2, 3)."""
         before, rest = keyframe_before(self._radar, chirps, self._step)
         numbers = np.unique([before, before + 1]).tolist()
-        keyframes = {
-            number: self._keyframes.get(number, partial(self._trace, number)) for number in numbers
-        }
-        every = np.concatenate([keyframe.pairs for keyframe in keyframes.values()])
-        pairs = np.unique(every, axis=0)
-        places = {(first, last): place for place, (first, last) in enumerate(pairs.tolist())}
+        keyframes = [
+            self._keyframes.get(number, partial(self._trace, number)) for number in numbers
+        ]
+        every = np.concatenate([keyframe.pairs for keyframe in keyframes])
+        pairs, place = np.unique(every, axis=0, return_inverse=True)
+        stops = np.cumsum([len(keyframe.pairs) for keyframe in keyframes])
+        places = np.split(place.ravel(), stops[:-1])
         weight = np.zeros((len(chirps), len(pairs)))
         start = np.full((len(chirps), len(pairs), 2, 3), np.nan)
         ramp = smoothstep(rest / self._step)
-        for number, keyframe in keyframes.items():
-            own = np.array(
-                [places[first, last] for first, last in keyframe.pairs.tolist()], np.int64
-            )
+        for number, keyframe, own in zip(numbers, keyframes, places, strict=True):
             for inside, share in ((before == number, 1 - ramp), (before + 1 == number, ramp)):
                 some = np.flatnonzero(inside)
                 weight[np.ix_(some, own)] += share[some, None] * keyframe.weight

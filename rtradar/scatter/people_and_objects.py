@@ -20,7 +20,7 @@ from rtradar.scatter.echo_models import build_model, takes_backend
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.rigid_echoes import RigidEchoes
+from rtradar.scatter.rigid_echoes import DIRECT, RigidEchoes
 from rtradar.scatter.rigid_sheets import RigidSheet
 from rtradar.scatter.validity import Limit, objects_inside
 from rtradar.scene import Object, Scene
@@ -56,8 +56,10 @@ class PeopleAndObjects:
 
     The ``objects (object, path)`` answer over several paths, the direct one first. The part of an
     object comes after the ``parts`` of the people, in the order of the objects. ``limits`` are
-    those of the objects, ``variant`` is the backend that traces for the people; ``room`` is their
-    model in a room, None without a room, or with nobody in it.
+    those of validity that the objects come near or go past, ``variant`` is the backend that traces
+    for the people; ``people_alone`` is their model without objects and without a room, ``room``
+    that in a room, None without a room, or with nobody in it, and ``paths`` are those of their
+    echoes, by the number that an echo has of it.
     """
 
     def __init__(
@@ -68,18 +70,10 @@ class PeopleAndObjects:
         limits: Sequence[Limit] = (),
     ) -> None:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
-        self._limits, self.variant = tuple(limits), person.variant
+        self.limits, self.variant = tuple(limits), person.variant
         self.room = person if isinstance(person, RoomModel) else None
-
-    @property
-    def people_alone(self) -> EchoModel:
-        """The model of the people without objects and without a room."""
-        return self.person if self.room is None else self.room.person
-
-    @property
-    def paths(self) -> tuple[WallPath, ...]:
-        """Path of people's echoes, by the number that an echo has of it; without walls one."""
-        return (WallPath((), ()),) if self.room is None else self.room.paths
+        self.people_alone = person if self.room is None else self.room.person
+        self.paths = (DIRECT,) if self.room is None else self.room.paths
 
     @property
     def path_names(self) -> tuple[str, ...]:
@@ -87,15 +81,9 @@ class PeopleAndObjects:
         every = [*self.paths, *(path.path for own in self.objects for path in own)]
         return tuple(dict.fromkeys(path.name for path in every))
 
-    @property
-    def limits(self) -> tuple[Limit, ...]:
-        """Limits of validity that the objects come near or go past."""
-        of_paths = (limit for own in self.objects for path in own for limit in path.limits)
-        return (*self._limits, *of_paths)
-
     def with_person(self, person: EchoModel) -> PeopleAndObjects:
         """Return the same objects with another model of the people."""
-        return PeopleAndObjects(person, self._parts, self.objects, self._limits)
+        return PeopleAndObjects(person, self._parts, self.objects, self.limits)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
@@ -202,7 +190,8 @@ def build_model_of_all(
         return kind(radar, moving, body.duration_s, path=path, **given)
 
     objects = [[echoes(moving, path) for path in paths] for moving in scene.objects]
-    return PeopleAndObjects(model, len(body.part_names), objects, overlaps)
+    limits = [*overlaps, *(limit for own in objects for path in own for limit in path.limits)]
+    return PeopleAndObjects(model, len(body.part_names), objects, limits)
 
 
 class BinaryPhaseModel:

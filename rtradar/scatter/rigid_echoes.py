@@ -115,7 +115,8 @@ class RigidEchoes:
             walls, radar, most_nodes=_NODES, enough=_WALL_ERROR, bounces=path.order
         )
         response = WallResponse(WallEdges.of(walls, radar), series.walls, self.frequency)
-        self._legs = RigidLegs(radar.at(0.0), path, response, past)
+        self._meets = path, response, past
+        self._legs = RigidLegs(radar.at(0.0), *self._meets)
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
@@ -308,7 +309,8 @@ class RigidEchoes:
         """Legs at a time, with the middles [m] and the normals (facet, 3) of facets, world."""
         facets, ((rotation,), (at,)) = self._facets, self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
-        return self._legs.before(self._radar.at(time_s)), middles, facets.normals @ rotation.T
+        legs = RigidLegs(self._radar.at(time_s), *self._meets)
+        return legs, middles, facets.normals @ rotation.T
 
 
 def far_apart(chirps: Indices) -> bool:

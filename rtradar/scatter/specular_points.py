@@ -145,9 +145,10 @@ class SpecularVisibility:
         time_s = keyframe_time(self._radar, self._body, chirp)
         radar, (centres, frames, semi_axes) = self._radar.at(time_s), self._body.at([time_s])
         self._tracer.pose(centres[0], frames[0])
-        every = (np.repeat(own, radar.n_tx, axis=0) for own in (centres, frames))
+        of_tx = np.zeros(radar.n_tx, dtype=np.int64)
         tx, rx = radar.tx, radar.rx[radar.rx_of_tx]
-        at = ChirpPoses(np.arange(radar.n_tx), tx, rx, *every, semi_axes)
+        given = np.arange(radar.n_tx), tx, rx, centres[of_tx], frames[of_tx], semi_axes
+        at = ChirpPoses(*given)
         points = solve_specular_points(at, points=True)[2]
         start = np.einsum("pji,pj->pi", frames[0], points[0, 0] - centres[0])
         return Keyframe(unobstructed(self._tracer, tx, rx, points), start)

@@ -261,7 +261,8 @@ class ClutterShadow:
         """
         legs = self._legs
         some = np.flatnonzero(legs.channel == self._radar.n_channels // 2)
-        lost = self._on_legs(tuple(array[some] for array in legs.geometry), posed, np.ones(1))
+        geometry = tuple(array[some] for array in legs.geometry)
+        lost = lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, np.ones(1))
         kept = np.ones(len(self.mirrors), dtype=np.complex128)
         np.multiply.at(kept, legs.mirror[some], 1 - lost[:, 0])
         of_points = points.samples(fields, posed)
@@ -272,16 +273,13 @@ class ClutterShadow:
         """Which mirrors are occluded, and what of each is lost (mirror, tx, rx, node)."""
         legs, radar = self._legs, self._radar
         scales = self.frequency / radar.centre_frequency_hz
-        lost = self._on_legs(legs.geometry, posed, scales)
+        lost = lost_on_legs(radar, legs.geometry, posed, REACH, MIRROR_LINES, scales)
         kept = np.ones((len(self.mirrors), radar.n_channels, SWEEP_NODES), dtype=np.complex128)
         some = np.flatnonzero(lost.any(axis=1))
         np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
         hidden = np.flatnonzero((kept != 1).any(axis=(1, 2)))
         shape = len(hidden), radar.n_tx, radar.n_rx, SWEEP_NODES
         return np.array(self.mirrors, dtype=np.int64)[hidden], 1 - kept[hidden].reshape(shape)
-
-    def _on_legs(self, geometry: tuple[Array, ...], posed: Posed, scales: Array) -> Field:
-        return lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales)
 
 
 def _apart_s(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -151,27 +149,20 @@ class FacetBody:
         return amplitude
 
     def field(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
-    ) -> NDArray[np.complex128]:
-        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m]."""
-        return self._in_pose(radiated, time, pose, nodes, length, parts)
-
-    def visible(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
-    ) -> NDArray[np.complex128]:
-        """What shadows leave (node, pair, n) of the amplitudes of parts (n,): 1 in full view."""
-        return self._in_pose(visible, time, pose, nodes, length, parts)
-
-    def _in_pose(
         self,
-        find: Callable[..., NDArray[np.complex128]],
         time: float,
         pose: Poses,
         nodes: ArrayNodes,
         length: Array,
         parts: Indices,
+        *,
+        left: bool = False,
     ) -> NDArray[np.complex128]:
-        antennas = nodes.antennas
+        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m].
+
+        With ``left`` it is what shadows leave of these amplitudes, 1 in full view.
+        """
+        antennas, find = nodes.antennas, visible if left else radiated
         seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
         links = self._links(antennas[None], nodes.pairs, length[None], self._radar.at(time).axes)
         own = pose.centres[:, parts], pose.frames[:, parts]

@@ -75,14 +75,6 @@ class _Interval(NamedTuple):
     known: NDArray[np.bool_]
 
 
-class Course(NamedTuple):
-    """One interval: ratio and slope (place, node, pair, part), where ``known (place, part)``."""
-
-    ratio: Field
-    slope: Field
-    known: NDArray[np.bool_]
-
-
 class Envelope:
     """An envelope over a capture, of the parts of one or several people: ``owner (part,)``.
 
@@ -139,12 +131,15 @@ class Envelope:
         index = min(index, self._end)
         return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
-    def course(self, index: int) -> Course:
-        """Cubics from place to place of an interval, with the slopes of parabolas through three."""
+    def course(self, index: int) -> tuple[Field, Field, NDArray[np.bool_]]:
+        """Cubics from place to place of an interval, with the slopes of parabolas through three.
+
+        Returned are ratio and slope (place, node, pair, part), where ``known (place, part)``.
+        """
         self.prepare_courses([index])
         here, after = self._intervals[index], self._intervals[index + 1]
         before = self._intervals[index - 1] if index > 0 else here
-        return Course(here.ratio, _slopes(before, here, after, inside=index > 0), here.known)
+        return here.ratio, _slopes(before, here, after, inside=index > 0), here.known
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
         """The keyframe before an interval, if any, those at its ends, and the one after it."""
@@ -305,7 +300,7 @@ class ArrayEnvelope:
         given = time, pose, nodes, length, parts
         if self._gradual:
             assert isinstance(self._surface, FacetBody)  # a skin has no fraction that is seen
-            return Sample(self._surface.visible(*given), np.abs(strength))
+            return Sample(self._surface.field(*given, left=True), np.abs(strength))
         amplitude = self._surface.field(*given)
         # Without a specular point there is next to nothing to see either: antennas on opposite
         # sides.
@@ -331,7 +326,7 @@ class ArrayEnvelope:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
                     fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
-                    course = tuple(envelope.course(interval))
+                    course = envelope.course(interval)
                     fill_envelope(inside, fraction, tx, weights, course, strength, amplitude)
                 else:
                     ratio = envelope.keyframe(interval).ratio[:, None]

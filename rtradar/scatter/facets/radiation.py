@@ -309,18 +309,7 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
 
     It is for exp(+j omega t), and 0 where nothing is lit. `Views` need not mark what faces away.
     """
-    views = Views(
-        _own(views.part, np.int64),
-        _own(views.antennas, np.float64),
-        _own(views.row, np.int64),
-        _own(views.seen, np.float32),
-    )
-    waves = waves._replace(
-        pairs=_own(waves.pairs, np.int64),
-        carrier=_own(waves.carrier, np.float64),
-        wavenumber=_own(waves.wavenumber, np.float64),
-        currents=_own(waves.currents, np.float64),
-    )
+    views, waves = Views(*map(_own, views)), Waves(*map(_own, waves))
     tasks = len(views.part)
     shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
     out = np.empty(shape, dtype=np.complex128)
@@ -332,6 +321,6 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
     return out
 
 
-def _own(array: NDArray[Any], kind: type[np.number]) -> NDArray[Any]:
+def _own(value: Any) -> Any:
     # What may not be written to is another type to Numba, for which it would compile all again.
-    return np.require(array, kind, ["C", "W"])
+    return np.require(value, None, ["C", "W"]) if isinstance(value, np.ndarray) else value

@@ -98,11 +98,11 @@ class RoomModel:
     A model whose class says ``fast_over_walls`` computes the echoes over all paths, with a formula,
     or by ``specular_echo`` with specular points, which the room follows over walls itself. Of any
     other level each path has a model before the images of the antennas over its legs. ``paths`` are
-    all paths, the direct one first; ``faces`` says of each face of furniture whether paths lead
-    over it; ``not_followed``, known after `prune`, are the walls whose frequency response is not
-    known to `FIELD_ERROR`, with the fraction of the echo power that meets each. Of the weakest
-    echoes that a tolerance leaves out ``left_out`` is the number and ``left_out_m2`` the mean power
-    [m^2].
+    all paths, the direct one first, and ``path_names`` theirs; ``faces`` says of each face of
+    furniture whether paths lead over it; ``not_followed``, known after `prune`, are the walls whose
+    frequency response is not known to `FIELD_ERROR`, with the fraction of the echo power that meets
+    each. Of the weakest echoes that a tolerance leaves out ``left_out`` is the number and
+    ``left_out_m2`` the mean power [m^2].
     """
 
     def __init__(
@@ -148,6 +148,7 @@ class RoomModel:
         self.paths = tuple(
             sorted(dict.fromkeys(chain.from_iterable(paths)), key=lambda path: path.order)
         )
+        self.path_names = tuple(path.name for path in self.paths)
         every = *series.walls, *(HALF_SPACE,) * len(faces)
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages.of(radar, self.paths)
@@ -176,11 +177,6 @@ class RoomModel:
     @property
     def _columns(self) -> EchoColumns:
         return self._keyframes.columns
-
-    @property
-    def path_names(self) -> tuple[str, ...]:
-        """Name of each path, by the number that an echo has of it."""
-        return tuple(path.name for path in self.paths)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the direct echoes did."""

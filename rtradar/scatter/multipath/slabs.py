@@ -286,7 +286,7 @@ class WallResponse(NamedTuple):
     frequency: Array
 
     @property
-    def walls(self) -> tuple[Wall, ...]:
+    def walls(self) -> Sequence[Wall]:
         """Walls of the room."""
         return self.edges.walls
 

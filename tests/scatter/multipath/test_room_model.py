@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.poses import chirp_poses, keyframe_step
 from rtradar.scatter.models.analytic import Analytic
-from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
 from rtradar.scatter.multipath.keyframes import KEYFRAMES_S
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_points import solve_specular_points
-from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.scene import Furniture, Scene, material
 from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
@@ -29,35 +27,6 @@ def unit(vector: Array) -> Array:
 
 
 # -- what occludes and what transmits --------------------------------------------------------------
-
-
-def test_a_slab_before_the_radar_lets_its_square_through(make: Any) -> None:
-    body = make.one((0.2, 0.2, 0.2), (0.0, 1.0, 1.0))
-    radar = make.single()
-    plasterboard = Wall(
-        name="partition",
-        corner_m=(-2.0, -2.0, 0.0),
-        edge_u_m=(0.0, 6.0, 0.0),
-        edge_v_m=(0.0, 0.0, 3.0),
-        material=material("plasterboard"),
-        thickness_m=0.003,
-    )
-    model = make.room(radar, body, plasterboard)
-    echoes, free = (
-        model.echoes(np.arange(2)),
-        Specular(radar, body).echoes(np.arange(2)),
-    )
-    # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
-    root = np.sqrt(material("plasterboard").eta(echoes.frequency))
-    wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
-    face, inside = (1 - root) / (1 + root), np.exp(-1j * wave * root * 0.003)
-    through = (1 - face**2) * inside / (1 - face**2 * inside**2) * np.exp(1j * wave * 0.003)
-    ratio = echoes.amplitude[:, :, 0, 0] / free.amplitude[:, :, 0, 0]
-    # Factors are kept in complex64.
-    np.testing.assert_allclose(ratio, np.conj(through**2)[:, None] * np.ones(2), rtol=1e-6)
-    np.testing.assert_allclose(echoes.length[..., 0], free.length[..., 0], rtol=1e-14)
-    # Tx before it, body behind: no wave is reflected from one to the other.
-    np.testing.assert_array_equal(echoes.amplitude[..., 1:], 0)
 
 
 def test_a_wall_reflects_only_where_it_is(make: Any) -> None:

@@ -131,7 +131,8 @@ def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "thickness"), [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125)]
+    ("name", "thickness"),
+    [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125), ("plasterboard", 0.003)],
 )
 def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
     name: str, thickness: float, make: Any
