@@ -25,7 +25,6 @@ from rtradar.body.body import Poses
 from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend
-from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
@@ -35,11 +34,10 @@ from rtradar.scatter.common.polarization import (
     over_copolar,
 )
 from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.multipath.image_paths import Leg, SolidFace, WallPath, images
+from rtradar.scatter.multipath.image_paths import Leg, SolidFace, WallPath
 from rtradar.scatter.multipath.path_echoes import NO_DELAYS, DelayingPassages, EchoColumns
 from rtradar.scatter.multipath.slabs import Passages, WallResponse
 from rtradar.scatter.multipath.solid_edges import SolidEdges
-from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.system.threads import in_threads, thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -101,7 +99,7 @@ def path_keyframes(
     Columns that are met for the first time are added. Whether other parts occlude a direct echo,
     and any of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
-    points, start, exists = _specular_points(around, columns, poses)
+    points, start, exists = columns.specular_points(around.ends, poses)
     radar, ends = around.radar, around.ends
     ways = [path.out for path in around.paths], [path.back for path in around.paths]
     antennas = (ends.tx, radar.tx_antenna), (ends.rx, radar.rx_antenna)
@@ -150,41 +148,6 @@ def _in_columns(
     for column, found in parts:
         out[..., column] = found
     return out
-
-
-def _specular_points(
-    around: Surroundings, columns: EchoColumns, poses: Poses
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Specular points, and whether there is one at all.
-
-    Returned are points for the middles of the lines (keyframe, line, echo, 3), world [m]; for the
-    ends of the lines of Tx (keyframe, line, 2, echo, 3), in the axes of the parts [m]; and
-    (keyframe, line, echo) bool.
-    """
-    ends, count, part = around.ends, len(poses.centres), columns.part
-    # The middle of each line of Tx and its ends, all with the middle of the receivers kept.
-    tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
-    rx = np.repeat(ends.rx_middle[:, None], tx.shape[1], axis=1)
-    shape = (count, *tx.shape[:2], len(part))
-    places, exists = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-    for number in np.unique(columns.path):
-        chosen, path = np.flatnonzero(columns.path == number), around.paths[number]
-        own = part[chosen]
-        from_tx = images(path.out, tx.reshape(-1, 3))
-        to_rx = images(path.back, rx.reshape(-1, 3))
-        centres, frames = (
-            np.repeat(array[:, own], len(from_tx), axis=0)
-            for array in (poses.centres, poses.frames)
-        )
-        antennas = np.tile(from_tx, (count, 1)), np.tile(to_rx, (count, 1))[:, None]
-        _, amplitude, found = solve_specular_points(
-            Geometry(*antennas, centres, frames, poses.semi_axes[own]), points=True
-        )
-        exists[..., chosen] = (np.abs(amplitude) > 0).reshape(*shape[:3], len(own))
-        places[..., chosen, :] = found.reshape(*shape[:3], len(own), 3)
-    away = places[:, :, 1:] - poses.centres[:, None, None, part]
-    starts = np.einsum("keji,klsej->klsei", poses.frames[:, part], away)
-    return places[:, :, 0], starts, exists[:, :, 0]
 
 
 # -- fields ----------------------------------------------------------------------------------------
