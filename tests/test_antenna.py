@@ -16,10 +16,10 @@ import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.scatter import build_model, chirp_poses
 from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.common.polarization import leg_gain, specular_points
 from rtradar.scatter.common.poses import ChirpPoses
-from rtradar.scatter.free_space_legs import leg_gain, specular_points
 from rtradar.scatter.models.analytic import far_field_echo
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 
 BODY = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
 

@@ -15,7 +15,7 @@ from scipy import integrate, special, stats
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.process import WindowFunctions
-from rtradar.scatter.multipath.slab_series import Term
+from rtradar.scatter.multipath.slabs import Term
 from rtradar.scene import reflection, slab
 from rtradar.scene.slab import slab_passes
 

@@ -21,11 +21,18 @@ from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.double_reflections import solve_double
 from rtradar.kernels.scatter.specular_point import Geometry, Options
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import together
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before, keyframe_step
+from rtradar.scatter.common.interpolation import together
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, keyframe_time
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.common.poses import (
+    BuiltInModel,
+    ChirpPoses,
+    KeyframeCache,
+    chirp_poses,
+    keyframe_before,
+    keyframe_step,
+    keyframe_time,
+)
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
@@ -53,23 +60,17 @@ class Doubles(NamedTuple):
 
 
 class TwoBounceModel(BuiltInModel):
-    """A model of one path a part, to which reflections from part to part may be added."""
+    """A model of one path a part, to which ``doubles`` may be added: reflections between parts."""
 
-    _double: DoubleReflections | None = None
-
-    def _reflect_twice(
-        self, radar: Radar, body: Body, tracer: BodyTracer, *, spreading: bool
-    ) -> None:
-        """Add reflections from part to part from now on."""
-        self._double = DoubleReflections(radar, body, tracer, spreading=spreading)
+    doubles: DoubleReflections | None = None
 
     def account(self) -> dict[str, Any] | None:
         """List the pairs of parts that reflect one after the other."""
-        return None if self._double is None else self._double.account()
+        return None if self.doubles is None else self.doubles.account()
 
     def _with_doubles(self, single: Echoes, chirps: Indices) -> Echoes:
         """Put the reflections from part to part, if any are asked for, after the single ones."""
-        return single if self._double is None else self._double.beside(single, chirps)
+        return single if self.doubles is None else self.doubles.beside(single, chirps)
 
 
 def check_bounces(fidelity: str, bounces: int) -> None:
@@ -253,19 +254,17 @@ class DoubleReflections:
         """Pairs (pair, 2), weights (chirp, pair), and where to begin (chirp, pair, 2, 3)."""
         before, rest = keyframe_before(self._radar, chirps, self._step)
         numbers = np.unique([before, before + 1]).tolist()
-        keyframes = {
-            number: self._keyframes.get(number, partial(self._trace, number)) for number in numbers
-        }
-        every = np.concatenate([keyframe.pairs for keyframe in keyframes.values()])
-        pairs = np.unique(every, axis=0)
-        places = {(first, last): place for place, (first, last) in enumerate(pairs.tolist())}
+        keyframes = [
+            self._keyframes.get(number, partial(self._trace, number)) for number in numbers
+        ]
+        every = np.concatenate([keyframe.pairs for keyframe in keyframes])
+        pairs, place = np.unique(every, axis=0, return_inverse=True)
+        stops = np.cumsum([len(keyframe.pairs) for keyframe in keyframes])
+        places = np.split(place.ravel(), stops[:-1])
         weight = np.zeros((len(chirps), len(pairs)))
         start = np.full((len(chirps), len(pairs), 2, 3), np.nan)
         ramp = smoothstep(rest / self._step)
-        for number, keyframe in keyframes.items():
-            own = np.array(
-                [places[first, last] for first, last in keyframe.pairs.tolist()], np.int64
-            )
+        for number, keyframe, own in zip(numbers, keyframes, places, strict=True):
             for inside, share in ((before == number, 1 - ramp), (before + 1 == number, ramp)):
                 some = np.flatnonzero(inside)
                 weight[np.ix_(some, own)] += share[some, None] * keyframe.weight

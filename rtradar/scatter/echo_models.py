@@ -14,8 +14,8 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scatter.common.polarization import over_legs
 from rtradar.scatter.common.poses import EchoModel, account_of, has_mesh
-from rtradar.scatter.free_space_legs import over_legs
 from rtradar.scene import Scene
 from rtradar.system.registries import MODELS
 

@@ -15,11 +15,10 @@ from rtradar.conventions import MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import at_nodes
-from rtradar.scatter.common.keyframes import chirps_by_steps, keyframe_step
-from rtradar.scatter.common.poses import EchoModel
-from rtradar.scatter.inside import Inside
+from rtradar.scatter.common.interpolation import at_nodes
+from rtradar.scatter.common.poses import EchoModel, chirps_by_steps, keyframe_step
 from rtradar.scatter.validity import (
+    Inside,
     Limit,
     folded_angle_deg,
     refuse_too_near,

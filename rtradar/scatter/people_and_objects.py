@@ -14,17 +14,16 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import together
-from rtradar.scatter.common.poses import EchoModel, account_of
+from rtradar.scatter.common.interpolation import together
+from rtradar.scatter.common.poses import EchoModel, account_of, one_echo_a_part
 from rtradar.scatter.echo_models import build_model, takes_backend
-from rtradar.scatter.inside import objects_inside
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.rigid.bounces import rigid_echoes
-from rtradar.scatter.rigid.echoes import RigidEchoes
-from rtradar.scatter.validity import Limit
-from rtradar.scene import Scene
+from rtradar.scatter.rigid_echoes import DIRECT, RigidEchoes
+from rtradar.scatter.rigid_sheets import RigidSheet
+from rtradar.scatter.validity import Limit, objects_inside
+from rtradar.scene import Object, Scene
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.occluders import Occluders
 
@@ -48,16 +47,8 @@ class Nobody:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """No echoes at these chirps."""
         tx = self._radar.tx_of_chirp(chirps)
-        length = np.empty((len(tx), self._radar.n_rx, 0))
-        none = np.empty(0, dtype=np.int64)
-        return Echoes(
-            length=length,
-            amplitude=np.empty((1, *length.shape), dtype=np.complex128),
-            frequency=np.array([self._radar.centre_frequency_hz]),
-            tx=tx,
-            part=none,
-            bounces=none,
-        )
+        none = np.empty((len(tx), self._radar.n_rx, 0))
+        return one_echo_a_part(tx, none, none, self._radar.centre_frequency_hz)
 
 
 class PeopleAndObjects:
@@ -65,7 +56,10 @@ class PeopleAndObjects:
 
     The ``objects (object, path)`` answer over several paths, the direct one first. The part of an
     object comes after the ``parts`` of the people, in the order of the objects. ``limits`` are
-    those of the objects.
+    those of validity that the objects come near or go past, ``variant`` is the backend that traces
+    for the people; ``people_alone`` is their model without objects and without a room, ``room``
+    that in a room, None without a room, or with nobody in it, and ``paths`` are those of their
+    echoes, by the number that an echo has of it.
     """
 
     def __init__(
@@ -76,27 +70,10 @@ class PeopleAndObjects:
         limits: Sequence[Limit] = (),
     ) -> None:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
-        self._limits = tuple(limits)
-
-    @property
-    def variant(self) -> str | None:
-        """Backend that traces for the people."""
-        return self.person.variant
-
-    @property
-    def room(self) -> RoomModel | None:
-        """The model of the people in a room; None without a room, or with nobody in it."""
-        return self.person if isinstance(self.person, RoomModel) else None
-
-    @property
-    def people_alone(self) -> EchoModel:
-        """The model of the people without objects and without a room."""
-        return self.person if self.room is None else self.room.person
-
-    @property
-    def paths(self) -> tuple[WallPath, ...]:
-        """Path of people's echoes, by the number that an echo has of it; without walls one."""
-        return (WallPath((), ()),) if self.room is None else self.room.paths
+        self.limits, self.variant = tuple(limits), person.variant
+        self.room = person if isinstance(person, RoomModel) else None
+        self.people_alone = person if self.room is None else self.room.person
+        self.paths = (DIRECT,) if self.room is None else self.room.paths
 
     @property
     def path_names(self) -> tuple[str, ...]:
@@ -104,15 +81,9 @@ class PeopleAndObjects:
         every = [*self.paths, *(path.path for own in self.objects for path in own)]
         return tuple(dict.fromkeys(path.name for path in every))
 
-    @property
-    def limits(self) -> tuple[Limit, ...]:
-        """Limits of validity that the objects come near or go past."""
-        of_paths = (limit for own in self.objects for path in own for limit in path.limits)
-        return (*self._limits, *of_paths)
-
     def with_person(self, person: EchoModel) -> PeopleAndObjects:
         """Return the same objects with another model of the people."""
-        return PeopleAndObjects(person, self._parts, self.objects, self._limits)
+        return PeopleAndObjects(person, self._parts, self.objects, self.limits)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the people did."""
@@ -141,8 +112,8 @@ class PeopleAndObjects:
         for direct, *_ in self.objects:
             echoes = direct.echoes(chirps)
             powers = _powers(echoes)
-            length = echoes.length[powers.argmax()].mean()
-            found.append((float(powers.max()), float(length) / SPEED_OF_LIGHT_MPS))
+            delay_s = float(echoes.length[powers.argmax()].mean()) / SPEED_OF_LIGHT_MPS
+            found.append((float(powers.max()), delay_s))
         return found
 
     def prune(self, radar: Radar, n_chirps: int, noise_power_m2: float) -> list[dict[str, Any]]:
@@ -211,11 +182,16 @@ def build_model_of_all(
         past = Occluders(use(select(variant)), scene, body)
     given: dict[str, Any] = {"past": past, "walls": scene.walls, "spreading": spreading}
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
-    objects = [
-        [rigid_echoes(radar, moving, body.duration_s, path=path, **given) for path in paths]
-        for moving in scene.objects
-    ]
-    return PeopleAndObjects(model, len(body.part_names), objects, overlaps)
+
+    def echoes(moving: Object, path: WallPath) -> RigidEchoes:
+        # Rays follow several bounces on a sheet.
+        sheet = past is not None and not (moving.shape.closed or path.order)
+        kind = RigidSheet if sheet else RigidEchoes
+        return kind(radar, moving, body.duration_s, path=path, **given)
+
+    objects = [[echoes(moving, path) for path in paths] for moving in scene.objects]
+    limits = [*overlaps, *(limit for own in objects for path in own for limit in path.limits)]
+    return PeopleAndObjects(model, len(body.part_names), objects, limits)
 
 
 class BinaryPhaseModel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,16 +11,150 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.full_wave import BodiesOfRevolution, ClosedMesh, ConductingSurface, Spheroid
 from rtradar.scatter.echo_models import models_that, refuse_options
-from rtradar.scatter.full_wave import FULL_WAVE, full_wave_scattering
 from rtradar.scatter.models.analytic import far_field_echo
-from rtradar.scatter.target import target_geometry
+from rtradar.scatter.target import target_geometry, target_mesh
 from rtradar.scatter.validity import warn_of_small_radii
+from rtradar.scene import material as material_of
+from rtradar.scene.mesh_files import Triangles
 from rtradar.system.registries import MODELS
 
 if TYPE_CHECKING:
     import trimesh
+
+Array = NDArray[np.float64]
+
+# -- full wave -------------------------------------------------------------------------------------
+
+
+FULL_WAVE = "full-wave"
+
+_ALIKE = 1e-6
+"""Relative difference of two semi-axes, and sine between two axes, that counts as none."""
+
+_POOR = 1e-3
+"""Residual of the boundary condition above which the field is warned of: some 0.01 dB."""
+
+
+def full_wave_scattering(
+    target: Ellipsoids | trimesh.Trimesh,
+    tx: Array,
+    rx: Array,
+    frequency: Array,
+    *,
+    polarization: Literal["v", "h"],
+    material: str = "perfect-conductor",
+) -> NDArray[np.complex128]:
+    """Co-polar scattering length (n,) of a target by a full-wave method.
+
+    Parameters, returns and errors are those of `scattering_length`; ``material`` is the name of
+    what fills the target, a perfect conductor by default.
+    """
+    out = np.empty(len(tx), dtype=np.complex128)
+    for one in np.unique(frequency).tolist():
+        own = np.flatnonzero(frequency == one)
+        antennas = tx[own], rx[own]
+        eta = complex(material_of(material).eta(one))
+        permittivity = eta if np.isfinite(eta) else None  # None for a perfect conductor
+        if not isinstance(target, Ellipsoids):
+            surface = _surface(target_mesh(target, *antennas), one, permittivity)
+            out[own] = surface.scattering_length(*antennas, polarization)
+            continue
+        bodies = coaxial_bodies(target, one, permittivity)
+        out[own], residual = bodies.solve(*antennas, polarization)
+        if (worst := residual.max(initial=0.0)) > _POOR:
+            warnings.warn(
+                f"scattering_length: '{FULL_WAVE}' leaves {worst:.1%} of the incident field on the "
+                "surface; an antenna or another body is too near for these sources",
+                ValidityWarning,
+                stacklevel=3,
+            )
+    return out
+
+
+def _surface(
+    mesh: Triangles, frequency_hz: float, permittivity: complex | None
+) -> ConductingSurface:
+    """Make the problem of closed conducting meshes."""
+    if not mesh.closed:
+        raise InputError(
+            f"scattering_length: the mesh is open; '{FULL_WAVE}' takes closed meshes: close its "
+            "holes, or give a sheet a thickness"
+        )
+    if permittivity is not None:
+        raise InputError(
+            f"scattering_length: '{FULL_WAVE}' takes meshes of perfect conductors alone; leave "
+            "material out, or take ellipsoids of revolution"
+        )
+    return ConductingSurface(ClosedMesh(mesh.vertices, mesh.faces), frequency_hz)
+
+
+def coaxial_bodies(
+    target: Ellipsoids, frequency_hz: float, permittivity: complex | None = None
+) -> BodiesOfRevolution:
+    """Find the common axis of ellipsoids of revolution, and make the problem of them.
+
+    Parameters
+    ----------
+    target : Ellipsoids
+        Ellipsoids with two equal semi-axes, on one axis.
+    frequency_hz : float
+        Frequency of the wave [Hz].
+    permittivity : complex, optional
+        Relative permittivity of all of them; None: perfect conductors.
+
+    Returns
+    -------
+    BodiesOfRevolution
+
+    Raises
+    ------
+    InputError
+        Where an ellipsoid has three different semi-axes, they have no common axis, or the bodies
+        overlap or are too large.
+    """
+    own = [_own_axis(*one) for one in zip(target.frames, target.semi_axes, strict=True)]
+    away = target.centres - target.centres[0]
+    farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
+    candidates = [farthest] if farthest.any() else []
+    candidates += [frame[:, 2] for frame, radius, half in own if radius != half]
+    axis = np.array(candidates[0] if candidates else [0.0, 0.0, 1.0])
+    axis = axis / np.linalg.norm(axis)
+    scale = float(target.semi_axes.max())
+    for part, (frame, radius, half) in enumerate(own):
+        tilted = radius != half and np.linalg.norm(np.cross(frame[:, 2], axis)) > _ALIKE
+        if tilted or np.linalg.norm(np.cross(away[part], axis)) > _ALIKE * scale:
+            raise InputError(
+                f"scattering_length: ellipsoid {part} is not on the axis of the others; "
+                f"'{FULL_WAVE}' takes ellipsoids of revolution about one common axis"
+            )
+    spheroids = tuple(
+        Spheroid(radius, half, float(offset @ axis))
+        for (_, radius, half), offset in zip(own, away, strict=True)
+    )
+    across = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
+    across /= np.linalg.norm(across)
+    frame = np.stack([across, np.cross(axis, across), axis], axis=1)
+    return BodiesOfRevolution(
+        spheroids, frequency_hz, target.centres[0], frame, permittivity=permittivity
+    )
+
+
+def _own_axis(frame: Array, semi_axes: Array) -> tuple[Array, float, float]:
+    """Frame whose third column is the axis of revolution, and the semi-axes across and along."""
+    for last in (2, 0, 1):
+        first, second = (last + 1) % 3, (last + 2) % 3
+        radius = float(semi_axes[first] + semi_axes[second]) / 2
+        if abs(semi_axes[first] - semi_axes[second]) <= _ALIKE * radius:
+            half = float(semi_axes[last])
+            half = radius if abs(half - radius) <= _ALIKE * radius else half
+            return frame[:, [first, second, last]], radius, half
+    raise InputError(
+        f"scattering_length: an ellipsoid has semi-axes of {semi_axes.tolist()} m; '{FULL_WAVE}' "
+        "takes ellipsoids of revolution: make two of them equal"
+    )
 
 
 _COMMON = ("target", "tx", "rx", "frequency", "polarization")
@@ -100,16 +235,16 @@ def scattering_length(
             f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h"
         )
     scattering, traces = _method_for(target, fidelity, model_options)
+    pairs = tx_array, rx_array, frequencies
     if isinstance(target, Ellipsoids):
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
             _refuse_inside(target, name, antennas)
-    if isinstance(target, Ellipsoids) and traces:
-        target = target.without_repeats()
-    if isinstance(target, Ellipsoids) and len(tx_array) and fidelity != FULL_WAVE:
-        _, amplitude = far_field_echo(target_geometry(target, tx_array, rx_array))
-        wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
-        warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
-    pairs = tx_array, rx_array, frequencies
+        target = target.without_repeats() if traces else target
+        if len(tx_array) and fidelity != FULL_WAVE:
+            _, amplitude = far_field_echo(target_geometry(target, tx_array, rx_array))
+            wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
+            given = target, tx_array, rx_array, wavenumber, amplitude[:, 0]
+            warn_of_small_radii(*given, stacklevel=2)
     return np.asarray(scattering(target, *pairs, polarization=polarization, **model_options))
 
 

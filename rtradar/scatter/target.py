@@ -1,10 +1,17 @@
-"""Targets of `scattering_length`: the geometry of ellipsoids, sums of echoes, and checked meshes.
+"""Targets: ellipsoids, sums of their echoes, checked meshes, and facets at which rays are aimed.
 
 A mesh of one's own is a `trimesh.Trimesh` in metres, given as the target of `scattering_length`; in
 a room it is furniture (`rtradar.scene.objects`).
+
+Facets are small and fixed in the material. One seen from a Tx is a tube: rays go to its corners and
+its middle. As the facets move with the body, each tube keeps its place in the material, and the sum
+over tubes changes as smoothly from chirp to chirp as the body moves.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +21,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scene.mesh_files import Triangles, checked_triangles
+
+Array = NDArray[np.float64]
 
 _ON_SURFACE = 1e-9
 """Fraction of a mesh's size: an antenna no farther from the surface is on it."""
@@ -73,3 +82,199 @@ def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]
                     "the target"
                 )
     return mesh
+
+
+# -- facets for rays -------------------------------------------------------------------------------
+
+
+_THOMSEN = 1.6075
+
+MOST_TUBES = 4_000_000
+"""Some 1.5 GB; a body at 77 GHz with 3 rays per wavelength has 2.4 million."""
+
+
+@dataclass(frozen=True)
+class Tubes:
+    """Facets at which rays are aimed.
+
+    ``places`` and ``normals (tube, 4, 3)`` are three corners and the centroid of each facet [m],
+    and the unit normals of the smooth surface there; ``surface (tube,)`` is the part or face.
+    """
+
+    places: Array
+    normals: Array
+    surface: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.surface)
+
+
+@dataclass(frozen=True)
+class EllipsoidGrid:
+    """Facets of the parts of a body, in the axes in which each part is a unit sphere.
+
+    ``corners (tube, 3, 3)`` are on a sphere a little larger than 1, so that the mean of |x|^2 over
+    the facets is 1; ``part (tube,)`` is the part of each. In one ``pose`` the body is `Ellipsoids`.
+    """
+
+    corners: Array
+    part: NDArray[np.int64]
+    pose: Ellipsoids | None = None
+
+    @classmethod
+    def cover(cls, semi_axes: Array, edge: float) -> EllipsoidGrid:
+        """As many facets on each part as equilateral triangles of that edge [m] would cover it.
+
+        They are stretched with the part and long where it bends little. That costs no accuracy,
+        because the phase over each is integrated exactly as far as it is linear. An `InputError` is
+        raised if they would be more than `MOST_TUBES`.
+        """
+        divisions = np.maximum(2, np.ceil(_sides(ellipsoid_areas(semi_axes) / 20, edge)))
+        _refuse_many(20 * divisions**2)
+        grids = [_sphere(int(n)) for n in divisions]
+        return cls(
+            np.concatenate(grids), np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
+        )
+
+    def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
+        """Those facets, each in four, whose corners are farther in as finer facets require."""
+        quarters = in_four(self.corners[which])
+        # Corners are outside the sphere by 3/2 of what the middle is below the mean radius, by a
+        # quarter of it with half the edge.
+        out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
+        size = np.linalg.norm(quarters, axis=-1, keepdims=True)
+        quarters *= (1 + np.repeat(out, 4)[:, None, None] / 4) / size
+        return EllipsoidGrid(quarters, np.repeat(self.part[which], 4), self.pose)
+
+    @cached_property
+    def tubes(self) -> Tubes:
+        """The facets in the world, in their pose."""
+        assert self.pose is not None
+        u, part = _with_middle(self.corners), self.part
+        place, normal = np.empty_like(u), np.empty_like(u)
+        each = zip(self.pose.centres, self.pose.frames, self.pose.semi_axes, strict=True)
+        for index, (centre, frame, axes) in enumerate(each):
+            own = slice(*np.searchsorted(part, [index, index + 1]))
+            place[own] = centre + (u[own] * axes) @ frame.T
+            normal[own] = (u[own] / axes) @ frame.T
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        return Tubes(place, normal, part)
+
+
+@dataclass(frozen=True)
+class MeshGrid:
+    """Facets of the faces of a mesh: ``corners (tube, 3, 3)`` [m], and the face of each."""
+
+    corners: Array
+    face: NDArray[np.int64]
+
+    @staticmethod
+    def divisions(triangles: Array, edge: float, *, by_area: bool = False) -> NDArray[np.int64]:
+        """How often to cut triangles (face, 3, 3) until no side is longer than ``edge`` [m].
+
+        With ``by_area`` facets get the area that those of `EllipsoidGrid` have: no triangle of a
+        skin is so long and thin that its sides would have to be cut. An `InputError` is raised if
+        the facets would be more than `MOST_TUBES`.
+        """
+        if by_area:
+            wanted = np.round(_sides(np.linalg.norm(_across(triangles), axis=1) / 2, edge))
+        else:
+            wanted = np.ceil(_longest(triangles) / edge * (1 - 1e-12))
+        divisions = np.maximum(1, wanted)
+        _refuse_many(divisions**2)
+        return divisions.astype(np.int64)
+
+    @classmethod
+    def cut(cls, triangles: Array, divisions: NDArray[np.int64]) -> MeshGrid:
+        """Cut triangles (face, 3, 3) evenly, each so often; those without area are left out."""
+        flat = np.linalg.norm(_across(triangles), axis=1) <= 1e-12 * _longest(triangles) ** 2
+        corners, face = [np.empty((0, 3, 3))], [np.empty(0, dtype=np.int64)]
+        for n in np.unique(divisions[~flat]).tolist():
+            own = np.flatnonzero((divisions == n) & ~flat)
+            corners.append(np.einsum("fkc,tci->tfki", _cut(n), triangles[own]).reshape(-1, 3, 3))
+            face.append(np.repeat(own, n * n))
+        return cls(np.concatenate(corners), np.concatenate(face))
+
+    @cached_property
+    def tubes(self) -> Tubes:
+        """The facets with their flat normals, anticlockwise seen from the side they point to."""
+        normal = _across(self.corners)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        places = _with_middle(self.corners)
+        return Tubes(places, np.broadcast_to(normal[:, None], places.shape), self.face)
+
+    def split(self, which: NDArray[np.int64]) -> MeshGrid:
+        """Those facets, each in four."""
+        return MeshGrid(in_four(self.corners[which]), np.repeat(self.face[which], 4))
+
+
+Grid = EllipsoidGrid | MeshGrid
+"""Facets, fixed in the material, that can be split."""
+
+
+def _with_middle(corners: Array) -> Array:
+    return np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+
+
+def _longest(triangles: Array) -> Array:
+    """Longest side of each triangle (face,) [m]."""
+    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1)
+    return np.asarray(sides.max(axis=1))
+
+
+def _sides(areas: Array, edge: float) -> Array:
+    """How many edges long the sides of equilateral triangles of these areas [m^2] are."""
+    return np.sqrt(areas / (np.sqrt(3) / 4)) / edge
+
+
+def _across(triangles: Array) -> Array:
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def _refuse_many(counts: Array) -> None:
+    if counts.sum() > MOST_TUBES:
+        raise InputError(
+            f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; "
+            "lower rays_per_wavelength or the frequency"
+        )
+
+
+def ellipsoid_areas(semi_axes: Array) -> Array:
+    """Surface (part,) of ellipsoids (part, 3) by K. Thomsen's formula, 1 % off at most [m^2]."""
+    a, b, c = np.asarray(semi_axes).T ** _THOMSEN
+    return np.asarray(4 * np.pi * ((a * b + a * c + b * c) / 3) ** (1 / _THOMSEN))
+
+
+@lru_cache(maxsize=64)
+def _cut(n: int) -> Array:
+    """Barycentric weights (n^2, 3 corners, 3) of a triangle cut into n^2 similar ones."""
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    up, down = i + j < n, i + j < n - 1
+
+    def at(i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+        return np.stack([n - i - j, i, j], axis=-1) / n
+
+    upright = np.stack([at(i[up], j[up]), at(i[up] + 1, j[up]), at(i[up], j[up] + 1)], axis=1)
+    i, j = i[down], j[down]
+    turned = np.stack([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)], axis=1)
+    return np.concatenate([upright, turned])
+
+
+@lru_cache(maxsize=64)
+def _sphere(n: int) -> Array:
+    """Corners (20 n^2, 3, 3) of an icosahedron cut n-fold, on a sphere with the mean |x|^2 of 1."""
+    import trimesh  # slow to import
+
+    ball = trimesh.creation.icosahedron()
+    triangles = np.asarray(ball.vertices, dtype=np.float64)[np.asarray(ball.faces)]
+    corners = np.einsum("fkc,tci->tfki", _cut(n), triangles).reshape(-1, 3, 3)
+    corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
+    areas = np.linalg.norm(_across(corners), axis=1)
+    # Mean of |x|^2 over a triangle with corners of length 1: (3 + |a + b + c|^2) / 12.
+    means = (3 + (corners.sum(axis=1) ** 2).sum(axis=-1)) / 12
+    return corners / np.sqrt((areas * means).sum() / areas.sum())
+
+
+def in_four(triangles: Array) -> Array:
+    """Cut triangles (n, 3, 3) into four like ones each, (4 n, 3, 3)."""
+    return np.einsum("fkc,tci->tfki", _cut(2), triangles).reshape(-1, 3, 3)

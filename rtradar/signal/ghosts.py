@@ -24,7 +24,7 @@ from rtradar.kernels.nufft import (
     fill_anchors,
 )
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import weakest
+from rtradar.scatter.common.interpolation import weakest
 from rtradar.signal.synthesis import (
     synthesize,
     warn_of_motion_in_chirp,

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.poses import antennas_in_use
+from rtradar.scatter.common.poses import KeyframeCache, antennas_in_use
 from rtradar.signal.static_clutter import RoomIf
 from rtradar.signal.synthesis import synthesize
 

@@ -14,9 +14,8 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.elementary import add_blended, cubic_weights
 from rtradar.kernels.scatter.silhouettes import Shadow
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import at_nodes
-from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
+from rtradar.scatter.common.interpolation import at_nodes, interpolation_weights, sweep_nodes
+from rtradar.scatter.common.poses import KeyframeCache, keyframe_before
 from rtradar.signal.synthesis import synthesize
 from rtradar.system.threads import begun, thread_map
 

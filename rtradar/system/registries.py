@@ -255,7 +255,7 @@ MODELS = Registry(
         "specular": "rtradar.scatter.models.specular:Specular",
         "physical-optics": "rtradar.scatter.models.physical_optics:PhysicalOptics",
         "rays": "rtradar.scatter.models.rays:Rays",
-        "reference": "rtradar.scatter.models.reference:Reference",
+        "reference": "rtradar.scatter.models.physical_optics:Reference",
         "auto": "rtradar.scatter.models.auto:Auto",
     },
     gone={

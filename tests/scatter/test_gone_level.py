@@ -23,10 +23,6 @@ MOTION = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
 SPHERE = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], np.full((1, 3), 0.1))
 IN_PYTHON: dict[str, Callable[[rt.Radar, Path], object]] = {
     "run": lambda radar, out: rt.run(MOTION, radar, fidelity="fresnel", out=out),
-    "simulate": lambda radar, out: rt.simulate(MOTION, radar, fidelity="fresnel"),
-    "compare": lambda radar, out: rt.compare(
-        MOTION, radar, fidelities=("analytic", "fresnel"), out=out
-    ),
     "scattering_length": lambda radar, out: rt.scattering_length(
         SPHERE, [4.0, 0, 0], [4.0, 0, 0], 12e9, "fresnel"
     ),
@@ -41,7 +37,7 @@ def test_in_python_one_line_says_what_to_take(call: str, small: rt.Radar, tmp_pa
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("command", ["run", "compare", "bench", "dataset"])
+@pytest.mark.parametrize("command", ["compare", "dataset"])
 def test_on_the_command_line_it_is_the_same_line(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -50,9 +46,7 @@ def test_on_the_command_line_it_is_the_same_line(
         "[each]\nfidelity = ['fresnel']\n"
     )
     words = {
-        "run": ["synthetic:walk", "--fidelity", "fresnel", "--out", "OUT"],
         "compare": ["synthetic:walk", "--fidelities", "specular,fresnel", "--out", "OUT"],
-        "bench": ["--fidelity", "fresnel"],
         "dataset": ["build", str(tmp_path / "set.toml"), "--out", "OUT"],
     }[command]
     words = [str(tmp_path / "out") if word == "OUT" else word for word in words]

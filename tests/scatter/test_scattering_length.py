@@ -1,5 +1,7 @@
 """`scattering_length`: its phase, its normalisation, its laws, and what it refuses."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,10 @@ from rtradar.errors import InputError
 
 Array = NDArray[np.float64]
 FIDELITIES = ("specular", "analytic")
+# How nearly a law holds at each level: the first two know a specular point to 1e-5 of the field.
+LAWS = {"specular": 1e-5, "analytic": 1e-5, "physical-optics": 1e-8, "rays": 1e-8}
+FACETS, RAYS = {"facets": 1280}, {"bounces": 1, "rays_per_wavelength": 1.0}
+OPTIONS: dict[str, dict[str, float]] = {"physical-optics": FACETS, "rays": RAYS}
 seeds = st.integers(0, 2**32 - 1)
 
 # Laws hold for any size, also where optics is no longer true.
@@ -48,28 +54,51 @@ def test_a_far_sphere_has_the_optical_field_phase_and_all(fidelity: str) -> None
         np.testing.assert_allclose(field, rt.rcs.sphere(0.1, frequency, "go"), rtol=2e-5)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_phase_belongs_to_the_path_over_the_origin(fidelity: str) -> None:
+def length(target: rt.Ellipsoids, tx: Array, rx: Array, hz: float, level: str, **more: str) -> Any:
+    """Scattering length by few facets and rays."""
+    return rt.scattering_length(target, tx, rx, hz, level, **OPTIONS.get(level, {}), **more)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("level", LAWS)
+def test_phase_belongs_to_the_path_over_the_origin(level: str) -> None:
     # 0.3 m farther away: the path is 0.6 m longer, and with exp(+j omega t) a longer path turns
     # back.
     tx = np.array([1e6, 0.0, 0.0])
     spheres = (ellipsoid(0.1, 0.1, 0.1), ellipsoid(0.1, 0.1, 0.1, centre=(-0.3, 0, 0)))
-    here, there = (rt.scattering_length(sphere, tx, tx, 1e9, fidelity) for sphere in spheres)
+    here, there = (length(sphere, tx, tx, 1e9, level) for sphere in spheres)
     turn = np.exp(-2j * np.pi * 1e9 / SPEED_OF_LIGHT_MPS * 0.6)
     np.testing.assert_allclose(there / here, [turn], atol=1e-5)
 
 
-@settings(max_examples=20)
-@given(seeds, st.sampled_from(FIDELITIES))
-def test_tx_and_rx_may_be_swapped(seed: int, fidelity: str) -> None:
+@settings(max_examples=40)
+@given(seeds, st.sampled_from(list(LAWS)), st.sampled_from("vh"))
+def test_ends_may_be_swapped_and_all_be_turned_about_the_vertical(
+    seed: int, fidelity: str, polarization: str
+) -> None:
     rng = np.random.default_rng(seed)
-    target = ellipsoid(0.05, 0.07, 0.2, frame=Rotation.random(random_state=seed).as_matrix())
-    tx = directions(rng, 5) * rng.uniform(1, 10, (5, 1))
-    rx = tx + rng.normal(0, 0.2, (5, 3))
-    there, back = (
-        rt.scattering_length(target, *pair, 12e9, fidelity) for pair in ((tx, rx), (rx, tx))
+    frames = Rotation.random(2, random_state=seed).as_matrix()
+    target = both(
+        ellipsoid(0.05, 0.07, 0.2, frame=frames[0]),
+        ellipsoid(0.06, 0.05, 0.08, centre=(0.1, 0.2, 0.1), frame=frames[1]),
     )
-    np.testing.assert_allclose(back, there, rtol=1e-5, atol=1e-9)
+    tx = directions(rng, 5) * rng.uniform(1, 10, (5, 1))
+    # Within a tenth of the distance: farther apart it is the currents that Tx drives which count.
+    rx = tx + 0.05 * np.linalg.norm(tx, axis=1, keepdims=True) * rng.uniform(-1, 1, (5, 3))
+    turn = Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix()
+    # Of one part, for whether the edge of a shadow takes a corner of a facet is left to rounding.
+    alone = ellipsoid(0.06, 0.05, 0.2, centre=(0.1, 0.0, 0.2), frame=frames[0])
+    turned = rt.Ellipsoids(alone.centres @ turn.T, turn @ alone.frames, alone.semi_axes)
+    there, back, upright, aslant = (
+        length(own, *ends, 5e9, fidelity, polarization=polarization)
+        for own, ends in (
+            (target, (tx, rx)),
+            (target, (rx, tx)),
+            (alone, (tx, rx)),
+            (turned, (tx @ turn.T, rx @ turn.T)),
+        )
+    )
+    np.testing.assert_allclose(back, there, rtol=LAWS[fidelity], atol=1e-9)
+    np.testing.assert_allclose(aslant, upright, rtol=LAWS[fidelity], atol=1e-9)
 
 
 @settings(max_examples=20)
@@ -84,8 +113,8 @@ def test_twice_as_large_at_half_the_frequency_is_twice_the_field(seed: int, fide
     np.testing.assert_allclose(large, 2 * small, rtol=1e-5)
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_parts_beside_each_other_add_up(fidelity: str) -> None:
+@pytest.mark.parametrize("level", LAWS)
+def test_parts_beside_each_other_add_up(level: str) -> None:
     rng = np.random.default_rng(2)
     first, second = (
         ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)),
@@ -93,38 +122,32 @@ def test_parts_beside_each_other_add_up(fidelity: str) -> None:
     )
     tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.2, (10, 3))
     rx = tx + np.array([0.0, 0.1, 0.0])
-    whole, *parts = (
-        rt.scattering_length(t, tx, rx, 12e9, fidelity)
-        for t in (both(first, second), first, second)
-    )
-    np.testing.assert_allclose(whole, sum(parts), rtol=1e-12)
+    whole, *parts = (length(t, tx, rx, 6e9, level) for t in (both(first, second), first, second))
+    np.testing.assert_allclose(whole, sum(parts), rtol=1e-9)
 
 
-def test_a_part_straight_behind_another_returns_nothing_and_comes_back_beside_it() -> None:
+@pytest.mark.parametrize("level", ["specular", "physical-optics", "rays"])
+def test_a_part_straight_behind_another_returns_nothing_and_comes_back_beside_it(
+    level: str,
+) -> None:
     tx = np.array([[-4.0, 0.0, 0.0], [-4.0, 0.1, 0.05], [0.0, -4.0, 0.0]])
     front, back = ellipsoid(0.1, 0.2, 0.2, centre=(-0.4, 0, 0)), ellipsoid(0.05, 0.05, 0.1)
-    whole, alone, behind = (
-        rt.scattering_length(t, tx, tx, 12e9) for t in (both(front, back), front, back)
-    )
-    np.testing.assert_array_equal(whole[:2], alone[:2])
+    whole, alone, behind = (length(t, tx, tx, 6e9, level) for t in (both(front, back), front, back))
+    np.testing.assert_allclose(whole[:2], alone[:2], rtol=1e-12)
     # The third antenna sees both.
-    np.testing.assert_allclose(whole[2], alone[2] + behind[2], rtol=1e-12)
+    np.testing.assert_allclose(whole[2], alone[2] + behind[2], rtol=1e-9)
 
 
-def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
+@pytest.mark.parametrize("level", ["specular", "rays"])
+def test_either_leg_alone_is_enough_to_hide_a_part(level: str) -> None:
     # The plate stands between target and Tx only.
     tx, rx = np.array([-4.0, 0.5, 0.0]), np.array([-4.0, -0.5, 0.0])
     plate, target = ellipsoid(0.01, 0.1, 0.3, centre=(-2.0, 0.25, 0)), ellipsoid(0.05, 0.05, 0.1)
     for pair in ((tx, rx), (rx, tx)):
-        whole, alone = (rt.scattering_length(t, *pair, 12e9) for t in (both(plate, target), plate))
-        np.testing.assert_array_equal(whole, alone)
-    assert (
-        abs(
-            rt.scattering_length(both(plate, target), rx, rx, 12e9)
-            - rt.scattering_length(plate, rx, rx, 12e9)
-        )
-        > 0.01
-    )
+        whole, alone = (length(t, *pair, 12e9, level) for t in (both(plate, target), plate))
+        np.testing.assert_allclose(whole, alone, rtol=1e-9)
+    seen, alone = (length(t, rx, rx, 12e9, level) for t in (both(plate, target), plate))
+    assert abs(seen - alone) > 0.01
 
 
 @pytest.mark.parametrize("fidelity", ["specular", "physical-optics", "reference", "rays"])

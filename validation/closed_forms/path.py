@@ -31,7 +31,7 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter import build_model
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.validate.rows import Row, judged, main
 
 Array = NDArray[np.float64]

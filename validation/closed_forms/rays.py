@@ -37,9 +37,8 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.scatter.models.rays import Rays
-from rtradar.scatter.ray_tubes.target import rays_scattering
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid
+from rtradar.scatter.models.rays import Rays, rays_scattering
+from rtradar.scatter.target import EllipsoidGrid
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))

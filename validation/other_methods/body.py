@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.common.poses import keyframe_step
 from rtradar.scatter.link_budget import link_budget, power_of_parts_alone
 from rtradar.validate.rows import Row, judged, main, reported
 

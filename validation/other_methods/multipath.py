@@ -31,7 +31,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.process import angle, power_map, range_spectrum
 from rtradar.scatter import build_model
-from rtradar.scatter.multipath import room_keyframes
+from rtradar.scatter.multipath import keyframes
 from rtradar.scatter.multipath.image_paths import WallPath
 from rtradar.scene import Scene, Surface, Wall, material, room_walls
 from rtradar.signal import synthesize
@@ -536,8 +536,8 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
     # A tenth of a second from the middle of the capture on.
     chirps = np.arange(radar.chirps_per_frame) + 20_000 // radar.n_tx * radar.n_tx
     fields = {}
-    for apart_s in (2.5e-3, room_keyframes.KEYFRAMES_S):
-        with mock.patch.object(room_keyframes, "KEYFRAMES_S", apart_s):
+    for apart_s in (2.5e-3, keyframes.KEYFRAMES_S):
+        with mock.patch.object(keyframes, "KEYFRAMES_S", apart_s):
             model = build_model("specular", radar, body, scene=scene)
             echoes = model.echoes(chirps)
         phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
@@ -553,7 +553,7 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
     error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported(
         "living room, walk",
-        f"ghosts at keyframes {room_keyframes.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms",
+        f"ghosts at keyframes {keyframes.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms",
         "dB",
         error,
     )

@@ -35,8 +35,8 @@ from rtradar.body.body import Poses
 from rtradar.kernels.jit import compiled
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.specular_point.visibility import SpecularVisibility
+from rtradar.scatter.common.poses import keyframe_step
+from rtradar.scatter.specular_points import SpecularVisibility
 from rtradar.system.threads import in_threads
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer

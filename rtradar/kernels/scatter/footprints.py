@@ -1,4 +1,4 @@
-"""Radiation of the footprints of ray tubes, see `rtradar.scatter.ray_tubes.footprints`."""
+"""Radiation of the footprints of ray tubes, see `rtradar.scatter.ray_tubes`."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from rtradar.radar import Radar
 from rtradar.report.snapshots import Snapshots
 from rtradar.report.three_d import semi_axis_poses
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Object, Scene
 
 MAX_ECHOES = 400

@@ -15,7 +15,7 @@ from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.processing import refuse_large
-from rtradar.scatter.common.echo_sets import at_nodes
+from rtradar.scatter.common.interpolation import at_nodes
 
 if TYPE_CHECKING:
     import xarray as xr

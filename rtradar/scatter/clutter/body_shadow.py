@@ -58,8 +58,7 @@ from rtradar.scatter.clutter.point_shadow import (
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import KeyframeCache, chirp_poses, keyframe_step
 from rtradar.scene import Object
 
 Array = NDArray[np.float64]
@@ -262,7 +261,8 @@ class ClutterShadow:
         """
         legs = self._legs
         some = np.flatnonzero(legs.channel == self._radar.n_channels // 2)
-        lost = self._on_legs(tuple(array[some] for array in legs.geometry), posed, np.ones(1))
+        geometry = tuple(array[some] for array in legs.geometry)
+        lost = lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, np.ones(1))
         kept = np.ones(len(self.mirrors), dtype=np.complex128)
         np.multiply.at(kept, legs.mirror[some], 1 - lost[:, 0])
         of_points = points.samples(fields, posed)
@@ -273,16 +273,13 @@ class ClutterShadow:
         """Which mirrors are occluded, and what of each is lost (mirror, tx, rx, node)."""
         legs, radar = self._legs, self._radar
         scales = self.frequency / radar.centre_frequency_hz
-        lost = self._on_legs(legs.geometry, posed, scales)
+        lost = lost_on_legs(radar, legs.geometry, posed, REACH, MIRROR_LINES, scales)
         kept = np.ones((len(self.mirrors), radar.n_channels, SWEEP_NODES), dtype=np.complex128)
         some = np.flatnonzero(lost.any(axis=1))
         np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
         hidden = np.flatnonzero((kept != 1).any(axis=(1, 2)))
         shape = len(hidden), radar.n_tx, radar.n_rx, SWEEP_NODES
         return np.array(self.mirrors, dtype=np.int64)[hidden], 1 - kept[hidden].reshape(shape)
-
-    def _on_legs(self, geometry: tuple[Array, ...], posed: Posed, scales: Array) -> Field:
-        return lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales)
 
 
 def _apart_s(

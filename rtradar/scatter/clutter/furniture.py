@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,9 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes, behind_walls
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.polarization import Polarization, apply_te_tm, pattern_of
-from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
-from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.tubes import MeshGrid
+from rtradar.scatter.common.polarization import POLARIZATIONS, Polarization, apply_te_tm, pattern_of
+from rtradar.scatter.ray_tubes import Footprints, Shooter, exits, radiate
+from rtradar.scatter.target import MeshGrid
 from rtradar.scene import Furniture, Material, Scene, reflection
 from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.trace.surfaces import Surfaces
@@ -56,8 +55,6 @@ _WIDTH_BINS = 4.0
 
 Seen from the ends of the array, the group stays within its half bin.
 """
-
-_POLARIZATIONS: tuple[Literal["te"], Literal["tm"]] = ("te", "tm")
 
 
 class _Piece:
@@ -242,17 +239,6 @@ class PathGroups:
 # -- returns ---------------------------------------------------------------------------------------
 
 
-class _Sampling(NamedTuple):
-    """How a piece is sampled: its surfaces and material, groups of echoes, and frequencies."""
-
-    surfaces: Surfaces
-    material: Material
-    groups: FacetGroups
-    chains: Sequence[PathGroups]
-    nodes: Array
-    radar: Radar
-
-
 def _returns(
     piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid, radar: Radar, scene: Scene
 ) -> RoomEchoes | None:
@@ -271,8 +257,8 @@ def _returns(
     groups = FacetGroups(places[:, 3], radar)
     chains = [PathGroups(places, radar, order) for order in range(2, bounces + 1)]
     nodes = sweep_nodes(radar, FURNITURE_NODES)
-    sampling = _Sampling(surfaces, piece.material, groups, chains, nodes, radar)
-    shots = [_shot(sampling, shooter.shoot(tx), index) for index, tx in enumerate(radar.tx)]
+    given = surfaces, piece.material, radar, groups, chains, nodes
+    shots = [_shot(*given, shooter.shoot(tx), index) for index, tx in enumerate(radar.tx)]
     amplitude = np.stack([amplitude for _, amplitude in shots], axis=1)
     if not amplitude.any():
         return None
@@ -297,10 +283,16 @@ def _returns(
 
 
 def _shot(
-    sampling: _Sampling, sets: list[Footprints], index: int
+    surfaces: Surfaces,
+    material: Material,
+    radar: Radar,
+    groups: FacetGroups,
+    chains: Sequence[PathGroups],
+    nodes: Array,
+    sets: list[Footprints],
+    index: int,
 ) -> tuple[Array, NDArray[np.complex128]]:
     """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
-    surfaces, material, groups, chains, nodes, radar = sampling
     polarization = Polarization(radar.polarization, radar.axes)
     tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
     wavenumber = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
@@ -339,7 +331,7 @@ def _reflected(
     eta = material.eta(frequency_hz)
     straight = reflection(eta, 1.0, "tm")
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j
-    te, tm = ((reflection(eta, cosine, kind) / turn).real for kind in _POLARIZATIONS)
+    te, tm = ((reflection(eta, cosine, kind) / turn).real for kind in POLARIZATIONS)
     # A conductor, whose coefficients are -1 and +1, leaves these fields as they are.
     field = apply_te_tm(footprints.field, ways, ways, normals, -te, tm)
     return turn, replace(footprints, field=field)

@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import at_nodes
-from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.interpolation import at_nodes, interpolation_weights, sweep_nodes
 from rtradar.scatter.common.polarization import Polarization, antenna_field
-from rtradar.scatter.multipath.slab_series import WallSeries, room_series
+from rtradar.scatter.multipath.slabs import WallResponse, WallSeries, Wave, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scatter.multipath.wall_interaction import WallResponse, Wave
 from rtradar.scatter.validity import sampled
 from rtradar.scene import Scene, Wall
 
@@ -152,13 +150,11 @@ def delayed(
     return room_series(walls, radar, most_nodes=most_nodes, enough=ENOUGH, bounces=1).walls
 
 
-class _Pair(NamedTuple):
-    """A wave out with one back, and what is left of the field on each: (node, tx or rx, echo)."""
+class _Leg(NamedTuple):
+    """A wave on the way to points, and what is left of its field (node, tx or rx, echo)."""
 
-    out: Wave
-    back: Wave
-    left_out: Field
-    left_back: Field
+    wave: Wave
+    left: Field
 
 
 def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
@@ -218,64 +214,64 @@ def _transmitted(
     walls = WallResponse(WallEdges.of(scene.walls, radar), series, returns.frequency)
     polarization = Polarization(radar.polarization, radar.axes)
 
-    def legs(antennas: Array) -> list[tuple[Wave, Field]]:
+    def legs(antennas: Array) -> list[_Leg]:
         ways = points - antennas[:, None]
         directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
         sent = antenna_field(directions, polarization, x_for_steep=True)
         waves = walls.transmitted(0, walls.start(sent), antennas[:, None], points)
-        return [(wave, np.asarray((wave.field * sent).sum(axis=-1).conj())) for wave in waves]
+        return [_Leg(wave, (wave.field * sent).sum(axis=-1).conj()) for wave in waves]
 
-    groups: dict[tuple[tuple[int, int], ...], list[_Pair]] = {}
-    for (out, left_out), (back, left_back) in product(legs(radar.tx), legs(radar.rx)):
+    groups: dict[tuple[tuple[int, int], ...], list[tuple[_Leg, _Leg]]] = {}
+    for out, back in product(legs(radar.tx), legs(radar.rx)):
         passes = Counter[int]()
-        for one in (*out.passages, *back.passages):
+        for one in (*out.wave.passages, *back.wave.passages):
             passes[one.wall] += one.passes
-        pair = _Pair(out, back, left_out, left_back)
-        groups.setdefault(tuple(sorted(passes.items())), []).append(pair)
+        groups.setdefault(tuple(sorted(passes.items())), []).append((out, back))
     # A bound of each echo, for most are not worth what they hold in memory.
     strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
     bounds = [
-        sum(_most(pair.left_out) * _most(pair.left_back) for pair in pairs) * strength
+        sum(np.prod([np.abs(leg.left).max(axis=(0, 1)) for leg in pair], axis=0) for pair in pairs)
+        * strength
         for pairs in groups.values()
     ]
     sizes, parts, off = np.array(bounds), list[RoomEchoes](), 0.0
     for pairs, size, some in zip(groups.values(), sizes, _worth(sizes), strict=True):
         if some.any():
             parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
-            passed = (one for pair in pairs for one in (*pair.out.passages, *pair.back.passages))
-            if any(not series[one.wall].held[1] for one in passed):
+            passed = (one for pair in pairs for leg in pair for one in leg.wave.passages)
+            if not all(series[one.wall].held[1] for one in passed):
                 off = max(off, float(size.max()))
     return parts, off
 
 
-def _most(left: Field) -> Array:
-    return np.asarray(np.abs(left).max(axis=(0, 1)))
-
-
 def _together(
-    returns: RoomEchoes, pairs: list[_Pair], some: NDArray[np.bool_], kept: NDArray[np.int64]
+    returns: RoomEchoes,
+    pairs: list[tuple[_Leg, _Leg]],
+    some: NDArray[np.bool_],
+    kept: NDArray[np.int64],
 ) -> RoomEchoes:
     """Some of the echoes by all pairs of waves, at their mean length.
 
     What each is longer is in its amplitude.
     """
 
-    def longer(pair: _Pair) -> Array:
-        return pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some]
+    def longer(out: _Leg, back: _Leg) -> Array:
+        return out.wave.extra_m[:, None, some] + back.wave.extra_m[kept][..., some]
+
+    def left(out: _Leg, back: _Leg, node: int) -> Field:
+        return out.left[node][:, None, some] * back.left[node][kept][..., some]
 
     # Pair by pair and node by node, which takes less memory.
     middle, total, weighted = len(returns.frequency) // 2, np.zeros(1), np.zeros(1)
     for pair in pairs:
-        left = pair.left_out[middle][:, None, some] * pair.left_back[middle][kept][..., some]
-        total = total + np.abs(left)
-        weighted = weighted + np.abs(left) * longer(pair)
+        size = np.abs(left(*pair, middle))
+        total, weighted = total + size, weighted + size * longer(*pair)
     mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
     amplitude = np.zeros_like(returns.amplitude)
     for node, wavenumber in enumerate(2 * np.pi * returns.frequency / SPEED_OF_LIGHT_MPS):
         for pair in pairs:
-            turn = np.exp(1j * wavenumber * (longer(pair) - mean))
-            left = pair.left_out[node][:, None, some] * pair.left_back[node][kept][..., some]
-            amplitude[node] += turn * left
+            turn = np.exp(1j * wavenumber * (longer(*pair) - mean))
+            amplitude[node] += turn * left(*pair, node)
     amplitude *= returns.amplitude
     return replace(returns, length=returns.length + mean, amplitude=amplitude)
 

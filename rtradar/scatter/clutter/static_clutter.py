@@ -6,6 +6,30 @@ hold the direct coupling from Tx to Rx, which is the radar's and not the room's;
 furniture and walls or other furniture; waves diffracted at edges of walls. Antennas look as their
 patterns say: isotropic ones receive what is right below, above and behind the radar as no real ones
 would. A room at rest is the same in every TDM cycle: its IF is computed once.
+
+**What walls return** is specular reflections by images, and diffuse returns of rough faces.
+A wall reflects like an infinite one where the specular point lies well inside its rectangle, and
+fades at edges that are free (`rtradar.scatter.multipath.wall_edges`); only furniture occludes it.
+The
+field on a path of length L is that of free space times what the walls do, so an echo is F = -2
+sqrt(pi) (p_rx . E) / L, whose square is a radar cross-section: with a conductor, which reverses E,
++2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's coefficient, or echoes
+of their own where no polynomial over the sweep follows that
+(`rtradar.scatter.multipath.slabs`). Left out are those between a wall and a pane right before
+it (a reflection by the pane's back is in, once), and the direct coupling from Tx to Rx.
+
+The fraction of the reflected power that roughness takes from the specular wave,
+1 - exp(-(2 k s)^2 cos_i cos_s) (Ament, Proc. IRE 41 (1953) 142, made reciprocal by the mean of both
+angles), goes into all directions before the wall by Lambert's law: the effective roughness of
+Degli-Esposti, Fuschini, Vitucci and Falciasecca, IEEE Trans. Antennas Propag. 55 (2007) 143, with
+S^2 from the height of the surface instead of a fit. So the power per area is
+
+    sigma0 = 4 S^2 |R|^2 cos_i cos_s,
+
+R of the smooth slab at the angle of each leg, its polarisation as it arrives. Over half of space it
+adds up to S^2 |R|^2 of what arrives, and specular and diffuse power together to what a smooth wall
+reflects. All of it counts as co-polar. A point represents its cell of a jittered grid, two range
+bins wide: near cells give a grainier return than a real wall, with the right mean power.
 """
 
 from __future__ import annotations
@@ -16,19 +40,223 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise, product
+from math import ceil, pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rtradar.antenna import Antenna
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import furniture_returns
-from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes
-from rtradar.scatter.clutter.wall_returns import rough_returns, specular_returns
+from rtradar.scatter.clutter.returns import (
+    ENOUGH,
+    FREQUENCY_ERROR,
+    RoomEchoes,
+    behind_walls,
+    delayed,
+)
+from rtradar.scatter.common.interpolation import sweep_nodes
+from rtradar.scatter.common.polarization import Polarization, sent_field
+from rtradar.scatter.multipath.image_paths import Face, Leg, height, image_chain, images
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
+from rtradar.scatter.multipath.slabs import (
+    DENSE_NODES,
+    WHOLE,
+    WallResponse,
+    after_slab,
+    whole_walls,
+)
+from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Scene
+from rtradar.system.seeds import stream
 from rtradar.trace.backends.backend import Backend, select, use
 from rtradar.trace.occluders import Occluders
+
+Array = NDArray[np.float64]
+
+# -- walls -----------------------------------------------------------------------------------------
+
+
+_EDGE_M = 1e-9
+"""Distance up to which a point lies on an edge [m]: rounding is a millionth of that."""
+_FAINT = 0.1 * FREQUENCY_ERROR
+"""Terms weaker than this fraction of the strongest of a reflection are left out."""
+
+CELL_BINS, CELL_M = 2.0, 0.1
+"""Width of a cell of a rough wall in range bins, and its largest width [m]."""
+MOST_POINTS = 40_000
+"""Largest number of points on one face of a wall; a larger face gets wider cells."""
+
+
+def specular_returns(
+    radar: Radar, scene: Scene, occluders: Occluders, order: int
+) -> Iterator[RoomEchoes]:
+    """Yield the specular reflections of up to ``order`` walls that some channel sees.
+
+    There is one object for each sequence of walls. Furniture, which `Occluders` know, occludes
+    legs.
+    """
+    faces = [Face(wall, back) for wall in scene.walls for back in (False, True)]
+    lit, received = (
+        [face for face in faces if (height(face.wall, antennas, back=face.back) > 0).any()]
+        for antennas in (radar.tx, radar.rx)
+    )
+    for bounces in range(1, order + 1):
+        choices = [lit, *[faces] * (bounces - 2), received]
+        if bounces == 1:
+            choices = [[face for face in lit if face in received]]
+        for leg in product(*choices):
+            if all(first.wall is not second.wall for first, second in pairwise(leg)):
+                returns = _follow(radar, scene, occluders, leg)
+                if returns is not None:
+                    yield returns
+
+
+def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomEchoes | None:
+    """Echoes over these faces, in as few terms as polynomials over the sweep follow."""
+    tx, rx = radar.tx[:, None], radar.rx[radar.rx_of_tx]
+    # By the edge of a right-angled corner the path goes over both walls in either order, each of
+    # them with half of its weight: no two or none of it.
+    edges = WallEdges.of(scene.walls, radar)
+    (stops, wide), (_, narrow) = (edges.leg(leg, tx, rx, margin) for margin in (_EDGE_M, -_EDGE_M))
+    weight = (wide + narrow) / 2
+    images = image_chain(leg, np.broadcast_to(tx, rx.shape))
+    length = np.linalg.norm(rx - images[-1], axis=-1)
+    which = np.flatnonzero(weight)
+    ends = [stop.reshape(-1, 3)[which] for stop in stops]
+    free = np.ones(len(which), dtype=bool)
+    for start, end in pairwise(ends):
+        free &= occluders.clear(start, end)
+    which, ends = which[free], [end[free] for end in ends]
+    if not len(which):
+        return None
+    # A leg is straight from an image, also in the crease of a corner, where it has no length.
+    sources = [image.reshape(-1, 3)[which] for image in images]
+    ways = [end - source for source, end in zip(sources, ends[1:], strict=True)]
+    ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+    polarization = Polarization(radar.polarization, radar.axes)
+    ahead = sent_field(radar.tx_antenna, ways[0], polarization, x_for_steep=True)
+    sent = ahead * weight.ravel()[which, None]
+    received = sent_field(radar.rx_antenna, -ways[-1], polarization, x_for_steep=True)
+    spread = -2 * sqrt(pi) / length.ravel()[which]
+    frequency = sweep_nodes(radar, DENSE_NODES)
+    best = None
+    for series in (whole_walls, lambda walls: delayed(walls, radar)):
+        walls = WallResponse(edges, series(scene.walls), frequency)
+        waves = walls.along(leg, ends, ways, sent)
+        returned = [spread * np.conj((wave.field * received).sum(axis=-1)) for wave in waves]
+        sizes = [float(np.abs(one).max()) for one in returned]
+        worth = [number for number, size in enumerate(sizes) if size > _FAINT * max(sizes)]
+        amplitude = np.zeros((len(frequency), length.size, len(worth)), dtype=np.complex128)
+        lengths = np.repeat(length.reshape(-1, 1), len(worth), axis=1)
+        for echo, number in enumerate(worth):
+            amplitude[:, which, echo] = returned[number]
+            lengths[which, echo] += waves[number].extra_m
+        if not amplitude.any():
+            return None
+        found = RoomEchoes(
+            name=" + ".join(face.wall.name for face in leg),
+            kind="mirror",
+            length=lengths.reshape(*length.shape, -1),
+            amplitude=amplitude.reshape(len(frequency), *length.shape, -1),
+            frequency=frequency,
+            bounces=np.full(len(worth), len(leg)),
+            points=np.repeat(np.stack(stops[1:-1], axis=-2)[:, :, None], len(worth), axis=2),
+            image=_image(leg),
+        ).with_fewest_nodes(radar, FREQUENCY_ERROR if len(worth) == 1 else ENOUGH)
+        if best is None or found.off_m < best.off_m:
+            best = found
+        if not best.off_m:
+            break
+    return best
+
+
+def _image(leg: Leg) -> tuple[Array, Array]:
+    """Rotation and shift that give the image of any point over a leg."""
+    origin = images(leg, np.zeros(3))
+    return (images(leg, np.eye(3)) - origin).T, origin
+
+
+# -- rough walls -----------------------------------------------------------------------------------
+
+
+def rough_returns(radar: Radar, scene: Scene, occluders: Occluders) -> Iterator[RoomEchoes]:
+    """Yield the diffuse returns of every face of a rough wall that has antennas before it.
+
+    Furniture, which `Occluders` know, occludes points. Positions and phases belong to the wall's
+    number and face, whatever the seed of a run: a room is the same for all who walk in it.
+    """
+    for (number, wall), back in product(enumerate(scene.walls), (False, True)):
+        before = [(height(wall, places, back=back) > 0).any() for places in (radar.tx, radar.rx)]
+        if wall.roughness_m > 0 and all(before):
+            rng = np.random.default_rng(stream(0, number, int(back)))
+            echoes = _rough_face(Face(wall, back), rng, radar, scene, occluders)
+            if echoes.n_echoes:
+                yield echoes
+
+
+def _points(face: Face, cell_m: float, rng: np.random.Generator) -> tuple[Array, float, Array]:
+    """Points (point, 3) of a jittered grid, the area of a cell [m^2] and phases (point,)."""
+    wall = face.wall
+    edges = np.array(wall.edge_u_m), np.array(wall.edge_v_m)
+    cell_m = max(cell_m, np.sqrt(wall.area_m2 / MOST_POINTS))
+    counts = [ceil(np.linalg.norm(edge) / cell_m) for edge in edges]
+    cells = np.indices(counts).reshape(2, -1)
+    u, v = (cells + rng.random(cells.shape)) / np.array(counts)[:, None]
+    corner = np.array(wall.corner_m) - (wall.thickness_m if face.back else 0.0) * wall.normal
+    points = corner + u[:, None] * edges[0] + v[:, None] * edges[1]
+    phases, there = rng.uniform(0, 2 * np.pi, len(points)), ~wall.in_opening(points)
+    return points[there], wall.area_m2 / len(points), phases[there]
+
+
+def _rough_face(
+    face: Face, rng: np.random.Generator, radar: Radar, scene: Scene, occluders: Occluders
+) -> RoomEchoes:
+    wall, cell_m = face.wall, min(CELL_BINS * radar.range_bin_m, CELL_M)
+    points, area, phase = _points(face, cell_m, rng)
+    frequency = np.array([radar.centre_frequency_hz])
+    smooth = replace(wall, roughness_m=0.0)
+    normal = -wall.normal if face.back else wall.normal
+    polarization = Polarization(radar.polarization, radar.axes)
+
+    def legs(antennas: Array, element: Antenna | None) -> tuple[Array, Array, Array]:
+        """Distances, cosines and fields that a smooth wall would reflect, (antenna, point)."""
+        ways = points - antennas[:, None]
+        distance = np.linalg.norm(ways, axis=-1)
+        ways /= distance[..., None]
+        sent = sent_field(element, ways, polarization, x_for_steep=True)
+        field = after_slab(smooth, sent.astype(np.complex128), ways, frequency, WHOLE[0])[0]
+        clear = occluders.clear(antennas[:, None], points)
+        strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear
+        return distance, np.maximum(-(ways @ normal), 0.0), strength
+
+    kept = radar.rx_of_tx
+    far_t, cos_t, field_t = legs(radar.tx, radar.tx_antenna)
+    far_r, cos_r, field_r = legs(radar.rx, radar.rx_antenna)
+    cosines = cos_t[:, None] * cos_r[kept]
+    waves = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * wall.roughness_m
+    scattered = -np.expm1(-((2 * waves) ** 2) * cosines)
+    # |R|^2 is the geometric mean of those of both legs.
+    power = 4 * scattered * cosines * field_t[:, None] * field_r[kept] * area
+    amplitude = np.sqrt(power) / (far_t[:, None] * far_r[kept]) * np.exp(1j * phase)
+    returns = RoomEchoes(
+        name=wall.name,
+        kind="rough",
+        length=far_t[:, None] + far_r[kept],
+        amplitude=amplitude[None],
+        frequency=frequency,
+        bounces=np.ones(len(points), dtype=np.int64),
+        points=points[None, None, :, None],
+    ).received(radar)
+    return behind_walls(returns, radar, scene).received(radar)
+
+
+# -- all clutter of a room -------------------------------------------------------------------------
+
 
 MOST_ORDER = 3
 KEPT_ROOMS = 2
@@ -176,9 +404,7 @@ class Clutter:
 
 def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:
     """Refuse a room that has echoes with too large an error over the sweep."""
-    strongest = max(
-        (float(np.abs(echoes.amplitude).max(initial=0.0)) for echoes in found), default=0.0
-    )
+    strongest = max((echoes.strongest_m() for echoes in found), default=0.0)
     for echoes in found:
         if echoes.off_m > FREQUENCY_ERROR * strongest:
             raise InputError(

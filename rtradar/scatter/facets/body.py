@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,16 +19,14 @@ from rtradar.scatter.facets.radiation import (
     Links,
     Seen,
     as_amplitude,
+    body_facets,
     directions_apart,
+    ellipsoid_facets,
     radiated,
+    subdivisions_for,
     visible,
 )
-from rtradar.scatter.facets.surfaces import (
-    body_facets,
-    ellipsoid_facets,
-    subdivisions_for,
-)
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.trace.backends.backend import Backend, select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -153,27 +149,20 @@ class FacetBody:
         return amplitude
 
     def field(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
-    ) -> NDArray[np.complex128]:
-        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m]."""
-        return self._in_pose(radiated, time, pose, nodes, length, parts)
-
-    def visible(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
-    ) -> NDArray[np.complex128]:
-        """What shadows leave (node, pair, n) of the amplitudes of parts (n,): 1 in full view."""
-        return self._in_pose(visible, time, pose, nodes, length, parts)
-
-    def _in_pose(
         self,
-        find: Callable[..., NDArray[np.complex128]],
         time: float,
         pose: Poses,
         nodes: ArrayNodes,
         length: Array,
         parts: Indices,
+        *,
+        left: bool = False,
     ) -> NDArray[np.complex128]:
-        antennas = nodes.antennas
+        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m].
+
+        With ``left`` it is what shadows leave of these amplitudes, 1 in full view.
+        """
+        antennas, find = nodes.antennas, visible if left else radiated
         seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
         links = self._links(antennas[None], nodes.pairs, length[None], self._radar.at(time).axes)
         own = pose.centres[:, parts], pose.frames[:, parts]

@@ -25,11 +25,10 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
-from rtradar.scatter.common.poses import owners_of
+from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, owners_of
 from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.radiation import edge_facets
 from rtradar.scatter.facets.skin import SkinFacets
-from rtradar.scatter.facets.surfaces import edge_facets
 from rtradar.system.threads import thread_map
 
 _KEPT_KEYFRAMES = 2048
@@ -76,14 +75,6 @@ class _Interval(NamedTuple):
     known: NDArray[np.bool_]
 
 
-class Course(NamedTuple):
-    """One interval: ratio and slope (place, node, pair, part), where ``known (place, part)``."""
-
-    ratio: Field
-    slope: Field
-    known: NDArray[np.bool_]
-
-
 class Envelope:
     """An envelope over a capture, of the parts of one or several people: ``owner (part,)``.
 
@@ -124,7 +115,7 @@ class Envelope:
         missing = []
         for index in sorted(around):
             if index in self._intervals:
-                self._interval(index)  # now the last to be dropped
+                self._intervals[index]  # now the last to be dropped
             else:
                 missing.append(index)
         self.prepare_keyframes(
@@ -135,20 +126,20 @@ class Envelope:
         for index, interval in zip(missing, found, strict=True):
             self._intervals.keep(index, interval)
 
-    def _interval(self, index: int) -> _Interval:
-        return self._intervals.get(index, lambda: self._divided(index, *self._ends(index)))
-
     def keyframe(self, index: int) -> Sample:
         """All parts at one keyframe."""
         index = min(index, self._end)
         return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
-    def course(self, index: int) -> Course:
-        """Cubics from place to place of an interval, with the slopes of parabolas through three."""
+    def course(self, index: int) -> tuple[Field, Field, NDArray[np.bool_]]:
+        """Cubics from place to place of an interval, with the slopes of parabolas through three.
+
+        Returned are ratio and slope (place, node, pair, part), where ``known (place, part)``.
+        """
         self.prepare_courses([index])
-        here, after = self._interval(index), self._interval(index + 1)
-        before = self._interval(index - 1) if index > 0 else here
-        return Course(here.ratio, _slopes(before, here, after, inside=index > 0), here.known)
+        here, after = self._intervals[index], self._intervals[index + 1]
+        before = self._intervals[index - 1] if index > 0 else here
+        return here.ratio, _slopes(before, here, after, inside=index > 0), here.known
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
         """The keyframe before an interval, if any, those at its ends, and the one after it."""
@@ -309,7 +300,7 @@ class ArrayEnvelope:
         given = time, pose, nodes, length, parts
         if self._gradual:
             assert isinstance(self._surface, FacetBody)  # a skin has no fraction that is seen
-            return Sample(self._surface.visible(*given), np.abs(strength))
+            return Sample(self._surface.field(*given, left=True), np.abs(strength))
         amplitude = self._surface.field(*given)
         # Without a specular point there is next to nothing to see either: antennas on opposite
         # sides.
@@ -335,7 +326,7 @@ class ArrayEnvelope:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
                     fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
-                    course = tuple(envelope.course(interval))
+                    course = envelope.course(interval)
                     fill_envelope(inside, fraction, tx, weights, course, strength, amplitude)
                 else:
                     ratio = envelope.keyframe(interval).ratio[:, None]

@@ -25,25 +25,22 @@ from rtradar.kernels.scatter.facets import Facets
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import ChirpPoses, has_mesh
+from rtradar.scatter.common.poses import ChirpPoses, KeyframeCache, has_mesh
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.radiation import (
     NEAR,
     Links,
     Seen,
     as_amplitude,
-    directions_apart,
-    radiated,
-)
-from rtradar.scatter.facets.surfaces import (
     body_facets,
+    directions_apart,
     facet_normals,
+    radiated,
     smooth_bend,
 )
-from rtradar.scatter.ray_tubes.tubes import in_four
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
+from rtradar.scatter.target import in_four
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.mesh_tracer import MeshTracer
 
@@ -90,8 +87,8 @@ def skin_of(person: Body, frequency_hz: float) -> Skin:
     def posed(time: float) -> tuple[Array, Array]:
         return tuple(person.skin([time], level)[0] for level in (divisions - 1, divisions))
 
-    coarse, fine = mesh.faces(divisions - 1), mesh.faces(divisions)
-    return Skin(coarse[order], _four_of(fine, order), part[order], posed)
+    coarse, fine = mesh.faces(divisions - 1), mesh.faces(divisions).reshape(-1, 4, 3)
+    return Skin(coarse[order], fine[order].reshape(-1, 3), part[order], posed)
 
 
 def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
@@ -110,15 +107,17 @@ def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
         places = (own @ stretched + pose.centres[0][:, None] for own in (sphere, fine))
         return tuple(own.reshape(-1, 3) for own in places)
 
-    def everywhere(own: Indices, count: int) -> Indices:
-        return np.concatenate([own + part * count for part in range(parts)])
+    everywhere, everywhere_fine = (
+        one_after_the_other([own] * parts, [len(points)] * parts)
+        for own, points in ((faces, sphere), (finer, fine))
+    )
+    return Skin(everywhere, everywhere_fine, np.repeat(np.arange(parts), len(faces)), posed)
 
-    part = np.repeat(np.arange(parts), len(faces))
-    return Skin(everywhere(faces, len(sphere)), everywhere(finer, len(fine)), part, posed)
 
-
-def _four_of(fine: Indices, order: Indices) -> Indices:
-    return np.asarray(fine.reshape(-1, 4, 3)[order].reshape(-1, 3))
+def one_after_the_other(several: Sequence[Indices], counts: Sequence[int]) -> Indices:
+    """Put indices into arrays of these lengths together as those into one array of all."""
+    firsts = np.cumsum([0, *counts[:-1]])
+    return np.concatenate([own + first for own, first in zip(several, firsts, strict=True)])
 
 
 class SkinFacets:
@@ -143,22 +142,15 @@ class SkinFacets:
         self.frequency = sweep_nodes(radar, nodes)
         stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
         self._skins = [skin_of(person, stop_hz) for person in body.people]
-        fine = self._fine()
-        counts = np.cumsum([0, *(len(person.semi_axes) for person in body.people)])
-        part = np.concatenate(
-            [skin.part + first for skin, first in zip(self._skins, counts[:-1], strict=True)]
+        parts = [len(person.semi_axes) for person in body.people]
+        fine = one_after_the_other(
+            [skin.fine for skin in self._skins],
+            [int(skin.fine.max()) + 1 for skin in self._skins],
         )
-        self._pieces = [_piece(fine, part, own) for own in range(counts[-1])]
+        part = one_after_the_other([skin.part for skin in self._skins], parts)
+        self._pieces = [_piece(fine, part, own) for own in range(sum(parts))]
         self._tracing = threading.Lock()
         self._looks: KeyframeCache[int, NDArray[np.bool_]] = KeyframeCache(0, _KEPT)
-
-    def _fine(self) -> Indices:
-        """Fine faces of all skins, numbered among the vertices of all."""
-        counts = [int(skin.fine.max()) + 1 for skin in self._skins]
-        firsts = np.cumsum([0, *counts[:-1]])
-        return np.concatenate(
-            [skin.fine + first for skin, first in zip(self._skins, firsts, strict=True)]
-        )
 
     def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
         """Path [m] over the specular point of each part's ellipsoid, and 1 / (R1 R2) of its middle.

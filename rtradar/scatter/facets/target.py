@@ -1,11 +1,17 @@
-"""Physical optics of one target over facets, for antennas anywhere."""
+"""Physical optics of one target over facets, for antennas anywhere.
+
+A mesh is closed, or open and then a thin sheet lit from both sides. Its triangles are flat, and
+stay so however they are divided: they are divided where spherical waves bend over them by more than
+linear phase can follow, and where the edge of a shadow runs through them, as Mitsuba finds at four
+points of each, down to a quarter of a wavelength.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +21,261 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.body import FacetShadows
-from rtradar.scatter.facets.mesh_target import mesh_scattering
-from rtradar.scatter.facets.radiation import NEAR, Links, directions_apart, radiated, visible
-from rtradar.scatter.facets.surfaces import (
+from rtradar.scatter.facets.radiation import (
     FACETS_PER_SQUARE_KA,
     LARGEST_KA,
     MAXIMUM_FACETS,
+    NEAR,
+    Links,
+    Seen,
+    directions_apart,
     edge_facets,
+    facet_normals,
+    mesh_facets,
+    radiated,
+    smooth_bend,
     subdivisions_for,
+    visible,
 )
-from rtradar.scatter.target import target_mesh
-from rtradar.trace.backends.backend import select
+from rtradar.scatter.target import in_four, target_mesh
+from rtradar.scene.mesh_files import Triangles
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.mesh_tracer import MeshTracer
 
 if TYPE_CHECKING:
     import trimesh
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# -- a mesh ----------------------------------------------------------------------------------------
+
+
+_BENT_PHASE = 0.05
+"""Phase that waves may depart from linear over a facet [rad]: at most 2 % of its field."""
+
+_MOST_FACETS = 5_000_000
+_DIVISIONS = 7
+"""Most divisions of a facet on the edge of a shadow."""
+
+_SAME = 1e-4
+"""Fraction of the mesh's size within which a hit is the point itself: at shared edges float32 does
+not know which face it met."""
+
+_FOUR = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+"""Middles of the four equal triangles that a triangle divides into, barycentric."""
+
+
+def mesh_scattering(
+    mesh: Triangles,
+    tx: Array,
+    rx: Array,
+    wavenumber: Array,
+    polarization: Polarization,
+    variant: str,
+) -> NDArray[np.complex128]:
+    """Co-polar scattering length (n,) of a mesh, see `facet_scattering`.
+
+    Antennas ``tx, rx (n, 3)`` are pair by pair [m], with their wavenumbers (n,) [rad/m].
+    """
+    _refuse_coarse(mesh, float(wavenumber.max()))
+    corners = np.ascontiguousarray(mesh.corners)
+    tracer = MeshTracer(use(select(variant)), corners, same=_SAME)
+    solid = _Solid(tracer, smooth_bend(mesh.vertices, mesh.faces), mesh.closed)
+    middle, one_pair = corners.mean(axis=(0, 1)), np.array([[0, 1]])
+    field = np.empty(len(tx), dtype=np.complex128)
+    for pair, k in enumerate(wavenumber):
+        antennas = np.stack([tx[pair], rx[pair]])
+        divided, face = _divide_bent(corners, antennas, k)
+        wide = bool(directions_apart(*(antennas - middle)) > NEAR)
+        divided, face, seen = _divide_edges(solid, divided, face, antennas, k, wide)
+        own = (divided - middle).reshape(-1, 3), _own_faces(len(divided))
+        facets = mesh_facets(*own, both_sides=not mesh.closed, bend=solid.bend[face])
+        ranges = np.linalg.norm(antennas, axis=1)
+        path, k_there = np.full((1, 1, 1), ranges.sum()), np.full((1, 1), k)
+        links = Links(antennas[None], one_pair, path, k_there, polarization, True, shadow=True)
+        row = np.arange(2)[:, None]
+        given = np.array([0]), (middle[None, None], np.eye(3)[None, None]), links
+        value = radiated(facets, *given, Seen(seen, row), row.T)
+        field[pair] = value.item() * ranges.prod()
+    return field
+
+
+def _own_faces(count: int) -> NDArray[np.int64]:
+    """Faces (count, 3) whose corners are theirs alone."""
+    return np.arange(3 * count).reshape(-1, 3)
+
+
+def _refuse_coarse(triangles: Triangles, wavenumber: float) -> None:
+    """A smooth mesh beyond ka = 400 needs its part of the 6 (ka)^2 facets of its sphere."""
+    import trimesh  # slow to import
+
+    vertices = triangles.vertices
+    spread = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    radius = float(np.linalg.norm(spread, axis=1).max())
+    ka = wavenumber * radius
+    if ka <= LARGEST_KA:
+        return
+    mesh = trimesh.Trimesh(vertices, triangles.faces, process=False)
+    angles = np.asarray(mesh.face_adjacency_angles)
+    # What meets at sharper angles is an edge, at less than a thousandth of a radian one plane.
+    if np.count_nonzero((angles > 1e-3) & (angles < 0.5)) <= len(angles) / 2:
+        return
+    sphere = 4 * math.pi * radius**2
+    needed = math.ceil(FACETS_PER_SQUARE_KA * ka**2 * float(mesh.area) / sphere)
+    if len(mesh.faces) < needed:
+        raise InputError(
+            f"physical optics of a smooth mesh with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs "
+            f"{needed} facets; it has {len(mesh.faces)}: mesh it finer"
+        )
+
+
+# -- division --------------------------------------------------------------------------------------
+
+
+def _divide(
+    corners: Array,
+    face: NDArray[np.int64],
+    coarse: Callable[[Array, NDArray[np.int64], int], tuple[NDArray[np.bool_], Array]],
+    most: float = math.inf,
+) -> tuple[Array, NDArray[np.int64], Array]:
+    """Divide triangles (n, 3, 3), of the faces (n,), in four until none is too coarse.
+
+    ``coarse(corners, face, level)`` returns which are, (n,), and a value of each, (n, ...); the
+    values of those that stay are returned.
+    """
+    done: list[tuple[Array, NDArray[np.int64], Array]] = []
+    level = count = 0
+    while len(corners):
+        split, value = coarse(corners, face, level)
+        done.append((corners[~split], face[~split], value[~split]))
+        count += len(done[-1][0])
+        corners, face, level = in_four(corners[split]), np.repeat(face[split], 4), level + 1
+        if count + len(corners) > most:
+            raise InputError(
+                f"physical optics of this mesh from so near takes more than {_MOST_FACETS} facets; "
+                "stand farther away, lower the frequency, or take 'specular' on ellipsoids"
+            )
+    corners, face, value = (np.concatenate(arrays) for arrays in zip(*done, strict=True))
+    return corners, face, value
+
+
+def _divide_bent(
+    corners: Array, antennas: Array, wavenumber: float
+) -> tuple[Array, NDArray[np.int64]]:
+    """Divide facets until waves are plane over each; corners (n, 3, 3), and the triangles (n,)."""
+
+    def coarse(corners: Array, _: NDArray[np.int64], __: int) -> tuple[NDArray[np.bool_], Array]:
+        middle = corners.mean(axis=1)
+        size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        # No nearer than the facet's own middle less its size; an antenna on the surface divides
+        # only so far.
+        distances = (np.maximum(np.linalg.norm(middle - a, axis=1), size) for a in antennas)
+        bend = sum(wavenumber * size**2 / (2 * distance) for distance in distances)
+        return bend > _BENT_PHASE, size
+
+    return _divide(corners, np.arange(len(corners)), coarse, _MOST_FACETS)[:2]
+
+
+def _divide_edges(
+    solid: _Solid, corners: Array, face: Indices, antennas: Array, wavenumber: float, wide: bool
+) -> tuple[Array, Indices, NDArray[np.float32]]:
+    """Divide facets on edges of shadows of ``antennas``, a Tx and a Rx.
+
+    Returns corners (n, 3, 3), the triangles (n,) that they are of, and fractions (2, n): lit by Tx,
+    and received by Rx. Those that are not ``wide`` apart both light.
+    """
+
+    def coarse(corners: Array, face: Indices, level: int) -> tuple[NDArray[np.bool_], Array]:
+        some = _Some.of(corners, face)
+        lit = solid.lit(some, antennas[0])
+        received = (
+            solid.received(some, antennas[1], lit > 0) if wide else solid.lit(some, antennas[1])
+        )
+        seen = np.stack([lit, received], axis=1)
+        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        mixed = ((seen > 0) & (seen < 1)).any(axis=1) & (edge > math.pi / (2 * wavenumber))
+        return mixed & (level < _DIVISIONS), seen
+
+    corners, face, seen = _divide(corners, face, coarse)
+    return corners, face, np.ascontiguousarray(seen.T, dtype=np.float32)
+
+
+# -- what antennas see -----------------------------------------------------------------------------
+
+
+class _Some(NamedTuple):
+    """Facets: corners (n, 3, 3), the triangles (n,) that they are of, and unit normals (n, 3)."""
+
+    corners: Array
+    face: Indices
+    normals: Array
+
+    @classmethod
+    def of(cls, corners: Array, face: Indices) -> _Some:
+        whole = np.ascontiguousarray(corners.reshape(1, -1, 3))
+        (normals,), _ = facet_normals(whole, _own_faces(len(corners)).astype(np.int32))
+        return cls(corners, face, normals)
+
+    def facing(self, antenna: Array) -> Array:
+        """Cosine (n,) between the normal and the way to an antenna."""
+        way = antenna - self.corners.mean(axis=1)
+        return np.asarray(np.sum(self.normals * way, axis=1) / np.linalg.norm(way, axis=1))
+
+
+class _Solid(NamedTuple):
+    """A mesh: its tracer, the ``bend (face,)`` of its triangles, and whether it is ``closed``."""
+
+    tracer: MeshTracer
+    bend: Array
+    closed: bool
+
+    def lit(self, some: _Some, antenna: Array) -> Array:
+        """Fraction of four points of each facet that an antenna sees, 0 for those that face away.
+
+        The smooth surface that a facet stands for may still face the antenna where the facet does
+        not: then the antenna is seen from as far above it as that surface may be.
+        """
+        facing = some.facing(antenna)
+        chosen = np.flatnonzero((facing > -self.bend[some.face]) | (not self.closed))
+        points = _FOUR @ some.corners[chosen]
+        edges = some.corners[chosen] - np.roll(some.corners[chosen], 1, axis=1)
+        lift = np.linalg.norm(edges, axis=2).max(axis=1) * self.bend[some.face[chosen]]
+        lift = np.where((facing[chosen] <= 0) & self.closed, lift, 0.0)
+        points = points + (lift[:, None] * some.normals[chosen])[:, None]
+        return self._fractions(points, some.face[chosen], antenna, chosen, len(facing))
+
+    def received(self, some: _Some, antenna: Array, lit: NDArray[np.bool_]) -> Array:
+        """Fraction of four points of each lit facet from which nothing else hides an antenna.
+
+        From a facet that faces away the way leads through the solid first, which hides nothing.
+        """
+        behind = (some.facing(antenna) <= 0) & self.closed
+        near, away = np.flatnonzero(lit & ~behind), np.flatnonzero(lit & behind)
+        points = _FOUR @ some.corners[near]
+        seen = self._fractions(points, some.face[near], antenna, near, len(lit))
+        inside = (_FOUR @ some.corners[away]).reshape(-1, 3)
+        normals, own = np.repeat(some.normals[away], 4, axis=0), np.repeat(some.face[away], 4)
+        exits, met = self.tracer.way_out(inside, -normals, antenna, own)
+        return seen + self._fractions(exits, met, antenna, away, len(lit))
+
+    def _fractions(
+        self, points: Array, own: Indices, antenna: Array, facets: Indices, count: int
+    ) -> Array:
+        """Fraction (count,) of four points of each of some facets that an antenna sees.
+
+        ``points (n, 4, 3)`` or (4 n, 3) are on the faces ``own (n,)`` or (4 n,).
+        """
+        seen, places = np.zeros(count), points.reshape(-1, 3)
+        if len(places):
+            whose = np.repeat(own, len(places) // len(own))
+            visible = self.tracer.sees(np.broadcast_to(antenna, places.shape), places, whose)
+            seen[facets] = visible.reshape(-1, 4).mean(axis=1)
+        return seen
+
+
+# -- ellipsoids, and any target --------------------------------------------------------------------
+
 
 _FEW_FACETS = 5120
 """Least number per ellipsoid."""

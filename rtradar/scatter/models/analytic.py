@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import Literal
 
 import numpy as np
@@ -70,29 +69,33 @@ def plane_wave_echo(
     return length, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
-class FormulaModel(BuiltInModel, ABC):
-    """An echo model that is one formula for a conductor, `conductor_echo`, without occlusion.
+class Analytic(BuiltInModel):
+    """`analytic`: closed-form cross-section at the specular range of each antenna.
 
-    Its echoes in free space follow from the formula, and in rooms the direct echoes and those over
-    walls.
+    One formula for a conductor, `conductor_echo`, gives the echoes in free space, and in rooms the
+    direct echoes and those over walls.
     """
 
     traces = False
     fast_over_walls = True
     relative_cost = 1.0
-    tracer = None
 
-    def __init__(
-        self,
-        radar: Radar,
-        body: Body,
-        *,
-        spreading: bool = True,
-    ) -> None:
-        self._radar, self._body, self.spreading = radar, body, spreading
+    def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
+        self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
 
-    @abstractmethod
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target, alike in both polarisations."""
+        at = target_geometry(target, tx, rx)
+        return sum_of_echoes(*far_field_echo(at), at, frequency)
+
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
 
@@ -109,32 +112,13 @@ class FormulaModel(BuiltInModel, ABC):
         amplitude : (chirp, rx, part) float64
             Scattering length, over R1 R2 with ``spreading`` [m].
         """
+        return far_field_echo(at, spreading=self._spreading)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         length, amplitude = self.conductor_echo(Geometry.of(at))
         return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
-
-
-class Analytic(FormulaModel):
-    """`analytic`: closed-form cross-section at the specular range of each antenna."""
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target, alike in both polarisations."""
-        at = target_geometry(target, tx, rx)
-        return sum_of_echoes(*far_field_echo(at), at, frequency)
-
-    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes in the far field."""
-        return far_field_echo(at, spreading=self.spreading)
 
 
 class AnalyticPaper(BuiltInModel):
@@ -144,7 +128,7 @@ class AnalyticPaper(BuiltInModel):
     relative_cost = 1.0
 
     def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
-        self._radar, self._body, self.spreading = radar, body, spreading
+        self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -152,5 +136,5 @@ class AnalyticPaper(BuiltInModel):
         radar, at = self._radar, chirp_poses(self._radar, self._body, chirps)
         tx, rx = radar.antennas_at(np.minimum(radar.centres_of(chirps), self._body.duration_s))
         middles = tx.mean(axis=1), rx.mean(axis=1)
-        length, amplitude = plane_wave_echo(Geometry.of(at), middles, spreading=self.spreading)
+        length, amplitude = plane_wave_echo(Geometry.of(at), middles, spreading=self._spreading)
         return one_echo_a_part(at.tx_index, length, amplitude, radar.centre_frequency_hz)

@@ -30,9 +30,9 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, owners_of
-from rtradar.scatter.models.physical_optics import PhysicalOptics
-from rtradar.scatter.models.reference import Reference
+from rtradar.scatter.models.physical_optics import PhysicalOptics, Reference
 from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.target import ellipsoid_areas
 
 Array = NDArray[np.float64]
 
@@ -51,9 +51,6 @@ _MARGIN = 0.9
 
 _LEAST_COMPLEX = 1e-3
 
-_THOMSEN = 1.6075
-"""Exponent of K. Thomsen's formula for the surface of an ellipsoid, 1 % off at most."""
-
 
 def optics_error(radar: Radar, body: Body) -> float:
     """Estimate the rms error of the received field by `specular`, over the rms field.
@@ -63,9 +60,7 @@ def optics_error(radar: Radar, body: Body) -> float:
     parts so weighted.
     """
     wavelength_m = SPEED_OF_LIGHT_MPS / radar.centre_frequency_hz
-    a, b, c = (body.semi_axes**_THOMSEN).T
-    squares = ((a * b + b * c + c * a) / 3) ** (1 / _THOMSEN)
-    owner = owners_of(body)
+    squares, owner = ellipsoid_areas(body.semi_axes) / (4 * math.pi), owners_of(body)
     rho = math.sqrt((np.bincount(owner, squares) / np.bincount(owner)).min())
     return math.hypot(_SHARP * wavelength_m**0.25, wavelength_m / (2 * math.pi * rho))
 
@@ -144,7 +139,7 @@ class Auto(BuiltInModel):
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: Array | None = None
     ) -> tuple[Array, Array]:
-        """Compute the echoes of a conductor by `specular`; see `HasSpecularPoints`."""
+        """Compute the echoes of a conductor by `specular`; see `Specular.specular_echo`."""
         return cast(Specular, self._model).specular_echo(chirps, at, start)
 
     def account(self) -> dict[str, Any]:

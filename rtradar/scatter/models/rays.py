@@ -1,11 +1,11 @@
-"""The echo model `rays`: shooting and bouncing rays by Mitsuba, on moving people."""
+"""The echo model `rays`: shooting and bouncing rays by Mitsuba, on targets and on moving people."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +18,124 @@ from rtradar.kernels.elementary import cubic_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_before
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, has_mesh, keyframe_time
-from rtradar.scatter.facets.skin import Skin, skin_of
-from rtradar.scatter.ray_tubes.footprints import radiate
-from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.common.poses import (
+    BuiltInModel,
+    KeyframeCache,
+    chirp_poses,
+    has_mesh,
+    keyframe_before,
+    keyframe_time,
+)
+from rtradar.scatter.facets.skin import Skin, one_after_the_other, skin_of
+from rtradar.scatter.ray_tubes import Shooter, exits, radiate
+from rtradar.scatter.specular_points import solve_specular_points
+from rtradar.scatter.target import EllipsoidGrid, Grid, MeshGrid, target_mesh
+from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.trace.surfaces import Surfaces
+
+if TYPE_CHECKING:
+    import trimesh
+
+Array = NDArray[np.float64]
+
+RAYS_PER_WAVELENGTH = 3.0
+BOUNCES_OF_TARGET = 3
+
+
+def rays_scattering(
+    target: Ellipsoids | trimesh.Trimesh,
+    tx: Array,
+    rx: Array,
+    frequency: Array,
+    *,
+    polarization: Literal["v", "h"] = "v",
+    variant: str = "auto",
+    rays_per_wavelength: float = RAYS_PER_WAVELENGTH,
+    bounces: int = BOUNCES_OF_TARGET,
+) -> NDArray[np.complex128]:
+    """Co-polar scattering length (n,) of a perfect conductor by shooting and bouncing rays.
+
+    Parameters, returns and errors are those of `scattering_length`; the edge of a tube's facet is
+    the shortest wavelength over ``rays_per_wavelength``, ``bounces`` the most reflections on the
+    way. An `InputError` is raised, too, where these would take too many tubes.
+    """
+    check_options(rays_per_wavelength, bounces)
+    solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
+    field = np.zeros(len(tx), dtype=np.complex128)
+    if len(tx) == 0:
+        return field
+    mi = use(select(variant))
+    wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    sent = Polarization(polarization)
+    surfaces, grid = _scene(mi, solid, 2 * np.pi / wavenumber.max() / rays_per_wavelength)
+    shooter = Shooter(
+        surfaces=surfaces,
+        grid=grid,
+        bounces=bounces,
+        wavenumber=float(wavenumber.max()),
+        polarization=sent,
+        two_sided=not (isinstance(solid, Ellipsoids) or solid.closed),
+    )
+    for transmitter, of_tx in _alike(tx):
+        shots = shooter.shoot(transmitter)
+        for receiver, of_rx in _alike(rx[of_tx]):
+            own = of_tx[of_rx]
+            length = np.full((1, 1), np.linalg.norm(transmitter) + np.linalg.norm(receiver))
+            for order, each in enumerate(shots):
+                to = exits(surfaces, each, receiver[None]), receiver[None], wavenumber[own], length
+                tapered = order > 0 and not surfaces.flat
+                sums = radiate(each, *to, polarization=sent, tapered=tapered)
+                field[own] += sums[:, 0, 0]
+            field[own] *= np.linalg.norm(transmitter) * np.linalg.norm(receiver)
+    return field
+
+
+def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surfaces, Grid]:
+    """What rays meet, and facets with edges of this length [m] at which they are aimed."""
+    if isinstance(solid, Ellipsoids):
+        return _Ellipsoids(mi, solid.semi_axes, edge).posed(solid)
+    grid = MeshGrid.cut(solid.corners, MeshGrid.divisions(solid.corners, edge))
+    return MeshTracer(mi, solid.corners), grid
+
+
+class _Ellipsoids:
+    """Ellipsoids with facets whose edges are ``edge`` long [m].
+
+    ``part (surface,)`` is the part of each surface that rays meet.
+    """
+
+    def __init__(self, mi: Any, semi_axes: Array, edge: float) -> None:
+        self._tracer, self.part = BodyTracer(mi, semi_axes), np.arange(len(semi_axes))
+        self._grid = EllipsoidGrid.cover(semi_axes, edge)
+
+    def posed(self, pose: Ellipsoids, _time_s: float = 0.0) -> tuple[Surfaces, Grid]:
+        """What rays meet in a pose, and where they are aimed."""
+        self._tracer.pose(pose.centres, pose.frames)
+        return self._tracer, replace(self._grid, pose=pose)
+
+
+def check_options(rays_per_wavelength: float, bounces: int) -> None:
+    """Raise an `InputError` where an option is out of range."""
+    if not 0.1 <= rays_per_wavelength <= 100:
+        raise InputError(
+            f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100"
+        )
+    if not (isinstance(bounces, int) and 1 <= bounces <= 10):
+        raise InputError(f"rays: bounces = {bounces}; allowed are 1 to 10")
+
+
+def _alike(points: Array) -> list[tuple[Array, NDArray[np.int64]]]:
+    """Each point that occurs, with the rows where it does."""
+    unique, inverse = np.unique(points, axis=0, return_inverse=True)
+    return [(point, np.flatnonzero(inverse.ravel() == index)) for index, point in enumerate(unique)]
+
+
+# -- people ----------------------------------------------------------------------------------------
+
 
 ANCHOR_S = 10e-3
 """Time between keyframes of people of ellipsoids [s]."""
@@ -48,8 +153,6 @@ _KEPT_SHOTS = 1024
 BOUNCES_OF_BODY = 1
 _NODES_PER_HZ = (1e-9, 3e-9)
 """Frequency nodes beyond three: for paths over one part, and for several bounces in one echo."""
-
-Array = NDArray[np.float64]
 
 
 class Rays(BuiltInModel):
@@ -107,9 +210,13 @@ class Rays(BuiltInModel):
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         backend, edge = select(variant), radar.wavelength_m / rays_per_wavelength
         self.variant: str | None = backend.kind
-        kind = _Skins if has_mesh(body) else _Ellipsoids
-        self._target = kind(use(backend), radar, body, edge)
-        self._posed: tuple[int, _Posed] | None = None
+        mi = use(backend)
+        self._target: _Ellipsoids | _Skins = (
+            _Skins(mi, radar, body, edge)
+            if has_mesh(body)
+            else _Ellipsoids(mi, body.semi_axes, edge)
+        )
+        self._posed: tuple[int, Surfaces, Grid] | None = None
         self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -145,8 +252,9 @@ class Rays(BuiltInModel):
         time_s = keyframe_time(self._radar, self._body, chirp)
         radar, (centres, frames, axes) = self._radar.at(time_s), self._body.at([time_s])
         if self._posed is None or self._posed[0] != chirp:
-            self._posed = chirp, self._target.at(time_s)
-        surfaces, grid, part = self._posed[1]
+            pose = Ellipsoids(centres[0], frames[0], axes)
+            self._posed = chirp, *self._target.posed(pose, time_s)
+        _, surfaces, grid = self._posed
         sent = Polarization(radar.polarization, radar.axes)
         shooter = Shooter(
             surfaces=surfaces,
@@ -163,7 +271,7 @@ class Rays(BuiltInModel):
         lengths, amplitudes = [], []
         for order, footprints in enumerate(shooter.shoot(place)):
             free = exits(surfaces, footprints, rx)
-            own = replace(footprints, surface=part[footprints.surface])
+            own = replace(footprints, surface=self._target.part[footprints.surface])
             lengths.append(own.mean_paths(own.surface, rx, specular) if order else specular)
             nodes = self._nodes(order > 0)
             sums = radiate(
@@ -189,28 +297,6 @@ class Rays(BuiltInModel):
         return sweep_nodes(self._radar, 3 + min(17, math.ceil(per_hz * self._radar.bandwidth_hz)))
 
 
-class _Posed(NamedTuple):
-    """What rays meet at one time, where they are aimed, and the ``part (surface,)`` of surfaces."""
-
-    surfaces: Surfaces
-    grid: Grid
-    part: NDArray[np.int64]
-
-
-class _Ellipsoids:
-    """People of ellipsoids, with facets whose edges are ``edge`` long [m]."""
-
-    def __init__(self, mi: Any, _radar: Radar, body: Body, edge: float) -> None:
-        self._body, self._tracer = body, BodyTracer(mi, body.semi_axes)
-        self._grid = EllipsoidGrid.cover(body.semi_axes, edge)
-
-    def at(self, time_s: float) -> _Posed:
-        (centres,), (frames,), axes = self._body.at([time_s])
-        self._tracer.pose(centres, frames)
-        grid = replace(self._grid, pose=Ellipsoids(centres, frames, axes))
-        return _Posed(self._tracer, grid, np.arange(len(axes)))
-
-
 class _Skins:
     """People of whom some have a mesh: their skins, cut into facets as those of `_Ellipsoids`.
 
@@ -220,16 +306,15 @@ class _Skins:
     def __init__(self, mi: Any, radar: Radar, body: Body, edge: float) -> None:
         self._mi, stop_hz = mi, radar.start_frequency_hz + radar.bandwidth_hz
         self._skins: list[Skin] = [skin_of(person, stop_hz) for person in body.people]
-        counts = np.cumsum([0, *(len(person.semi_axes) for person in body.people)])
-        parts = zip(self._skins, counts[:-1], strict=True)
-        self._part = np.concatenate([np.repeat(own.part, 4) + first for own, first in parts])
+        counts = [len(person.semi_axes) for person in body.people]
+        self.part = np.repeat(one_after_the_other([own.part for own in self._skins], counts), 4)
         # As at the start, so that each facet keeps its place in the material.
         self._divisions = MeshGrid.divisions(self._corners(0.0), edge, by_area=True)
 
-    def at(self, time_s: float) -> _Posed:
+    def posed(self, _pose: Ellipsoids, time_s: float) -> tuple[Surfaces, Grid]:
         corners = self._corners(time_s)
         tracer = MeshTracer(self._mi, corners, same=_SAME)
-        return _Posed(tracer, MeshGrid.cut(corners, self._divisions), self._part)
+        return tracer, MeshGrid.cut(corners, self._divisions)
 
     def _corners(self, time_s: float) -> Array:
         return np.concatenate([skin.posed(time_s)[1][skin.fine] for skin in self._skins])

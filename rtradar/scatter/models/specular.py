@@ -15,15 +15,19 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
+    DoubleReflections,
     TwoBounceModel,
     check_bounces,
     double_scattering,
 )
 from rtradar.scatter.facets.envelope import ArrayEnvelope, visible_fractions_of
 from rtradar.scatter.facets.target import visible_fractions
-from rtradar.scatter.specular_point.second_term import check_terms, with_second_term
-from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
+from rtradar.scatter.specular_points import (
+    SpecularVisibility,
+    solve_specular_points,
+    unobstructed,
+    with_second_term,
+)
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -31,8 +35,14 @@ from rtradar.trace.body_tracer import BodyTracer
 Visibility = Literal["sharp", "gradual"]
 
 
-def check_visibility(visibility: str) -> None:
-    """Raise InputError where there is no such kind of visibility."""
+def _check(bounces: int, terms: int, visibility: str) -> None:
+    """Raise InputError where there is no such option."""
+    check_bounces("specular", bounces)
+    if terms not in (1, 2):
+        raise InputError(
+            f"specular: terms = {terms!r}; it must be 1, for geometric optics, or 2 for the next "
+            "term in powers of 1/k as well"
+        )
     if visibility not in (allowed := get_args(Visibility)):
         raise InputError(
             f"specular: visibility = {visibility!r} is unknown; allowed: {', '.join(allowed)}"
@@ -51,9 +61,7 @@ def _scattering_length(
     visibility: Visibility = "sharp",
 ) -> NDArray[np.complex128]:
     """Scattering length of one target."""
-    check_bounces("specular", bounces)
-    check_terms(terms)
-    check_visibility(visibility)
+    _check(bounces, terms, visibility)
     at, sent = target_geometry(target, tx, rx), Polarization(polarization)
     length, amplitude, points = solve_specular_points(at, polarization=sent, points=True)
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
@@ -92,7 +100,7 @@ class Specular(TwoBounceModel):
         these a path is visible or not.
     terms : int
         1, or 2 for the second term of geometric optics as well
-        (`rtradar.scatter.specular_point.second_term`), at the middle of the sweep.
+        (`rtradar.scatter.specular_points`), at the middle of the sweep.
 
     Raises
     ------
@@ -115,23 +123,21 @@ class Specular(TwoBounceModel):
         terms: int = 1,
         visibility: Visibility = "sharp",
     ) -> None:
-        check_bounces("specular", bounces)
-        check_terms(terms)
-        check_visibility(visibility)
+        _check(bounces, terms, visibility)
         self._terms = terms
-        self._radar, self._body, self.spreading = radar, body, spreading
+        self._radar, self._body, self._spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
-        self.tracer = BodyTracer(use(backend), body.semi_axes)
+        self._tracer = BodyTracer(use(backend), body.semi_axes)
         self._visibility: SpecularVisibility | ArrayEnvelope
         if visibility == "gradual":
             self._visibility = visible_fractions_of(
                 radar, body, variant=variant, spreading=spreading
             )
         else:
-            self._visibility = SpecularVisibility(radar, body, self.tracer)
+            self._visibility = SpecularVisibility(radar, body, self._tracer)
         if bounces == 2:
-            self._reflect_twice(radar, body, self.tracer, spreading=spreading)
+            self.doubles = DoubleReflections(radar, body, self._tracer, spreading=spreading)
         if bounces == 2 or terms == 2 or visibility == "gradual":
             # Each path over walls has these of its own.
             self.fast_over_walls = False
@@ -157,7 +163,12 @@ class Specular(TwoBounceModel):
     def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes of a conductor; see `HasSpecularPoints`."""
+        """Compute direct echoes at some chirps as if the body were a conductor.
+
+        Points ``start (chirp, part, 3)`` near the specular points, in the axes of the parts [m],
+        save steps. Returned are lengths and co-polar amplitudes, with occlusion (chirp, rx, part)
+        [m].
+        """
         length, amplitude, _ = self._solved(chirps, at, start)
         return length, amplitude
 
@@ -179,7 +190,7 @@ class Specular(TwoBounceModel):
             at,
             start=known if start is None else start,
             polarization=Polarization(self._radar.polarization, at.axes),
-            spreading=self.spreading,
+            spreading=self._spreading,
             points=points,
         )
         return length, amplitude * weight, found

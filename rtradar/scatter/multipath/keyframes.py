@@ -5,10 +5,13 @@ their slabs, to the specular point on the body. Both legs begin at their antenna
 receiver receives what it would send. Specular points are those for the middles of the lines of
 antennas, legs run from the ends of the lines. A slab that delays makes several waves of one, each
 with its own delay: an echo has a column for each pair of those of its legs.
+
+Keyframes are computed many at a time, kept, and found again.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
 from typing import NamedTuple
@@ -17,9 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
+from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.mirrors import received_from_conductors
-from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.kernels.scatter.nearby_points import Nearby
+from rtradar.kernels.scatter.rooms import Blend
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
@@ -28,12 +33,11 @@ from rtradar.scatter.common.polarization import (
     bisector,
     over_copolar,
 )
-from rtradar.scatter.multipath.furniture_faces import SolidFace
-from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
+from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, keyframe_step
+from rtradar.scatter.multipath.image_paths import Leg, SolidFace, WallPath
 from rtradar.scatter.multipath.path_echoes import NO_DELAYS, DelayingPassages, EchoColumns
+from rtradar.scatter.multipath.slabs import Passages, WallResponse
 from rtradar.scatter.multipath.solid_edges import SolidEdges
-from rtradar.scatter.multipath.wall_interaction import Passages, WallResponse
-from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.system.threads import in_threads, thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -86,12 +90,6 @@ class Surroundings(NamedTuple):
         """Polarisation of the antennas."""
         return Polarization(self.radar.polarization, self.radar.axes)
 
-    def before(self, radar: Radar) -> Surroundings:
-        """Return the same before a radar at rest."""
-        if radar is self.radar:
-            return self
-        return self._replace(radar=radar, ends=ArrayEnds.of(radar))
-
 
 def path_keyframes(
     around: Surroundings, columns: EchoColumns, poses: Poses, times: Array
@@ -101,7 +99,7 @@ def path_keyframes(
     Columns that are met for the first time are added. Whether other parts occlude a direct echo,
     and any of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
-    points, start, exists = _specular_points(around, columns, poses)
+    points, start, exists = columns.specular_points(around.ends, poses)
     radar, ends = around.radar, around.ends
     ways = [path.out for path in around.paths], [path.back for path in around.paths]
     antennas = (ends.tx, radar.tx_antenna), (ends.rx, radar.rx_antenna)
@@ -139,54 +137,17 @@ def _in_columns(
     strength: Array,
 ) -> Field:
     """Factors (node, keyframe, line, 2, rx_end, column), without terms that are faint anywhere."""
-    owners = []
+    parts = []
     for chosen, met, found in factors:
         size = np.abs(found).max(axis=0)
         counts = ((size > _FAINT * strength[..., chosen]) & (size > 0)).any(axis=(0, 1, 2, 3))
-        pairs = zip(chosen, counts, strict=True)
-        owners.append(
-            np.array([columns.column(int(echo), met) if own else -1 for echo, own in pairs])
-        )
-    nodes = factors[0][2].shape[0]
-    out = np.zeros((nodes, *strength.shape[:-1], len(columns)), dtype=np.complex128)
-    for (_, _, found), column in zip(factors, owners, strict=True):
-        out[..., column[column >= 0]] = found[..., column >= 0]
+        column = np.full(len(chosen), -1)
+        column[counts] = [columns.column(echo, met) for echo in chosen[counts].tolist()]
+        parts.append((column[column >= 0], found[..., column >= 0]))
+    out = np.zeros((len(parts[0][1]), *strength.shape[:-1], len(columns)), dtype=np.complex128)
+    for column, found in parts:
+        out[..., column] = found
     return out
-
-
-def _specular_points(
-    around: Surroundings, columns: EchoColumns, poses: Poses
-) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Specular points, and whether there is one at all.
-
-    Returned are points for the middles of the lines (keyframe, line, echo, 3), world [m]; for the
-    ends of the lines of Tx (keyframe, line, 2, echo, 3), in the axes of the parts [m]; and
-    (keyframe, line, echo) bool.
-    """
-    ends, count, part = around.ends, len(poses.centres), columns.part
-    # The middle of each line of Tx and its ends, all with the middle of the receivers kept.
-    tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
-    rx = np.repeat(ends.rx_middle[:, None], tx.shape[1], axis=1)
-    shape = (count, *tx.shape[:2], len(part))
-    places, exists = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-    for number in np.unique(columns.path):
-        chosen, path = np.flatnonzero(columns.path == number), around.paths[number]
-        own = part[chosen]
-        from_tx = images(path.out, tx.reshape(-1, 3))
-        to_rx = images(path.back, rx.reshape(-1, 3))
-        centres, frames = (
-            np.repeat(array[:, own], len(from_tx), axis=0)
-            for array in (poses.centres, poses.frames)
-        )
-        antennas = np.tile(from_tx, (count, 1)), np.tile(to_rx, (count, 1))[:, None]
-        _, amplitude, found = solve_specular_points(
-            Geometry(*antennas, centres, frames, poses.semi_axes[own]), points=True
-        )
-        exists[..., chosen] = (np.abs(amplitude) > 0).reshape(*shape[:3], len(own))
-        places[..., chosen, :] = found.reshape(*shape[:3], len(own), 3)
-    away = places[:, :, 1:] - poses.centres[:, None, None, part]
-    starts = np.einsum("keji,klsej->klsei", poses.frames[:, part], away)
-    return places[:, :, 0], starts, exists[:, :, 0]
 
 
 # -- fields ----------------------------------------------------------------------------------------
@@ -354,3 +315,110 @@ def _not_occluded(
         occluded = ~body.clear(starts, stops, group, parts, pose, poses)
         clear[keyframe[occluded], line[occluded], end[occluded], echo[occluded]] = False
     return np.asarray(both[0][:, :, :, None] & both[1][:, :, None])
+
+
+# -- many keyframes --------------------------------------------------------------------------------
+
+
+KEYFRAMES_S = 20e-3
+"""Keyframe spacing of echoes over walls [s]. Interpolating leaves an error of -21 dB of the ghosts
+(`validation/other_methods/multipath.py`)."""
+
+_KEPT_BYTES = 64e6
+"""Memory of the keyframes that stay, so that pruning and the signal trace once: 10 s in a box."""
+
+_KEYFRAMES_AT_ONCE = 32
+
+
+class RoomKeyframes:
+    """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps."""
+
+    def __init__(self, around: Surroundings, columns: EchoColumns, body: Body) -> None:
+        self._around, self.columns, self._body = around, columns, body
+        self.step = keyframe_step(around.radar, KEYFRAMES_S)
+        self._cache: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
+
+    def direct(self) -> RoomKeyframes:
+        """Return those of the direct echoes alone, with what is already known of them."""
+        other, keep = copy.copy(self), self.columns.direct
+        other.columns, other._cache = copy.copy(self.columns), self._cache.copy()
+        other.restrict(keep[np.array(self.columns.echo)], keep)
+        return other
+
+    def around(
+        self, chirps: NDArray[np.int64], tx: NDArray[np.int64]
+    ) -> tuple[Blend, PathKeyframes, PathKeyframes]:
+        """Return where chirps are, and the keyframes before and after each interval.
+
+        ``tx (chirp,)`` are their transmitters.
+        """
+        numbers, rest = keyframe_before(self._around.radar, chirps, self.step)
+        starts, interval = np.unique(numbers, return_inverse=True)
+        fraction = rest / self.step
+        # Where every chirp of an interval is its first, the keyframe after it does not matter.
+        stops = starts + (np.bincount(interval, weights=fraction) > 0)
+        found = self._find(np.union1d(starts, stops).tolist())
+        before, after = (
+            _stack([found[number] for number in ends.tolist()], len(self.columns))
+            for ends in (starts, stops)
+        )
+        ends = self._around.ends
+        blend = Blend(
+            interval, fraction, ends.line_of_tx[tx], ends.tx_weight[tx], ends.rx_weight[tx]
+        )
+        return blend, before, after
+
+    def look_ahead(self, n_chirps: int) -> None:
+        """Compute the keyframes of a capture that stay, many at a time."""
+        self._find(list(range(min(-(-n_chirps // self.step) + 1, self._cache.stay))))
+
+    def _find(self, numbers: list[int]) -> dict[int, PathKeyframes]:
+        """Keyframes with these numbers, from the cache or many at a time."""
+        cache = self._cache
+        found = {number: cache[number] for number in numbers if number in cache}
+        missing, radar = [number for number in numbers if number not in found], self._around.radar
+        at_once = 1 if radar.is_moving else _KEYFRAMES_AT_ONCE
+        for first in range(0, len(missing), at_once):
+            some = missing[first : first + at_once]
+            times = radar.gapless.centres_of(np.array(some) * self.step)
+            poses = self._body.at(np.minimum(times, self._body.duration_s))
+            around, there = self._around, radar.at(float(times[0]))
+            if radar.is_moving:
+                around = around._replace(radar=there, ends=ArrayEnds.of(there))
+            keyframes = path_keyframes(around, self.columns, poses, times)
+            for place, number in enumerate(some):
+                own = PathKeyframes(*(array[place].copy() for array in keyframes))
+                cache.stay = int(_KEPT_BYTES / sum(array.nbytes for array in own))
+                cache.keep(number, own)
+                found[number] = own
+        return found
+
+    def restrict(self, column: NDArray[np.bool_], echo: NDArray[np.bool_]) -> None:
+        """Leave out all other columns and all other echoes for good."""
+        self.columns.keep(column, echo)
+        self._cache.replace(
+            lambda own: PathKeyframes(
+                _widened(own.factor, len(column))[..., column].copy(),
+                own.seen[..., echo].copy(),
+                own.start[..., echo, :].copy(),
+            )
+        )
+
+
+def nearby_points(blend: Blend, before: PathKeyframes, after: PathKeyframes) -> Nearby:
+    """Return the specular points that are expected at chirps between keyframes."""
+    wanted = np.any(before.seen | after.seen, axis=(2, 3))
+    interval, fraction, line, tx_weight, _ = blend
+    return Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
+
+
+def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:
+    factor = np.stack([_widened(own.factor, columns) for own in keyframes])
+    seen, start = (np.stack(arrays) for arrays in list(zip(*keyframes, strict=True))[1:])
+    return PathKeyframes(factor, seen, start)
+
+
+def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:
+    """Add empty columns for what was not yet known."""
+    missing = columns - factor.shape[-1]
+    return factor if not missing else np.pad(factor, [(0, 0)] * (factor.ndim - 1) + [(0, missing)])

@@ -13,7 +13,7 @@ import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,23 +25,30 @@ from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.echo_sets import take, times_factor, together, weakest
-from rtradar.scatter.common.interpolation import ArrayEnds
-from rtradar.scatter.common.keyframes import chirps_by_steps
-from rtradar.scatter.common.polarization import CONDUCTOR, Polarization, Surfaces
-from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
-from rtradar.scatter.free_space_legs import over_legs
-from rtradar.scatter.multipath.furniture_faces import FaceSummary, reflecting_faces
-from rtradar.scatter.multipath.image_paths import Face, ImageRadar, corners, wall_paths
-from rtradar.scatter.multipath.keyframes import Surroundings
+from rtradar.scatter.common.interpolation import ArrayEnds, take, times_factor, together, weakest
+from rtradar.scatter.common.polarization import CONDUCTOR, Polarization, Surfaces, over_legs
+from rtradar.scatter.common.poses import (
+    ChirpPoses,
+    EchoModel,
+    account_of,
+    chirp_poses,
+    chirps_by_steps,
+)
+from rtradar.scatter.multipath.image_paths import (
+    Face,
+    FaceSummary,
+    ImageRadar,
+    corners,
+    reflecting_faces,
+    wall_paths,
+)
+from rtradar.scatter.multipath.keyframes import RoomKeyframes, Surroundings, nearby_points
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
-from rtradar.scatter.multipath.room_keyframes import RoomKeyframes, nearby_points
-from rtradar.scatter.multipath.slab_series import HALF_SPACE, room_series
+from rtradar.scatter.multipath.slabs import HALF_SPACE, WallResponse, room_series
 from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
 from rtradar.system.threads import in_threads
@@ -79,21 +86,6 @@ class HasFormula(EchoModel, Protocol):
         ...
 
 
-class HasSpecularPoints(EchoModel, Protocol):
-    """A model of the specular points of ellipsoids, which the room follows over walls itself."""
-
-    def specular_echo(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, start: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Compute direct echoes at some chirps as if the body were a conductor.
-
-        Points ``start (chirp, part, 3)`` near the specular points, in the axes of the parts [m],
-        save steps. Returned are lengths and co-polar amplitudes, with occlusion (chirp, rx, part)
-        [m].
-        """
-        ...
-
-
 class RoomModel:
     """A fidelity level in a room; its model of the ``person`` alone is that of free space.
 
@@ -103,13 +95,14 @@ class RoomModel:
     legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
     ``variant`` asks for the backend that traces what occludes; None is for no occlusion.
 
-    A model whose class says ``fast_over_walls`` computes the echoes over all paths, with points or
-    a formula of its own. Of any other level each path has a model before the images of the antennas
-    over its legs. ``paths`` are all paths, the direct one first;
-    ``faces`` says of each face of furniture whether paths lead over it; ``not_followed``, known
-    after `prune`, are the walls whose frequency response is not known to
-    `FIELD_ERROR`, with the fraction of the echo power that meets each. Of the weakest echoes that a
-    tolerance leaves out ``left_out`` is the number and ``left_out_m2`` the mean power [m^2].
+    A model whose class says ``fast_over_walls`` computes the echoes over all paths, with a formula,
+    or by ``specular_echo`` with specular points, which the room follows over walls itself. Of any
+    other level each path has a model before the images of the antennas over its legs. ``paths`` are
+    all paths, the direct one first, and ``path_names`` theirs; ``faces`` says of each face of
+    furniture whether paths lead over it; ``not_followed``, known after `prune`, are the walls whose
+    frequency response is not known to `FIELD_ERROR`, with the fraction of the echo power that meets
+    each. Of the weakest echoes that a tolerance leaves out ``left_out`` is the number and
+    ``left_out_m2`` the mean power [m^2].
     """
 
     def __init__(
@@ -155,6 +148,7 @@ class RoomModel:
         self.paths = tuple(
             sorted(dict.fromkeys(chain.from_iterable(paths)), key=lambda path: path.order)
         )
+        self.path_names = tuple(path.name for path in self.paths)
         every = *series.walls, *(HALF_SPACE,) * len(faces)
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages.of(radar, self.paths)
@@ -183,11 +177,6 @@ class RoomModel:
     @property
     def _columns(self) -> EchoColumns:
         return self._keyframes.columns
-
-    @property
-    def path_names(self) -> tuple[str, ...]:
-        """Name of each path, by the number that an echo has of it."""
-        return tuple(path.name for path in self.paths)
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model of the direct echoes did."""
@@ -225,7 +214,8 @@ class RoomModel:
         else:
             start = near.take(slice(n_direct)).places()
             if self._fast:
-                found = [cast(HasSpecularPoints, model).specular_echo(chirps, at, start)]
+                specular: Any = model
+                found = [specular.specular_echo(chirps, at, start)]
             else:
                 sent = Polarization(self._radar.polarization, at.axes)
                 found = [solve_specular_points(at, start=start, polarization=sent)[:2]]

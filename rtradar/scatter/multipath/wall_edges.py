@@ -15,6 +15,7 @@ sweep shows elsewhere, and weakly: it is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -24,10 +25,10 @@ from scipy.special import fresnel
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.multipath.furniture_faces import SolidFace
 from rtradar.scatter.multipath.image_paths import (
     Face,
     Leg,
+    SolidFace,
     corners,
     height,
     image,
@@ -53,23 +54,23 @@ class Sides(NamedTuple):
     free: Bools
 
 
+@dataclass(frozen=True, eq=False)
 class WallEdges:
     """The walls of a room, and faces of furniture, with their edges, for the sweep of a radar.
 
     Edges count at the wavelength in the middle of the sweep, ``wavelength_m``; its range resolution
-    ``resolution_m`` is c / B, of the whole path. ``surfaces`` are the walls, then the faces.
+    ``resolution_m`` is c / B, of the whole path.
     """
 
-    def __init__(
-        self,
-        walls: Sequence[Wall],
-        wavelength_m: float,
-        resolution_m: float,
-        faces: Sequence[Face] = (),
-    ) -> None:
-        self.walls = tuple(walls)
-        self.surfaces = (*self.walls, *(face.wall for face in faces))
-        self.wavelength_m, self.resolution_m = wavelength_m, resolution_m
+    walls: Sequence[Wall]
+    wavelength_m: float
+    resolution_m: float
+    faces: Sequence[Face] = ()
+
+    @cached_property
+    def surfaces(self) -> tuple[Wall, ...]:
+        """The walls, then the faces."""
+        return *self.walls, *(face.wall for face in self.faces)
 
     @classmethod
     @lru_cache(maxsize=8)

@@ -18,7 +18,7 @@ from rtradar.kernels.scatter.facets_by_length import (
     facets_by_length,
 )
 from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
-from rtradar.scatter.facets.surfaces import ellipsoid_facets
+from rtradar.scatter.facets.radiation import ellipsoid_facets
 
 _WAVENUMBER = 300.0
 

@@ -131,22 +131,3 @@ def test_too_many_facets_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyP
         returns(
             ONE, Scene(furniture=(block(tmp_path, "block", (0.5, 0.9, 0.7), (0, 0, 1), "wood"),))
         )
-
-
-def test_many_pieces_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[str] = []
-
-    def bar(pieces: list[object], **words: object) -> list[object]:
-        shown.append(f"{len(pieces)} {words['desc']}")
-        return pieces
-
-    monkeypatch.setattr(clutter_furniture, "tqdm", bar)
-    chairs = tuple(
-        Furniture(
-            name=f"chair {k}", mesh="chair", material=material("wood"), position_m=(2.0, k, 0.0)
-        )
-        for k in range(2)
-    )
-    radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=128)
-    list(furniture_returns(use(select("scalar")), radar, Scene(furniture=chairs)))
-    assert shown == ["2 furniture"]

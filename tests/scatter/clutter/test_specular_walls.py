@@ -11,7 +11,7 @@ import trimesh
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
-from rtradar.scatter.clutter.wall_returns import specular_returns
+from rtradar.scatter.clutter.static_clutter import specular_returns
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.occluders import Occluders
@@ -66,13 +66,6 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
     for name, total in found.items():
         # A conductor mirrors v into v, whatever the angles.
         np.testing.assert_allclose(total, 1, rtol=0, atol=1e-12, err_msg=str(name))
-
-
-def test_a_conductor_returns_as_a_large_sphere_does() -> None:
-    radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
-    far = next(echoes for echoes in mirrors(radar, box(), 1) if echoes.name == "far")
-    np.testing.assert_allclose(far.amplitude, 2 * np.sqrt(np.pi) / 10.4, rtol=1e-12)
-    assert far.frequency.shape == (1,)
 
 
 def test_furniture_hides_a_wall(tmp_path: Path) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import tracemalloc
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,17 +100,6 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
     assert np.abs(got - exact).max() < 0.04
 
 
-@pytest.mark.slow
-def test_an_edge_that_wanders_changes_the_share_without_jumps() -> None:
-    # Steps of 2e-3, where the edge is in sight, at its corner and where it vanishes.
-    u = (np.array([-0.8, 0.0, 0.6])[:, None] + np.linspace(-0.02, 0.02, 21)).ravel()
-    k = 2 * np.pi * 14e9 / C
-    edges = u / np.sqrt(k * (2 / 3.9 + 2 / 0.1) / 2)
-    share = np.array([share_behind_plate(0.1, 14e9, edge) for edge in edges])
-    # exp(-j u^2) bends by 2 u / sqrt(pi) a unit squared: 5e-6 at a step of 2e-3.
-    assert np.abs(np.diff(share.reshape(3, -1), 2)).max() < 1e-4
-
-
 def test_full_view_is_one_and_full_cover_exactly_nothing(backend: Backend) -> None:
     radar, chirps = small_radar(tx_y=3, rx_y=2, tx_spacing_wavelengths=1.0), np.arange(30)
     for body, target in ((Curtain(edge=0.5), 1.0), (Curtain(edge=-0.3), 0.0)):
@@ -170,16 +157,6 @@ def test_tx_and_rx_may_be_swapped_and_stand_far_apart(backend: Backend) -> None:
         for options in ({}, GRADUAL)
     )  # fmt: skip
     assert 0 < abs(soft[0] - sharp[0]) < abs(sharp[0])
-
-
-@pytest.mark.slow
-def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
-    radar, body = small_radar(tx_y=2, rx_y=2), Curtain(speed=1.0)
-    whole = gradual(radar, body, variant=backend.kind).echoes(np.arange(70, 150)).amplitude
-    for block in (np.arange(131, 150), np.arange(70, 71), np.arange(71, 131)):
-        afresh = gradual(radar, body, variant=backend.kind)
-        # A keyframe alone goes without its neighbours: the same but for the last digit.
-        np.testing.assert_allclose(afresh.echoes(block).amplitude, whole[:, block - 70], rtol=1e-13)
 
 
 def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
@@ -275,31 +252,3 @@ def test_another_visibility_is_refused_in_one_line(wrong: Any) -> None:
         with pytest.raises(InputError, match=r"visibility = .*; allowed: sharp, gradual") as caught:
             call()
         assert "\n" not in str(caught.value)
-
-
-@dataclass(frozen=True)
-class Swinging(Curtain):
-    """The curtain, to and fro for minutes."""
-
-    duration_s: float = 100.0
-
-    def at(self, times: Array) -> Poses:
-        return super().at(0.1 + 0.2 * np.sin(2 * np.pi * np.asarray(times) / 4))
-
-
-@pytest.mark.slow
-def test_what_is_kept_does_not_grow_with_the_capture() -> None:
-    model, held = gradual(small_radar(), Swinging(speed=1.0)), []
-    of_arrays = tracemalloc.DomainFilter(inclusive=True, domain=np.lib.tracemalloc_domain)
-    tracemalloc.start()
-    try:
-        # 20 s of keyframes, 10 ms apart, stay; of those after them few.
-        for begin in range(0, 24_000, 10):
-            model.echoes(np.array([begin]))
-            if begin in (21_500, 23_990):
-                gc.collect()
-                traces = tracemalloc.take_snapshot().filter_traces([of_arrays]).traces
-                held.append(sum(trace.size for trace in traces))
-    finally:
-        tracemalloc.stop()
-    assert held[1] == held[0]

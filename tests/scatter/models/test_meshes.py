@@ -13,8 +13,8 @@ from rtradar.body.people import body_of_people
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter import build_model
 from rtradar.scatter.facets.skin import skin_of
-from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH
-from rtradar.scatter.ray_tubes.tubes import MOST_TUBES, MeshGrid
+from rtradar.scatter.models.rays import RAYS_PER_WAVELENGTH
+from rtradar.scatter.target import MOST_TUBES, MeshGrid
 from rtradar.settings import RunSettings
 
 needs_anny = pytest.mark.skipif(

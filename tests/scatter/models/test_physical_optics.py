@@ -22,10 +22,9 @@ from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample
 from rtradar.scatter.facets.target import facet_scattering
-from rtradar.scatter.models.physical_optics import PhysicalOptics
-from rtradar.scatter.models.reference import Reference
+from rtradar.scatter.models.physical_optics import PhysicalOptics, Reference
 from rtradar.scatter.models.specular import Specular
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 
 Array = NDArray[np.float64]
 PLACES = 8

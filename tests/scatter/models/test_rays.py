@@ -3,19 +3,15 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
-from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter import build_model
-from rtradar.scatter.models.rays import Rays
-from rtradar.scatter.ray_tubes.target import rays_scattering
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid
+from rtradar.scatter.models.rays import Rays, rays_scattering
+from rtradar.scatter.target import EllipsoidGrid, MeshGrid
 from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
@@ -169,60 +165,6 @@ def test_two_spheres_send_each_other_what_one_of_them_alone_does_not() -> None:
     # Stationary phase over both spheres gives 0.0676 m (validation/closed_forms/rays.py works it
     # out); 1 dB for edges of shadow.
     assert 20 * np.log10(abs(two - one) / 0.0676) == pytest.approx(0, abs=1.0)
-
-
-def test_a_part_behind_another_adds_nothing(backend: Backend) -> None:
-    antenna = [4.0, 0.02, 0.01]
-    model_options = {"bounces": 1, "variant": backend.kind, "rays_per_wavelength": 1.0}
-    hidden = rt.Ellipsoids(
-        [[0, 0, 0], [-0.5, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1] * 3, [0.05] * 3]
-    )
-    assert backscatter(hidden, antenna, 12e9, **model_options) == backscatter(
-        sphere(0.1), antenna, 12e9, **model_options
-    )
-
-
-def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
-    tx, rx, frequency = (
-        np.array([[-4.0, 0.5, 0.0]]),
-        np.array([[-4.0, -0.5, 0.0]]),
-        np.array([12e9]),
-    )
-    screen = rt.Ellipsoids([[-2.0, 0.25, 0]], [np.eye(3)], [[0.01, 0.1, 0.3]])
-    both = rt.Ellipsoids(
-        [[-2.0, 0.25, 0], [0, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.01, 0.1, 0.3], [0.05] * 3]
-    )
-    for pair in ((tx, rx), (rx, tx)):
-        with_part, alone = (
-            rays_scattering(target, *pair, frequency, bounces=1) for target in (both, screen)
-        )
-        np.testing.assert_allclose(with_part, alone, rtol=1e-9)
-
-
-@settings(max_examples=20)
-@given(st.integers(0, 2**32 - 1), st.sampled_from(["v", "h"]))
-def test_tx_and_rx_may_be_swapped(seed: int, polarization: str) -> None:
-    rng = np.random.default_rng(seed)
-    frames = Rotation.random(2, random_state=seed).as_matrix()
-    target = rt.Ellipsoids([[0, 0, 0], [0.1, 0.1, 0.1]], frames, rng.uniform(0.03, 0.08, (2, 3)))
-    tx = rng.normal(size=(2, 3))
-    tx *= rng.uniform(1, 5, (2, 1)) / np.linalg.norm(tx, axis=1, keepdims=True)
-    rx = tx + rng.normal(0, 0.3, (2, 3))
-    model_options = {"bounces": 1, "polarization": polarization, "rays_per_wavelength": 1.0}
-    frequency = np.array([12e9, 16e9])
-    there, back = (
-        rays_scattering(target, *pair, frequency, **model_options) for pair in ((tx, rx), (rx, tx))
-    )  # type: ignore[arg-type]
-    np.testing.assert_allclose(back, there, rtol=1e-9, atol=1e-9)
-
-
-def test_phase_belongs_to_the_path_over_the_origin() -> None:
-    here, there = (
-        backscatter(sphere(0.05, place), [FAR, 0, 0], 1e10) for place in ((0, 0, 0), (-0.3, 0, 0))
-    )
-    assert there / here == pytest.approx(
-        np.exp(-2j * np.pi * 1e10 / SPEED_OF_LIGHT_MPS * 0.6), abs=1e-5
-    )
 
 
 def test_pairs_keep_their_order_and_their_frequencies() -> None:

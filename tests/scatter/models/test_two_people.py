@@ -7,14 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.body.body import Poses
 from rtradar.body.people import body_of_people
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter import build_model
 from rtradar.scatter.common.interpolation import interpolation_weights
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.settings import RunSettings
 from rtradar.system.registries import MODELS
 
@@ -95,29 +94,3 @@ def test_one_behind_another_loses_what_is_in_the_way() -> None:
     # And nobody behind takes anything from who is in front.
     before = build_model("specular", RADAR, front).echoes(chirps).amplitude[0, 0]
     np.testing.assert_array_equal(echoes.amplitude[0, 0][:, both.owner[echoes.part] == 0], before)
-
-
-class Half:
-    """Some parts of a body, as a body of their own."""
-
-    def __init__(self, body: rt.body.Body, parts: NDArray[np.int64]) -> None:
-        self.whole, self.parts = body, parts
-        self.semi_axes, self.duration_s = body.semi_axes[parts], body.duration_s
-        self.part_names = tuple(body.part_names[part] for part in parts)
-
-    def at(self, times: NDArray[np.float64]) -> Poses:
-        centres, frames, axes = self.whole.at(times)
-        return Poses(centres[:, self.parts], frames[:, self.parts], axes[self.parts])
-
-
-@pytest.mark.parametrize("fidelity", ["analytic-paper", "analytic", "specular"])
-def test_a_body_of_two_sets_of_ellipsoids_returns_the_same(fidelity: str) -> None:
-    """Left and right of a body as two: named otherwise, and in another order."""
-    body = body_of_people(PEOPLE[:1], RunSettings(duration_s=0.06))
-    order = np.argsort(["left" in name for name in body.part_names], kind="stable")
-    chirps = np.array([7, 403])
-    whole = build_model(fidelity, RADAR, body).echoes(chirps)
-    split = build_model(fidelity, RADAR, Half(body, order)).echoes(chirps)  # type: ignore[arg-type]
-    every = np.ones(len(order), dtype=bool)
-    given, expected = received(split, every), received(whole, every)
-    assert np.abs(given - expected).max() < 1e-9 * np.abs(expected).max()

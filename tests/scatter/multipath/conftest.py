@@ -1,6 +1,5 @@
 """Bodies, walls and radars of the tests of echoes over walls."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +14,6 @@ from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 
 Array = NDArray[np.float64]
-Make = Callable[..., Any]
 SIDES = {
     "floor": ((-10.0, -10.0, 0.0), (20.0, 0.0, 0.0), (0.0, 20.0, 0.0)),
     "left": ((-10.0, 2.5, -10.0), (20.0, 0.0, 0.0), (0.0, 0.0, 20.0)),
@@ -55,56 +53,37 @@ class Still:
         )
 
 
-@pytest.fixture
-def still() -> Make:
-    return Still
+class Rooms:
+    """What tests make rooms of."""
 
+    still = Still
 
-@pytest.fixture
-def one() -> Make:
-    def make(
+    @staticmethod
+    def one(
         axes: tuple[float, float, float] = (0.1, 0.15, 0.3),
         centre: tuple[float, ...] = (0.0, 0.3, 1.2),
-        **more: object,
+        **more: Any,
     ) -> Still:
+        """One part."""
         frame = Rotation.from_euler("xyz", [0.3, -0.2, 0.5]).as_matrix()
-        return Still(np.array([centre]), np.array([axes]), frame[None], **more)  # type: ignore[arg-type]
+        return Still(np.array([centre]), np.array([axes]), frame[None], **more)
 
-    return make
-
-
-@pytest.fixture
-def wall() -> Make:
-    def make(side: str, name: str = "perfect-conductor", thickness: float = 0.1) -> Wall:
+    @staticmethod
+    def wall(side: str, name: str = "perfect-conductor", thickness: float = 0.1) -> Wall:
+        """One of `SIDES`."""
         corner, u, v = SIDES[side]
-        return Wall(
-            name=side,
-            corner_m=corner,
-            edge_u_m=u,
-            edge_v_m=v,
-            material=material(name),
-            thickness_m=thickness,
-        )
+        edges = {"corner_m": corner, "edge_u_m": u, "edge_v_m": v}
+        return Wall(name=side, material=material(name), thickness_m=thickness, **edges)
 
-    return make
-
-
-@pytest.fixture
-def single() -> Make:
-    def make(**fields: object) -> Radar:
+    @staticmethod
+    def single(**fields: Any) -> Radar:
         """One Tx, one Rx, both at one place."""
         return Radar(
             **({"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "chirp_duration_s": 1e-3} | fields)
-        )  # type: ignore[arg-type]
+        )
 
-    return make
-
-
-@pytest.fixture
-def room() -> Make:
-    """Build `specular`, or another level, between walls and furniture."""
-
-    def make(
+    @staticmethod
+    def room(
         radar: Radar,
         body: Any,
         *walls: Wall,
@@ -112,7 +91,11 @@ def room() -> Make:
         furniture: tuple[Furniture, ...] = (),
         **options: Any,
     ) -> Any:
+        """`specular`, or another level, between walls and furniture."""
         scene = Scene(walls=walls, furniture=furniture)
         return build_model(fidelity, radar, body, scene=scene, **options)
 
-    return make
+
+@pytest.fixture
+def make() -> type[Rooms]:
+    return Rooms

@@ -1,6 +1,5 @@
 """Every level of fidelity in rooms: of walls that are not there, and of one mirror."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -24,7 +23,6 @@ from rtradar.system.registries import MODELS
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
-Make = Callable[..., Any]
 VACUUM = Material(name="vacuum", source="", bands=(PowerLaw(0.0, np.inf, 1.0, 0.0, 0.0, 0.0),))
 SMALL = replace(Radar.preset("paper-12ghz"), tx_y=2, tx_z=1, rx_y=2, rx_z=2)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
@@ -77,9 +75,9 @@ def test_skin_and_patterns_are_in_rooms_what_they_are_in_free_space(fidelity: st
 
 
 @pytest.mark.parametrize("fidelity", ["analytic", "specular", "physical-optics"])
-def test_a_slab_delays_echoes_from_the_first_block_on(fidelity: str, wall: Make) -> None:
+def test_a_slab_delays_echoes_from_the_first_block_on(fidelity: str, make: Any) -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", duration_s=0.1))
-    scene = Scene(walls=(wall("left", "plasterboard", 0.2),))
+    scene = Scene(walls=(make.wall("left", "plasterboard", 0.2),))
     model: Any = build_model(fidelity, SMALL, body, scene=scene, **OPTIONS.get(fidelity, {}))
     first, again = (model.echoes(np.array([103])) for _ in range(2))
     over_the_wall = np.unique(first.part[first.bounces > 1], return_counts=True)[1]
@@ -119,9 +117,11 @@ def from_images(fidelity: str, body: Any, tx: Array, rx: Array, polarization: st
     return complex(length / (ranges[0] * ranges[1]) * np.exp(-2j * np.pi * turns))
 
 
-def test_reflections_from_part_to_part_go_over_every_path(wall: Make) -> None:
+def test_reflections_from_part_to_part_go_over_every_path(make: Any) -> None:
     body = Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
-    room: Any = build_model("specular", SMALL, body, scene=Scene(walls=(wall("left"),)), bounces=2)
+    room: Any = build_model(
+        "specular", SMALL, body, scene=Scene(walls=(make.wall("left"),)), bounces=2
+    )
     echoes = room.echoes(np.array([100]))
     names = np.array(room.path_names)[echoes.path]
     double = echoes.bounces - [name.count("left") for name in names] == 2
@@ -131,15 +131,15 @@ def test_reflections_from_part_to_part_go_over_every_path(wall: Make) -> None:
 @pytest.mark.parametrize(("side", "polarization", "sign"), MIRRORS)
 @pytest.mark.parametrize("fidelity", MODELS.built_in)
 def test_before_one_mirror_stand_the_radar_and_its_image(
-    fidelity: str, side: str, polarization: Any, sign: int, still: Make, wall: Make
+    fidelity: str, side: str, polarization: Any, sign: int, make: Any
 ) -> None:
     # The ball is seen past the limb's edge.
     frames = Rotation.from_rotvec([[0.3, 0.2, 0.4], [0, 0, 0]]).as_matrix()
     axes = np.array([[0.08, 0.06, 0.2], [0.1, 0.1, 0.1]])
-    body = still(np.array([[0.0, 0.3, 1.0], [0.9, 0.15, 1.0]]), axes, frames)
+    body = make.still(np.array([[0.0, 0.3, 1.0], [0.9, 0.15, 1.0]]), axes, frames)
     one = {"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "polarization": polarization}
     radar = replace(Radar(), **one, position_m=(-3.0, 0.2, 1.0))
-    scene, options = Scene(walls=(wall(side),)), OPTIONS.get(fidelity, {})
+    scene, options = Scene(walls=(make.wall(side),)), OPTIONS.get(fidelity, {})
     model = build_model(fidelity, radar, body, scene=scene, order=2, **options)
     echoes = model.echoes(np.array([0]))
     names = np.array(model.path_names)[echoes.path]

@@ -9,7 +9,7 @@ import trimesh
 
 from rtradar.radar import Radar
 from rtradar.scatter.echo_models import build_model
-from rtradar.scatter.multipath.furniture_faces import faces_of, reflecting_faces
+from rtradar.scatter.multipath.image_paths import faces_of, reflecting_faces
 from rtradar.scene import Furniture, Scene, Wall, material, reflection
 from rtradar.trace.backends.backend import Backend
 
@@ -52,9 +52,9 @@ def test_the_doors_of_the_wardrobe_are_one_face_and_a_lamp_has_none() -> None:
     assert not [face for face in faces_of(lamp) if face.filled_m2 > 0.05]
 
 
-def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: Any) -> None:
+def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, make: Any) -> None:
     # The front of the block looks at radar and body; nothing is seen over its other faces.
-    body = one(centre=(0.0, 0.1, 1.1))
+    body = make.one(centre=(0.0, 0.1, 1.1))
     for made, high, place, reason in (
         ("metal", 1.5, (-2.6, 2.2, 1.0), ""),
         # Out of the way.
@@ -75,7 +75,7 @@ def test_only_faces_over_which_the_body_is_seen_are_listed(tmp_path: Path, one: 
 
 @pytest.mark.parametrize("made", ["perfect-conductor", "wood"])
 def test_a_large_face_reflects_as_a_wall_of_the_same_material(
-    made: str, tmp_path: Path, backend: Backend, one: Any
+    made: str, tmp_path: Path, backend: Backend, make: Any
 ) -> None:
     # A block as large as a wall, in whose front the wall is; wood without end against a conductor.
     piece = block(tmp_path, (12.0, 0.4, 12.0), made, position_m=(-2.0, 2.2, 0.0))
@@ -87,7 +87,7 @@ def test_a_large_face_reflects_as_a_wall_of_the_same_material(
         material=material("perfect-conductor"),
         thickness_m=0.1,
     )
-    body = one((0.1, 0.1, 0.1), (0.0, 0.3, 1.0))
+    body = make.one((0.1, 0.1, 0.1), (0.0, 0.3, 1.0))
     found = {}
     for name, scene in {
         "block right": Scene(furniture=(piece,)),

@@ -1,7 +1,6 @@
 """Where ghosts show: their direction in the axes of a board that is turned."""
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from rtradar.scene import Scene, Wall, material
 
 
 @pytest.mark.parametrize("name", ["iwr1843", "paper-12ghz"])
-def test_the_azimuth_of_a_ghost_is_that_of_its_last_leg(name: str, one: Callable[..., Any]) -> None:
+def test_the_azimuth_of_a_ghost_is_that_of_its_last_leg(name: str, make: Any) -> None:
     wall = Wall(
         name="left",
         corner_m=(-6.0, 3.0, -3.0),
@@ -25,7 +24,7 @@ def test_the_azimuth_of_a_ghost_is_that_of_its_last_leg(name: str, one: Callable
         thickness_m=0.01,
     )
     radar = dataclasses.replace(Radar.preset(name), position_m=(-4.0, 1.0, 1.0), yaw_deg=20.0)
-    body = one((0.1, 0.1, 0.1), (0.0, 0.0, 1.0))
+    body = make.one((0.1, 0.1, 0.1), (0.0, 0.0, 1.0))
     model = build_model("specular", radar, body, scene=Scene(walls=(wall,)), variant="scalar")
     assert isinstance(model, RoomModel)
     found = {ghost.path: np.degrees(ghost.azimuth_rad) for ghost in ghosts(model, radar, 0.0)}

@@ -1,6 +1,5 @@
 """A model in a room: what occludes, transmits and is left out, and which models it takes."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -9,24 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.radar import Radar
-from rtradar.scatter import build_model
-from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import chirp_poses, keyframe_step
 from rtradar.scatter.models.analytic import Analytic
-from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images
-from rtradar.scatter.multipath.room_keyframes import KEYFRAMES_S
+from rtradar.scatter.multipath.keyframes import KEYFRAMES_S
 from rtradar.scatter.multipath.room_model import RoomModel
-from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.scatter.specular_points import solve_specular_points
+from rtradar.scene import Furniture, Scene, material
 from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
-Make = Callable[..., Any]
 
 
 def unit(vector: Array) -> Array:
@@ -36,49 +29,21 @@ def unit(vector: Array) -> Array:
 # -- what occludes and what transmits --------------------------------------------------------------
 
 
-def test_a_slab_before_the_radar_lets_its_square_through(
-    one: Make, single: Make, room: Any
-) -> None:
-    body = one((0.2, 0.2, 0.2), (0.0, 1.0, 1.0))
-    radar = single()
-    plasterboard = Wall(
-        name="partition",
-        corner_m=(-2.0, -2.0, 0.0),
-        edge_u_m=(0.0, 6.0, 0.0),
-        edge_v_m=(0.0, 0.0, 3.0),
-        material=material("plasterboard"),
-        thickness_m=0.003,
-    )
-    model = room(radar, body, plasterboard)
-    echoes, free = (
-        model.echoes(np.arange(2)),
-        Specular(radar, body).echoes(np.arange(2)),
-    )
-    # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
-    root = np.sqrt(material("plasterboard").eta(echoes.frequency))
-    wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
-    face, inside = (1 - root) / (1 + root), np.exp(-1j * wave * root * 0.003)
-    through = (1 - face**2) * inside / (1 - face**2 * inside**2) * np.exp(1j * wave * 0.003)
-    ratio = echoes.amplitude[:, :, 0, 0] / free.amplitude[:, :, 0, 0]
-    # Factors are kept in complex64.
-    np.testing.assert_allclose(ratio, np.conj(through**2)[:, None] * np.ones(2), rtol=1e-6)
-    np.testing.assert_allclose(echoes.length[..., 0], free.length[..., 0], rtol=1e-14)
-    # Tx before it, body behind: no wave is reflected from one to the other.
-    np.testing.assert_array_equal(echoes.amplitude[..., 1:], 0)
-
-
-def test_a_wall_reflects_only_where_it_is(one: Make, wall: Make, single: Make, room: Any) -> None:
+def test_a_wall_reflects_only_where_it_is(make: Any) -> None:
     # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the
     # body passes x = 0.2.
-    body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
+    body = make.one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
     sheet = replace(
-        wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0)
+        make.wall("left"),
+        corner_m=(-1.4, 2.5, 0.0),
+        edge_u_m=(-1.0, 0.0, 0.0),
+        edge_v_m=(0.0, 0.0, 3.0),
     )
-    radar = single()
+    radar = make.single()
     chirps = np.arange(0, 1000, keyframe_step(radar, KEYFRAMES_S))
     found = []
-    for mirror in (sheet, wall("left")):
-        model = room(radar, body, mirror)
+    for mirror in (sheet, make.wall("left")):
+        model = make.room(radar, body, mirror)
         found.append(np.abs(model.echoes(chirps).amplitude[0, :, 0, 1]))
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     _, _, point = solve_specular_points(
@@ -98,13 +63,13 @@ def test_a_wall_reflects_only_where_it_is(one: Make, wall: Make, single: Make, r
     # On its way in it grows smoothly, chirp by chirp.
     first = int(chirps[np.flatnonzero(deep > 0)[0]])
     moments = np.arange(first - keyframe_step(radar, KEYFRAMES_S), first + 1)
-    onset = np.abs(room(radar, body, sheet).echoes(moments).amplitude[0, :, 0, 1])
+    onset = np.abs(make.room(radar, body, sheet).echoes(moments).amplitude[0, :, 0, 1])
     assert (np.diff(onset) > 0).all()
 
 
 @pytest.mark.parametrize("hides", [True, False])
 def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
-    hides: bool, backend: Backend, one: Make, wall: Make, single: Make, room: Any
+    hides: bool, backend: Backend, make: Any
 ) -> None:
     # A wardrobe between radar and body; the floor before it is free, but what goes over it meets
     # its side.
@@ -112,15 +77,15 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
     wardrobe = Furniture(
         name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place
     )
-    body = one(centre=(1.0, 1.0, 1.0))
-    given = single(), body, wall("floor"), wall("left")
+    body = make.one(centre=(1.0, 1.0, 1.0))
+    given = make.single(), body, make.wall("floor"), make.wall("left")
     options = {"furniture": (wardrobe,), "variant": backend.kind}
-    model = room(*given, **options)
+    model = make.room(*given, **options)
     seen = np.abs(model.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as
     # well.
     np.testing.assert_array_equal(seen, not hides)
-    second = room(*given, **options, order=2)
+    second = make.room(*given, **options, order=2)
     seen = np.abs(second.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     number = second.path_names.index("left > body > left")
     assert seen[number]
@@ -128,24 +93,24 @@ def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
 
 
 def test_furniture_occludes_by_the_backend_that_was_asked_for_also_where_no_part_does(
-    one: Make, wall: Make, single: Make, room: Any
+    make: Any,
 ) -> None:
     # `auto` traces nothing by itself where nothing comes near a line of sight.
-    model = room(single(), one(), wall("left"), fidelity="auto", variant="scalar")
+    model = make.room(
+        make.single(), make.one(), make.wall("left"), fidelity="auto", variant="scalar"
+    )
     assert model.variant == "scalar"
 
 
-def test_another_part_hides_a_leg_over_a_wall(
-    backend: Backend, wall: Make, single: Make, still: Make, room: Any
-) -> None:
+def test_another_part_hides_a_leg_over_a_wall(backend: Backend, make: Any) -> None:
     # A large sphere on the way from the left wall to the small one; both are free before the radar.
-    small, radar = np.array([0.0, 1.0, 1.0]), single()
+    small, radar = np.array([0.0, 1.0, 1.0]), make.single()
     image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
     large = small + 0.6 * unit(image - small)
-    body = still(
+    body = make.still(
         np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2)
     )
-    model = room(radar, body, wall("left"), variant=backend.kind)
+    model = make.room(radar, body, make.wall("left"), variant=backend.kind)
     echoes = model.echoes(np.arange(1))
     seen = {
         (name, part): bool(abs(echoes.amplitude[0, 0, 0, 2 * i + part]) > 0)
@@ -165,11 +130,14 @@ def test_another_part_hides_a_leg_over_a_wall(
 # -- leaving out -----------------------------------------------------------------------------------
 
 
-def test_what_stays_below_the_noise_is_left_out_and_told(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    given = single(frame_duration_s=0.1), one(), wall("floor", "wood", 0.02), wall("left")
-    model = room(*given)
+def test_what_stays_below_the_noise_is_left_out_and_told(make: Any) -> None:
+    given = (
+        make.single(frame_duration_s=0.1),
+        make.one(),
+        make.wall("floor", "wood", 0.02),
+        make.wall("left"),
+    )
+    model = make.room(*given)
     whole = model.echoes(np.arange(0, 100, 10))
     power = (np.abs(whole.amplitude) ** 2).mean(axis=(0, 1, 2))
     gain = 256 * 100
@@ -187,7 +155,7 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
     assert names["left > body"].why == ""
     assert names["body"].kept == ["part 0"]
     assert kept.length.shape[2] == 3
-    again = room(*given).echoes(np.arange(20))
+    again = make.room(*given).echoes(np.arange(20))
     stay = [0, model.path_names.index("body > left"), model.path_names.index("left > body")]
     # What is left is of conductors, and the same at all frequencies.
     assert len(kept.frequency) == 1
@@ -196,17 +164,15 @@ def test_what_stays_below_the_noise_is_left_out_and_told(
     np.testing.assert_array_equal(kept.length, again.length[..., stay])
 
 
-def test_the_weakest_are_left_out_as_far_as_is_tolerated(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    given = single(frame_duration_s=0.1), one(), wall("floor"), wall("left")
-    whole = room(*given)
+def test_the_weakest_are_left_out_as_far_as_is_tolerated(make: Any) -> None:
+    given = make.single(frame_duration_s=0.1), make.one(), make.wall("floor"), make.wall("left")
+    whole = make.room(*given)
     whole.prune(100, 0.0)
     echoes = whole.echoes(np.arange(0, 100, 4))
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
     weakest = int(np.argmin(np.where(echoes.bounces > 1, power, np.inf)))
     for share, count in ((0.5, 0), (1.5, 1)):
-        model = room(*given)
+        model = make.room(*given)
         summaries = model.prune(100, 0.0, share * power[weakest])
         assert model.left_out == count
         assert model.left_out_m2 == pytest.approx(count * power[weakest], rel=0.05)
@@ -220,16 +186,14 @@ def test_the_weakest_are_left_out_as_far_as_is_tolerated(
     assert set(model.echoes(np.arange(4)).path.tolist()) == {0}
 
 
-def test_without_noise_only_what_is_never_seen_is_left_out(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
+def test_without_noise_only_what_is_never_seen_is_left_out(make: Any) -> None:
     aside = replace(
-        wall("floor"),
+        make.wall("floor"),
         corner_m=(20.0, 20.0, 0.0),
         edge_u_m=(1.0, 0.0, 0.0),
         edge_v_m=(0.0, 1.0, 0.0),
     )
-    model = room(single(), one(), aside, wall("left"))
+    model = make.room(make.single(), make.one(), aside, make.wall("left"))
     summaries = {summary.path: summary for summary in model.prune(50, 0.0)}
     assert summaries["floor > body"].dropped == ["part 0"]
     assert summaries["floor > body"].power_m2 == 0
@@ -250,24 +214,20 @@ def test_without_noise_only_what_is_never_seen_is_left_out(
         ({"materials": ["wood"]}, "allowed: perfect-conductor, skin"),
     ],
 )
-def test_what_has_no_meaning_is_refused(
-    given: dict[str, object], message: str, one: Make, wall: Make, single: Make, room: Any
-) -> None:
+def test_what_has_no_meaning_is_refused(given: dict[str, object], message: str, make: Any) -> None:
     with pytest.raises(InputError, match=message) as error:
-        room(single(), one(), wall("floor"), **given)
+        make.room(make.single(), make.one(), make.wall("floor"), **given)
     assert "\n" not in str(error.value)
 
 
-def test_direct_echoes_and_ghosts_follow_from_one_formula(
-    one: Make, wall: Make, single: Make
-) -> None:
+def test_direct_echoes_and_ghosts_follow_from_one_formula(make: Any) -> None:
     class Double(Analytic):
         def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
             length, amplitude = super().conductor_echo(at)
             return length + 1, 2 * amplitude
 
-    body, radar, chirps = one(), single(), np.arange(5)
-    for walls in ((), (wall("left"),)):
+    body, radar, chirps = make.one(), make.single(), np.arange(5)
+    for walls in ((), (make.wall("left"),)):
         usual, double = (
             RoomModel(
                 partial(kind, body=body),
@@ -282,13 +242,11 @@ def test_direct_echoes_and_ghosts_follow_from_one_formula(
         np.testing.assert_allclose(double.amplitude, 2 * usual.amplitude, rtol=1e-6)
 
 
-def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
+def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(make: Any) -> None:
     # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is
     # not seen.
-    walls = (wall("floor", "concrete", 0.2), wall("left", "plasterboard", 0.005))
-    model = room(single(), one(), *walls)
+    walls = (make.wall("floor", "concrete", 0.2), make.wall("left", "plasterboard", 0.005))
+    model = make.room(make.single(), make.one(), *walls)
     amplitude = model.echoes(np.arange(3)).amplitude
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
@@ -300,33 +258,10 @@ def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
     assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
 
 
-@pytest.mark.parametrize("name", ["perfect-conductor", "skin"])
-def test_the_person_alone_is_specular_in_free_space(
-    name: str, one: Make, wall: Make, room: Any
-) -> None:
-    body, radar, chirps = (
-        one(velocity=(-1.0, 0.0, 0.0)),
-        Radar.preset("paper-12ghz"),
-        np.arange(100),
-    )
-    model = room(radar, body, wall("floor", "concrete"), materials=[name])
-    free = build_model("specular", radar, body, materials=[name]).echoes(chirps)
-    alone = model.person.echoes(chirps)
-    np.testing.assert_array_equal(alone.length, free.length)
-    np.testing.assert_array_equal(alone.amplitude, free.amplitude)
-    # Its direct echo in the room is the same, for the floor is beside it.
-    direct = model.echoes(chirps).amplitude[1, ..., 0]
-    # In the room the reflection of skin follows the sweep and the ends of the lines, here it is
-    # that of the middle.
-    np.testing.assert_allclose(direct, free.amplitude[0, ..., 0], rtol=2e-3)
-
-
-def test_skin_over_a_wall_is_weaker_by_its_reflection(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    given = single(), one((0.2, 0.2, 0.2)), wall("left")
+def test_skin_over_a_wall_is_weaker_by_its_reflection(make: Any) -> None:
+    given = make.single(), make.one((0.2, 0.2, 0.2)), make.wall("left")
     metal, skin = (
-        room(*given, materials=[name]).echoes(np.arange(2))
+        make.room(*given, materials=[name]).echoes(np.arange(2))
         for name in ("perfect-conductor", "skin")
     )
     # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand,
@@ -343,10 +278,8 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(
     assert ratio == pytest.approx(np.conj((root - cosine) / (root + cosine)), rel=0.01)
 
 
-def test_direct_echoes_of_a_conductor_need_one_frequency(
-    one: Make, wall: Make, single: Make, room: Any
-) -> None:
-    model = room(single(), one(), wall("left", "brick"))
+def test_direct_echoes_of_a_conductor_need_one_frequency(make: Any) -> None:
+    model = make.room(make.single(), make.one(), make.wall("left", "brick"))
     chirps = np.arange(40)
     whole, direct = model.echoes(chirps), model.without_ghosts().echoes(chirps)
     assert len(whole.frequency) > 1

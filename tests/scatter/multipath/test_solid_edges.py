@@ -1,6 +1,5 @@
 """Edges of furniture and of moving objects against the knife edge and Kirchhoff's integral."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,6 @@ from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
-Make = Callable[..., Any]
 
 WAVE = SPEED_OF_LIGHT_MPS
 TILT = Rotation.from_euler("zyx", [20, 15, 30], degrees=True).as_matrix()
@@ -83,9 +81,9 @@ def past(sheet: trimesh.Trimesh, wavelength_m: float, source: Array, target: Arr
     ],
 )
 def test_a_sphere_behind_a_board_returns_over_its_edge(
-    fidelity: str, moves: bool, carrier_hz: float, one: Make, tmp_path: Path
+    fidelity: str, moves: bool, carrier_hz: float, make: Any, tmp_path: Path
 ) -> None:
-    radar, body = narrow(carrier_hz), one((0.1, 0.1, 0.1), (4.0, 0.0, 1.0))
+    radar, body = narrow(carrier_hz), make.one((0.1, 0.1, 0.1), (4.0, 0.0, 1.0))
     chirp = np.zeros(1, dtype=np.int64)
     bare = build_model(fidelity, radar, body).echoes(chirp).amplitude
     for offset_m in (-0.30, -0.15, -0.05, 0.02, 0.05, 0.10, 0.15, 0.30):
@@ -136,14 +134,14 @@ def test_two_boxes_that_touch_are_one(tmp_path: Path) -> None:
 
 
 def test_a_box_on_the_floor_sends_nothing_over_the_edges_that_it_stands_on(
-    wall: Make, tmp_path: Path
+    make: Any, tmp_path: Path
 ) -> None:
     radar, origin = narrow(12e9), np.array([0.0, 0.0, 1.0])
     targets = np.linspace([4.0, -1.5, 0.05], [4.0, 1.5, 0.05], 60)
     stands, mirrored = (
         piece(box((2.0, -0.5, low), (2.3, 0.5, 1.5)), tmp_path) for low in (0.0, -1.5)
     )
-    got = left(Scene(walls=(wall("floor"),), furniture=(stands,)), radar, origin, targets)
+    got = left(Scene(walls=(make.wall("floor"),), furniture=(stands,)), radar, origin, targets)
     exact = left(Scene(furniture=(mirrored,)), radar, origin, targets)
     np.testing.assert_allclose(got, exact, rtol=0, atol=1e-6)
 

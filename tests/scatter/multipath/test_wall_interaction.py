@@ -12,10 +12,10 @@ from scipy.optimize import minimize
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter.common.polarization import apply_te_tm
 from rtradar.scatter.multipath import image_paths
-from rtradar.scatter.multipath import wall_interaction as rw
-from rtradar.scatter.multipath.slab_series import POLARIZATIONS, WHOLE, Term, whole_walls
+from rtradar.scatter.multipath import slabs as rw
+from rtradar.scatter.multipath.slabs import POLARIZATIONS, WHOLE, Term, whole_walls
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scene import Scene, Wall, material, own_material, slab
+from rtradar.scene import Scene, Wall, material, own_material
 
 reflect, transmit = (partial(rw.after_slab, term=term) for term in WHOLE)
 
@@ -151,30 +151,6 @@ def test_a_wall_without_loss_keeps_the_energy(seed: int) -> None:
     ]
     powers.append((np.abs(transmit(wall, field, direction, [12e9, 14e9])) ** 2).sum(axis=-1))
     np.testing.assert_allclose(powers[0] + powers[2], powers[1], rtol=1e-12)
-
-
-def test_te_and_tm_take_their_own_coefficients() -> None:
-    # By hand: the wave goes along x and down onto a floor; TE is y, TM lies in x and z.
-    floor = Wall(
-        name="floor",
-        corner_m=(0, 0, 0),
-        edge_u_m=(5, 0, 0),
-        edge_v_m=(0, 5, 0),
-        material=material("concrete"),
-        thickness_m=0.05,
-    )
-    down = np.array([0.8, 0, -0.6])
-    te, tm = (slab(floor.material.eta(14e9), 0.05, 14e9, 0.6, kind) for kind in ("te", "tm"))
-    np.testing.assert_allclose(
-        reflect(floor, np.array([0, 1, 0]), down, [14e9])[0], [0, te[0], 0], atol=1e-12
-    )
-    # e_TE x k, with e_TE = k x n = -y: down, (0.6, 0, 0.8); up, (-0.6, 0, 0.8).
-    e_down, e_up = np.array([0.6, 0, 0.8]), np.array([-0.6, 0, 0.8])
-    np.testing.assert_allclose(reflect(floor, e_down, down, [14e9])[0], tm[0] * e_up, atol=1e-12)
-    air = np.exp(2j * np.pi * 14e9 / SPEED_OF_LIGHT_MPS * 0.05 * 0.6)
-    np.testing.assert_allclose(
-        transmit(floor, e_down, down, [14e9])[0], tm[1] * air * e_down, atol=1e-12
-    )
 
 
 def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:

@@ -49,7 +49,7 @@ def _valid(leg: Any, antenna: np.ndarray, points: np.ndarray) -> bool:
 
 
 def test_over_a_wall_that_is_not_parallel_to_others_an_echo_is_that_of_a_turned_radar(
-    one: Any, room: Any
+    make: Any,
 ) -> None:
     # A mirror turned by 25 degrees about the vertical: v stays v. Its image of the radar by hand.
     turn = np.radians(25)
@@ -67,8 +67,8 @@ def test_over_a_wall_that_is_not_parallel_to_others_an_echo_is_that_of_a_turned_
         thickness_m=0.01,
     )
     np.testing.assert_allclose(mirror.normal, normal, atol=1e-12)
-    body = one((0.1, 0.1, 0.1), (0.0, 0.3, 1.2))
-    model = room(RADAR, body, mirror, order=2)
+    body = make.one((0.1, 0.1, 0.1), (0.0, 0.3, 1.2))
+    model = make.room(RADAR, body, mirror, order=2)
     echoes = model.echoes(np.arange(1))
     index = model.path_names.index("leaning > body > leaning")
     middle = np.array(RADAR.position_m)
@@ -81,14 +81,14 @@ def test_over_a_wall_that_is_not_parallel_to_others_an_echo_is_that_of_a_turned_
 
 @pytest.mark.parametrize(("aside_m", "through"), [(0.0, True), (2.0, False)])
 def test_a_person_is_seen_through_a_doorway_and_behind_the_wall_beside_it(
-    aside_m: float, through: bool, one: Any, room: Any
+    aside_m: float, through: bool, make: Any
 ) -> None:
     # The leg from y = 1 to 0.6 meets the wall at 0.8 m, in the middle of a doorway 1.2 m wide.
     doorway = replace(PARTITION, openings=((20.2 - aside_m, 19.0, 1.2, 3.0),))
-    body = one((0.1, 0.1, 0.1), (0.0, 0.6, 1.0))
+    body = make.one((0.1, 0.1, 0.1), (0.0, 0.6, 1.0))
     scenes = (), (PARTITION,), (doorway,)
     free, behind, got = (
-        room(RADAR, body, *walls, order=0).echoes(np.arange(1)) for walls in scenes
+        make.room(RADAR, body, *walls, order=0).echoes(np.arange(1)) for walls in scenes
     )
     expected = free if through else behind
     own = np.abs(got.amplitude[..., 0, :]).max(axis=0)

@@ -19,14 +19,12 @@ from numpy.typing import NDArray
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import SHEET_BOUNCES
-from rtradar.scatter.common.echo_sets import together
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.interpolation import together
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.multipath.image_paths import WallPath
-from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
-from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.tubes import MeshGrid
-from rtradar.scatter.rigid.echoes import PolynomialsInTime, RigidEchoes, far_apart
+from rtradar.scatter.common.poses import KeyframeCache
+from rtradar.scatter.ray_tubes import Footprints, Shooter, exits, radiate
+from rtradar.scatter.rigid_echoes import PolynomialsInTime, RigidEchoes, far_apart
+from rtradar.scatter.target import MeshGrid
 from rtradar.scene import Object
 from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.trace.occluders import Occluders
@@ -35,22 +33,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _KEPT_KNOTS, _PASSING = 128, 32
-
-
-def rigid_echoes(
-    radar: Radar,
-    moving: Object,
-    duration_s: float,
-    past: Occluders | None,
-    *,
-    path: WallPath,
-    **options: Any,
-) -> RigidEchoes:
-    """Return the echoes of a moving object over a path; rays follow several bounces on a sheet."""
-    given = radar, moving, duration_s
-    if past is None or moving.shape.closed or path.order:
-        return RigidEchoes(*given, past, path=path, **options)
-    return RigidSheet(*given, past, path=path, **options)
 
 
 class RigidSheet(RigidEchoes):

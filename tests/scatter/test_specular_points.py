@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar import rcs
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_points import solve_specular_points
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -131,20 +130,6 @@ def test_neither_the_order_of_antennas_nor_place_turn_and_size_matter(
         # The last step of the search is at most 1e-7 of the least semi-axis.
         np.testing.assert_allclose(there[1], here[1], rtol=1e-5, atol=1e-9)
     np.testing.assert_allclose(moved[2], turn.apply(here[2]) + shift, atol=1e-6)
-
-
-@given(seeds)
-def test_far_away_it_is_the_cross_section_and_no_turn_of_the_polarisation(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    axes = rng.uniform(0.02, 0.5, 3)
-    sight = unit(rng.normal(size=(10, 3)))
-    section = rcs.ellipsoid(*axes, np.arccos(sight[:, 2]), np.arctan2(sight[:, 1], sight[:, 0]))
-    for polarization in ("v", "h"):
-        _, amplitude, _ = solve(
-            1e6 * sight, 1e6 * sight, axes, polarization=polarization, spreading=False
-        )
-        # 4.3 (R1 + R2) / R dB is left of the near field; R1 is at most 0.5^2 / 0.02 m.
-        np.testing.assert_allclose(amplitude**2, section, rtol=1e-4)
 
 
 def test_the_nearer_the_antenna_the_weaker_a_flat_side() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rtradar.scatter.common.keyframes import KeyframeCache
+from rtradar.scatter.common.poses import KeyframeCache
 
 
 def test_a_second_pass_from_the_start_finds_the_first_ones_again() -> None:

@@ -10,7 +10,7 @@ An object is seen over some lengths, one echo each, about that over its point of
 facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
 phases change slowly against those at the point of reference, the field is computed at knots in
 time for all pairs of antennas, with polynomials in between; else at every chirp. A sheet reflects
-several times, too (`RigidSheet`, in `rtradar.scatter.rigid.bounces`).
+several times, too (`RigidSheet`, in `rtradar.scatter.rigid_sheets`).
 """
 
 from __future__ import annotations
@@ -36,13 +36,11 @@ from rtradar.kernels.scatter.facets_by_length import (
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import flat_edge, small_facets
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.scatter.common.poses import antennas_in_use
+from rtradar.scatter.common.poses import KeyframeCache, antennas_in_use
 from rtradar.scatter.multipath.image_paths import WallPath, images
-from rtradar.scatter.multipath.slab_series import room_series
+from rtradar.scatter.multipath.slabs import WallResponse, room_series
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scatter.multipath.wall_interaction import WallResponse
-from rtradar.scatter.rigid.legs import RigidLegs
+from rtradar.scatter.rigid_legs import RigidLegs
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Object, Wall
 from rtradar.system.threads import thread_map
@@ -117,7 +115,8 @@ class RigidEchoes:
             walls, radar, most_nodes=_NODES, enough=_WALL_ERROR, bounces=path.order
         )
         response = WallResponse(WallEdges.of(walls, radar), series.walls, self.frequency)
-        self._legs = RigidLegs(radar.at(0.0), path, response, past)
+        self._meets = path, response, past
+        self._legs = RigidLegs(radar.at(0.0), *self._meets)
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
@@ -310,7 +309,8 @@ class RigidEchoes:
         """Legs at a time, with the middles [m] and the normals (facet, 3) of facets, world."""
         facets, ((rotation,), (at,)) = self._facets, self._pose(np.array([time_s]))
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
-        return self._legs.before(self._radar.at(time_s)), middles, facets.normals @ rotation.T
+        legs = RigidLegs(self._radar.at(time_s), *self._meets)
+        return legs, middles, facets.normals @ rotation.T
 
 
 def far_apart(chirps: Indices) -> bool:

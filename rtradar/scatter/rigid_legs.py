@@ -18,13 +18,14 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
 from rtradar.scatter.common.polarization import (
+    POLARIZATIONS,
     Polarization,
     antenna_field,
     bisector,
     unit,
 )
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
-from rtradar.scatter.multipath.wall_interaction import WallResponse
+from rtradar.scatter.multipath.slabs import Carried, WallResponse
 from rtradar.scene import Material, Object, reflection
 from rtradar.trace.occluders import Occluders
 
@@ -59,12 +60,6 @@ class RigidLegs:
             self._sends[:, None], images(path.out, self._real), images(path.back, self._real)
         )
 
-    def before(self, radar: Radar) -> RigidLegs:
-        """Return the legs of another radar at rest."""
-        if radar is self._radar:
-            return self
-        return RigidLegs(radar, self.path, self._walls, self._past)
-
     def seen(
         self, time_s: float, points: Array, asked: Bools, *, but: Object | None = None
     ) -> Bools:
@@ -91,11 +86,11 @@ class RigidLegs:
         A leg adds none where no wave comes to the point.
         """
         total = 0.0
-        for leg, antenna in self._sides:
-            waves, _ = self._waves(leg, antenna, point[None])
-            powers = [float((np.abs(field) ** 2).sum()) for _, field in waves]
+        for side in range(2):
+            waves = self._carried(side, point[None]).waves
+            powers = [float((np.abs(wave.field) ** 2).sum()) for wave in waves]
             if waves:
-                total += float(waves[int(np.argmax(powers))][0][0])
+                total += float(waves[int(np.argmax(powers))].extra_m[0])
         return total
 
     def factor(self, points: Array, normals: Array, made_of: Material, longer_m: float) -> Field:
@@ -104,22 +99,21 @@ class RigidLegs:
         ``points`` are their middles and ``normals (facet, 3)`` unit vectors, world [m]. The phase
         of a length ``longer_m`` is taken out; waves that come much earlier or later are left out.
         """
-        (sent, going), (received, coming) = (
-            self._waves(leg, antenna, points) for leg, antenna in self._sides
-        )
-        normal = bisector(-going, -coming)
+        out, back = (self._carried(side, points) for side in range(2))
+        normal = bisector(-out.ways[-1], -back.ways[-1])
         radar = self._radar
         k = 2 * np.pi * self._walls.frequency[:, None] / SPEED_OF_LIGHT_MPS
         apart = _TOGETHER * SPEED_OF_LIGHT_MPS / radar.bandwidth_hz
         total = np.zeros((len(k), len(points)), dtype=np.complex128)
-        for extra_out, field in sent:
+        for sent in out.waves:
+            field = sent.field
             turned = 2 * np.sum(field * normal, axis=-1, keepdims=True) * normal - field
-            for extra_back, own in received:
-                extra = extra_out + extra_back - longer_m
+            for received in back.waves:
+                extra = sent.extra_m + received.extra_m - longer_m
                 near = np.abs(extra) <= apart
                 # A conductor at normal incidence counts as +1: that the field is reversed is in
                 # the sign.
-                total -= near * np.exp(-1j * k * extra) * np.sum(own * turned, axis=-1)
+                total -= near * np.exp(-1j * k * extra) * np.sum(received.field * turned, axis=-1)
         if made_of.conducts:
             return total
         way = -normal
@@ -127,17 +121,12 @@ class RigidLegs:
         across = unit(np.cross(way, normals))
         te = np.sum(antenna_field(way, self._polarization) * across, axis=-1) ** 2
         eta = made_of.eta(np.array([radar.centre_frequency_hz]))
-        in_te, in_tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+        in_te, in_tm = (reflection(eta, cosine, kind) for kind in POLARIZATIONS)
         # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
         return np.asarray(total * (in_tm - te * (in_te + in_tm)))
 
-    def _waves(
-        self, leg: Leg, antenna: Antenna | None, points: Array
-    ) -> tuple[list[tuple[Array, Field]], Array]:
-        """Waves from the array's middle to points: extra lengths and fields, and where they go.
-
-        Lengths (point,) [m], fields (node, point, 3), and the direction of arrival (point, 3).
-        """
+    def _carried(self, side: int, points: Array) -> Carried:
+        """Carry the field of the array's middle over one of both legs to points (point, 3) [m]."""
+        leg, antenna = self._sides[side]
         middle = np.array(self._radar.position_m)
-        found = self._walls.carried(leg, middle, points, antenna, self._polarization)
-        return [(wave.extra_m, wave.field) for wave in found.waves], found.ways[-1]
+        return self._walls.carried(leg, middle, points, antenna, self._polarization)

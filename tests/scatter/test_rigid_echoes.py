@@ -13,11 +13,11 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
+from rtradar.scatter import rigid_sheets
 from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.multipath.image_paths import wall_paths
 from rtradar.scatter.people_and_objects import build_model_of_all
-from rtradar.scatter.rigid import bounces
-from rtradar.scatter.rigid.echoes import PolynomialsInTime, RigidEchoes
+from rtradar.scatter.rigid_echoes import PolynomialsInTime, RigidEchoes
 from rtradar.scene import Wall, material, reflection, slab
 
 RADAR = dataclasses.replace(
@@ -153,8 +153,8 @@ def test_a_corner_reflector_on_a_cart_returns_three_bounces() -> None:
 def test_a_pass_may_need_more_knots_of_bounces_than_are_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(bounces, "_KEPT_KNOTS", 2)
-    monkeypatch.setattr(bounces, "_PASSING", 1)
+    monkeypatch.setattr(rigid_sheets, "_KEPT_KNOTS", 2)
+    monkeypatch.setattr(rigid_sheets, "_PASSING", 1)
     radar = dataclasses.replace(RADAR, tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     turning = rt.Turning(rate_hz=0.5)
     corner = rt.Object(

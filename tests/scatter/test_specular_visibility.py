@@ -8,13 +8,10 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter import build_model
-from rtradar.scatter.common.keyframes import keyframe_step
-from rtradar.scatter.common.poses import ChirpPoses
-from rtradar.scatter.specular_point import visibility
-from rtradar.scatter.specular_point.visibility import (
+from rtradar.scatter import build_model, specular_points
+from rtradar.scatter.common.poses import keyframe_step
+from rtradar.scatter.specular_points import (
     SpecularVisibility,
-    trace_keyframe,
     unobstructed,
 )
 from rtradar.trace.backends.backend import Backend, use
@@ -74,18 +71,6 @@ def test_points_behind_another_part_are_hidden_on_either_leg(backend: Backend) -
     # The curtain's own point faces only the first antenna, but only other parts count.
     np.testing.assert_array_equal(seen[:, 0], [False, False, True])
     np.testing.assert_array_equal(seen[:, 1], [True, True, True])
-
-
-def test_a_keyframe_knows_visibility_and_a_specular_point_of_each_part(backend: Backend) -> None:
-    radar, body = small_radar(), Curtain(0.0)
-    poses = body.at(np.zeros(radar.n_tx))
-    at = ChirpPoses(np.arange(2), radar.tx, radar.rx[radar.rx_of_tx], *poses)
-    keyframe = trace_keyframe(BodyTracer(use(backend), body.semi_axes), at)
-    assert keyframe.visible.shape == (2, 2, 2)
-    np.testing.assert_array_equal(keyframe.visible[..., 0], False)
-    np.testing.assert_array_equal(keyframe.visible[..., 1], True)
-    # On the side that faces the radar, whose antennas are 5 cm apart.
-    np.testing.assert_allclose(keyframe.start[1], [-0.3, 0, 0], atol=0.01)
 
 
 def test_a_fade_is_smooth_monotone_and_ends_at_the_keyframes(backend: Backend) -> None:
@@ -161,14 +146,14 @@ def test_keyframes_are_the_same_where_only_a_few_are_remembered(
 ) -> None:
     radar, body = small_radar(), Curtain(3.0)
     whole = weights(backend, radar, body, np.arange(150, 260))
-    monkeypatch.setattr(visibility, "_KEPT_KEYFRAMES", 4)
-    traced = []
+    monkeypatch.setattr(specular_points, "_KEPT_KEYFRAMES", 4)
+    traced, trace = [], SpecularVisibility.keyframe
 
-    def counted(tracer: BodyTracer, at: ChirpPoses) -> visibility.Keyframe:
-        traced.append(at.centres[0, 1, 1])
-        return trace_keyframe(tracer, at)
+    def counted(own: SpecularVisibility, chirp: int) -> specular_points.Keyframe:
+        traced.append(chirp)
+        return trace(own, chirp)
 
-    monkeypatch.setattr(visibility, "trace_keyframe", counted)
+    monkeypatch.setattr(SpecularVisibility, "keyframe", counted)
     few = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
     keyframes = np.arange(150, 261, 10)
     few.at(keyframes)

@@ -15,7 +15,7 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.models.specular import Specular
-from rtradar.scatter.multipath.slab_series import Term, room_series
+from rtradar.scatter.multipath.slabs import Term, room_series
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material, slab
 from rtradar.scene.slab import slab_passes
 
@@ -131,14 +131,15 @@ def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "thickness"), [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125)]
+    ("name", "thickness"),
+    [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125), ("plasterboard", 0.003)],
 )
 def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
-    name: str, thickness: float, one: Any, room: Any
+    name: str, thickness: float, make: Any
 ) -> None:
-    body, radar = one(BALL, (0.0, 0.0, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+    body, radar = make.one(BALL, (0.0, 0.0, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     wall = pane(name, thickness)
-    behind = room(radar, body, wall, order=0).echoes(np.arange(1))
+    behind = make.room(radar, body, wall, order=0).echoes(np.arange(1))
     free = Specular(radar, body).echoes(np.arange(1))
     way = np.array([4.0, -1.0, 0.0]) - 0.0
     cosine = abs(way[0]) / np.linalg.norm(way)
@@ -153,11 +154,9 @@ def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
     assert error < 0.02
 
 
-def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
-    one: Any, room: Any
-) -> None:
-    body = one(BALL, (0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
-    model = room(PRESET, body, pane("brick", 0.24), order=0)
+def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(make: Any) -> None:
+    body = make.one(BALL, (0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
+    model = make.room(PRESET, body, pane("brick", 0.24), order=0)
     # Between two keyframes, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
     echoes, free = model.echoes(chirps), model.person.echoes(chirps)
@@ -175,11 +174,11 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
     assert np.ptp(farther) > 2e-3
 
 
-def test_one_pruned_echo_list_for_all_of_a_capture(one: Any, room: Any) -> None:
+def test_one_pruned_echo_list_for_all_of_a_capture(make: Any) -> None:
     # It walks out from behind a partition of brick.
     partition = replace(pane("brick", 0.1), corner_m=(-2.0, -3.0, -20.0), edge_v_m=(0.0, 3.5, 0.0))
-    body = one(BALL, (0.0, -1.2, 1.0), velocity=(0.0, 3.0, 0.0))
-    model = room(PRESET, body, partition, order=1)
+    body = make.one(BALL, (0.0, -1.2, 1.0), velocity=(0.0, 3.0, 0.0))
+    model = make.room(PRESET, body, partition, order=1)
     n_chirps = int(0.9 / PRESET.chirp_duration_s)
     (direct, *_) = model.prune(n_chirps, 0.0)
     assert direct.kept == ["part 0"]
@@ -197,13 +196,11 @@ def test_one_pruned_echo_list_for_all_of_a_capture(one: Any, room: Any) -> None:
 
 
 @pytest.mark.parametrize(("name", "thickness"), [("brick", 0.11), ("plasterboard", 0.025)])
-def test_ghosts_off_a_wall_whose_back_answers(
-    name: str, thickness: float, one: Any, room: Any
-) -> None:
-    body, radar = one(BALL, (2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+def test_ghosts_off_a_wall_whose_back_answers(name: str, thickness: float, make: Any) -> None:
+    body, radar = make.one(BALL, (2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     found = {}
     for made, depth in ((name, thickness), ("perfect-conductor", 0.1)):
-        model = room(radar, body, pane(made, depth, beside=True), order=2)
+        model = make.room(radar, body, pane(made, depth, beside=True), order=2)
         echoes = model.echoes(np.arange(1))
         for path in ("side > body", "side > body > side"):
             own = np.array(model.path_names)[echoes.path] == path

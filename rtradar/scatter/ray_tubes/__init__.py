@@ -1,1 +1,0 @@
-"""Shooting and bouncing rays: tubes of rays, their bounces and their footprints."""

@@ -1,1 +1,0 @@
-"""Rigid objects that move: their facets, legs, and bounces on sheets."""

@@ -1,1 +1,0 @@
-"""Specular points of ellipsoids: where they are, and which of them are visible."""
