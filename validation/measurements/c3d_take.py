@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.motion.formats.c3d import LONGEST_GAP_S, bridged, read_markers
-from rtradar.motion.formats.markers import NEEDED
+from rtradar.motion.formats.markers import LONGEST_GAP_S, NEEDED, bridged, read_markers
 from rtradar.motion.skeleton import NODES, to_nodes
 from rtradar.pipeline.compared import chamfer
 from rtradar.validate.rows import Row, judged, main, reported

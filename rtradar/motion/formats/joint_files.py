@@ -35,7 +35,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.formats.text_file import TextFile
-from rtradar.motion.names import plain
+from rtradar.motion.skeleton import plain
 from rtradar.recordings import UPWARD, Finding
 from rtradar.system.checks import brief, check_number
 from rtradar.system.files import read_arrays

@@ -1,7 +1,7 @@
 """Recordings of joint positions, such as cameras with depth and body models give.
 
 What is measured joint by joint is made the motion of a rigid skeleton: the 22 nodes are taken from
-the joints (`rtradar.motion.names`), gaps are bridged, joints of cameras pass a low-pass, all is
+the joints (`rtradar.motion.skeleton`), gaps are bridged, joints of cameras pass a low-pass, all is
 sampled evenly, heads and feet are completed, the floor is found, and the bones are given their
 median lengths (`markers.rigid_motion`).
 
@@ -34,9 +34,8 @@ from rtradar.motion.formats.joint_files import (
     read_csv,
     read_npz,
 )
-from rtradar.motion.formats.markers import level_axes, rigid_motion, runs, unit
+from rtradar.motion.formats.skeletons import level_axes, rigid_motion, runs, unit
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
     settled_nodes,
     stature_of,
@@ -47,8 +46,11 @@ from rtradar.motion.skeleton import (
     MINIMUM_PART_M,
     NODE_PARENTS,
     NODES,
+    Convention,
     middle,
+    node_positions,
     of_node,
+    recognise,
 )
 from rtradar.recordings import Finding, rate_of, tall
 

@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import load_motion
-from rtradar.motion.formats.c3d import LONGEST_GAP_S, _Bounded, read_markers
-from rtradar.motion.formats.markers import NEEDED
+from rtradar.motion.formats.markers import LONGEST_GAP_S, NEEDED, _Bounded, read_markers
 from rtradar.motion.skeleton import NODES, to_nodes
 
 FRAMES, RATE = 90, 120.0

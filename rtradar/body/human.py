@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body.human.fit import KEYPOINT_NODES, Fit, fit_to
-from rtradar.body.human.shape import data_folder
+from rtradar.body.human_shape import KEYPOINT_NODES, Fit, data_folder, fit_to
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.motion import Motion
