@@ -260,8 +260,21 @@ class Array(Waveform):
 
     @cached_property
     def patterns(self) -> tuple[LinePattern, LinePattern]:
-        """Far field of all virtual elements over the sines of azimuth and of elevation."""
-        y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
+        """Far field of all virtual elements over the sines of azimuth and of elevation.
+
+        Each line of a cross is taken for one without gaps, whose angles are those of
+        (:eq:`angle-axis`), and both for the longer one.
+        """
+        if not self.is_cross:
+            y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
+            return y, z
+        spacing = self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+        counts = self.tx_y * self.rx_y, self.tx_z * self.rx_z
+        width = min(180.0, math.degrees(0.886 / (max(*counts, 1) * spacing)))
+        y, z = (
+            LinePattern(count > 1, 1 / spacing, -math.inf, width if count > 1 else 180.0)
+            for count in counts
+        )
         return y, z
 
     @property
@@ -271,31 +284,22 @@ class Array(Waveform):
         Of a cross it is asin(lambda / 2d) (:eq:`angle-axis`), of a listed array half the sine of
         the first grating lobe, `LinePattern.grating_sine`.
         """
-        return self._cross_angle_deg if self.is_cross else self.patterns[0].max_angle_deg
+        return self.patterns[0].max_angle_deg
 
     @property
     def max_elevation_deg(self) -> float:
         """Elevation up to which no other direction looks alike [deg]; see `max_azimuth_deg`."""
-        return self._cross_angle_deg if self.is_cross else self.patterns[1].max_angle_deg
+        return self.patterns[1].max_angle_deg
 
     @property
     def max_angle_deg(self) -> float:
         """Unambiguous angle, the larger of those of azimuth and elevation [deg]."""
-        axes = self.max_azimuth_deg, self.max_elevation_deg
-        if self.is_cross:
-            return axes[0]
-        measured = [most for most, there in zip(axes, self.measures, strict=True) if there]
-        return max(measured, default=90.0)
-
-    @property
-    def _cross_angle_deg(self) -> float:
-        return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
+        measured = [one.max_angle_deg for one in self.patterns if one.wide]
+        return max(measured, default=self.max_azimuth_deg)
 
     @property
     def measures(self) -> tuple[bool, bool]:
         """Whether the radar measures azimuth, and whether it measures elevation."""
-        if self.is_cross:
-            return self.tx_y * self.rx_y > 1, self.tx_z * self.rx_z > 1
         y, z = self.patterns
         return y.wide, z.wide
 
@@ -307,31 +311,17 @@ class Array(Waveform):
         beam widths. Where the spacings of Tx and Rx of a cross do not fill a line without gaps, it
         is the width for a line of as many elements.
         """
-        if not self.is_cross:
-            return min(self.azimuth_resolution_deg, self.elevation_resolution_deg)
-        elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
-        if elements < 2:
-            return 180.0
-        return min(180.0, math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths)))
+        return min(self.azimuth_resolution_deg, self.elevation_resolution_deg)
 
     @property
     def azimuth_resolution_deg(self) -> float:
         """Half-power beam width in azimuth at broadside [deg]; 180 where it is not measured."""
-        return self._resolution_deg(0)
+        return self.patterns[0].width_deg
 
     @property
     def elevation_resolution_deg(self) -> float:
         """Half-power beam width in elevation at broadside [deg]; 180 where it is not measured."""
-        return self._resolution_deg(1)
-
-    def _resolution_deg(self, axis: int) -> float:
-        if not self.is_cross:
-            return self.patterns[axis].width_deg
-        return self.angle_resolution_deg if self.measures[axis] else 180.0
-
-    @property
-    def _virtual_spacing_wavelengths(self) -> float:
-        return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+        return self.patterns[1].width_deg
 
 
 def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from rtradar.radar.radar import Radar
 
 
+_ANGLES = ("azimuth", "elevation")
+
+
 def brief_rows(radar: Radar) -> dict[str, str]:
     """Return the rows of a radar's ``repr``."""
     settings, limits = settings_rows(radar), limit_rows(radar)
@@ -82,27 +85,21 @@ def settings_rows(radar: Radar) -> dict[str, str]:
 
 def limit_rows(radar: Radar) -> dict[str, str]:
     """Return the limits that follow from the settings, as texts with units by their labels."""
-    axes = " and ".join(measured_angles(radar))
-    beam, most = f"{radar.angle_resolution_deg:.3g}°", f"±{radar.max_angle_deg:.3g}° in {axes}"
-    gratings = {}
-    if not radar.is_cross:
-        own = {
-            "azimuth": (radar.max_azimuth_deg, radar.azimuth_resolution_deg),
-            "elevation": (radar.max_elevation_deg, radar.elevation_resolution_deg),
-        }
-        measured = [(name, *own[name]) for name in measured_angles(radar)]
-        most = ", ".join(f"±{angle:.3g}° in {name}" for name, angle, _ in measured)
-        beam = " and ".join(f"{width:.3g}°" for _, _, width in measured)
-        if lobes := _grating_lobes(radar):
-            gratings = {"Grating lobes": lobes}
+    measured = [(name, one) for name, one in zip(_ANGLES, radar.patterns, strict=True) if one.wide]
+    most: dict[str, list[str]] = {}
+    for name, one in measured:
+        most.setdefault(f"±{one.max_angle_deg:.3g}°", []).append(name)
+    reach = ", ".join(f"{angle} in {' and '.join(names)}" for angle, names in most.items())
+    beam = " and ".join(dict.fromkeys(f"{one.width_deg:.3g}°" for _, one in measured))
+    lobes = _grating_lobes(radar)
     return {
         "Maximum range": f"{radar.max_range_m:.4g} m",
         "Range resolution": f"{100 * radar.range_bin_m:.4g} cm",
         "Maximum velocity": f"±{radar.max_velocity_mps:.4g} m/s",
         "Velocity resolution": f"{radar.velocity_bin_mps:.3g} m/s",
-        "Maximum angle": most if axes else "not measured",
-        "Angular resolution": f"{beam} at boresight" if axes else "not measured",
-        **gratings,
+        "Maximum angle": reach or "not measured",
+        "Angular resolution": f"{beam} at boresight" if beam else "not measured",
+        **({"Grating lobes": lobes} if lobes else {}),
         "Wavelength": f"{quantity(radar.wavelength_m, 'm')} at the sweep centre",
         "Samples in a frame": f"{radar.chirps_per_frame * radar.n_rx * radar.samples_per_chirp:,}",
     }
@@ -117,7 +114,7 @@ def _turn(radar: Radar) -> str:
 
 def _grating_lobes(radar: Radar) -> str:
     """Say how far from an echo, in sines, its first grating lobe is, and how high."""
-    names = zip(("azimuth", "elevation"), radar.patterns, strict=True)
+    names = zip(_ANGLES, radar.patterns, strict=True)
     return ", ".join(
         f"{one.grating_sine:.3g} from an echo in the sine of {name}, {one.grating_db:.1f} dB"
         for name, one in names
@@ -139,7 +136,7 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    names = zip(("azimuth", "elevation"), radar.measures, strict=True)
+    names = zip(_ANGLES, radar.measures, strict=True)
     return tuple(name for name, measured in names if measured)
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -23,9 +24,9 @@ from rtradar.motion.synthetic.figure import (
     offsets,
     rotations,
 )
-from rtradar.motion.synthetic.gait import walk, walk_in_place
-from rtradar.motion.synthetic.jacks import jump, jumping_jack
-from rtradar.motion.synthetic.strikes import boxing, kick, punch
+from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.jacks import jumping_jack
+from rtradar.motion.synthetic.strikes import kick, punch
 from rtradar.recordings import SYNTHETIC, Source
 from rtradar.system.checks import brief, check_number, is_whole
 from rtradar.system.registries import check_activity
@@ -47,10 +48,10 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "bend": bend,
     "squat": squat,
     "wave": wave,
-    "jump": jump,
+    "jump": partial(jumping_jack, activity="jump"),
     "fall": fall,
-    "walk_in_place": walk_in_place,
-    "boxing": boxing,
+    "walk_in_place": partial(walk, table="walk_in_place"),
+    "boxing": partial(punch, boxing=True),
 }
 """Activities of the actors, by name."""
 

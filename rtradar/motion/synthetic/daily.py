@@ -59,7 +59,6 @@ def _crouched(
     subject: Subject,
     own: SimpleNamespace,
     forward: Array,
-    *,
     legs: Array,
     tilts: tuple[Array, Array, Array],
     arms: tuple[Array, Array],
@@ -72,23 +71,12 @@ def _crouched(
     feet = soles(subject, len(forward), own.feet, own.toes)
     pelvis, thorax, head = (about(y=tilt) for tilt in tilts)
     outward = math.radians(own.arms_out)
-    return replace(
-        feet,
-        root=over_feet(feet, subject.height_m, pelvis, forward, legs),
-        pelvis=pelvis,
-        thorax=thorax,
-        head=head,
-        arms={
-            side: swing_arm(
-                thorax,
-                side,
-                forward=arms[0] * subject.uneven[side],
-                outward=outward,
-                elbow=arms[1],
-            )
-            for side in SIDES
-        },
-    )
+    swung = {
+        side: swing_arm(thorax, side, arms[0] * uneven, outward, arms[1])
+        for side, uneven in subject.uneven.items()
+    }
+    root = over_feet(feet, subject.height_m, pelvis, forward, legs)
+    return replace(feet, root=root, pelvis=pelvis, thorax=thorax, head=head, arms=swung)
 
 
 def bend(duration_s: float, subject: Subject) -> PosesAt:
@@ -100,17 +88,11 @@ def bend(duration_s: float, subject: Subject) -> PosesAt:
 
     def pose(bent: Array, forward: Array) -> Pose:
         tilt = deep * bent
-        return _crouched(
-            subject,
-            own,
-            forward,
-            legs=LEGS * (straight + (min(own.knees, straight) - straight) * bent),
-            tilts=(own.hips * tilt, tilt + math.radians(2), 0.8 * tilt),
-            arms=(
-                math.radians(4) + raised * (1 - bent) + (1 + own.reach) * tilt,
-                np.radians(own.elbows + 0 * bent),
-            ),
-        )
+        legs = LEGS * (straight + (min(own.knees, straight) - straight) * bent)
+        tilts = own.hips * tilt, tilt + math.radians(2), 0.8 * tilt
+        swung = math.radians(4) + raised * (1 - bent) + (1 + own.reach) * tilt
+        elbows = np.radians(own.elbows + 0 * bent)
+        return _crouched(subject, own, forward, legs, tilts, (swung, elbows))
 
     return _balanced(duration_s, subject, own, pose)
 
@@ -123,23 +105,16 @@ def squat(duration_s: float, subject: Subject) -> PosesAt:
 
     def pose(bent: Array, forward: Array) -> Pose:
         tilt = lean * bent
-        return _crouched(
-            subject,
-            own,
-            forward,
-            legs=LEGS * (own.straight_legs - (own.straight_legs - low) * bent),
-            tilts=(0.8 * tilt, tilt + math.radians(2), 0.2 * tilt),
-            arms=(math.radians(4) + (arms + lean) * bent, np.radians(14 + 0 * bent)),
-        )
+        legs = LEGS * (own.straight_legs - (own.straight_legs - low) * bent)
+        tilts = 0.8 * tilt, tilt + math.radians(2), 0.2 * tilt
+        angles = math.radians(4) + (arms + lean) * bent, np.radians(14 + 0 * bent)
+        return _crouched(subject, own, forward, legs, tilts, angles)
 
     return _balanced(duration_s, subject, own, pose)
 
 
 def _balanced(
-    duration_s: float,
-    subject: Subject,
-    own: SimpleNamespace,
-    pose: Callable[[Array, Array], Pose],
+    duration_s: float, subject: Subject, own: SimpleNamespace, pose: Callable[[Array, Array], Pose]
 ) -> PosesAt:
     """Repeat a pose by how far it is and by the way of the root forward, in balance."""
     done = repetitions(subject, own, duration_s)
@@ -163,14 +138,9 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
         way = 4 * bent * (1 - bent)
         tilt = lean * way
         hands = math.radians(3) + math.radians(own.thighs) * bent + 0.3 * tilt
-        found = _crouched(
-            subject,
-            own,
-            forward,
-            legs=legs + 0 * bent,
-            tilts=(0.7 * tilt + rests * bent, tilt + rests * bent + math.radians(2), 0.3 * tilt),
-            arms=(hands, np.radians(12 + (own.elbows - 12) * bent)),
-        )
+        tilts = 0.7 * tilt + rests * bent, tilt + rests * bent + math.radians(2), 0.3 * tilt
+        arms = hands, np.radians(12 + (own.elbows - 12) * bent)
+        found = _crouched(subject, own, forward, legs + 0 * bent, tilts, arms)
         level = (ANKLE + legs + ROOT - HIP - own.seat) * height
         found.root[:, 2] += bent * (level - found.root[:, 2])
         return found
@@ -220,11 +190,8 @@ def wave(duration_s: float, subject: Subject) -> PosesAt:
 
 def _angle(done: Array, first_deg: float, middle_deg: float, last_deg: float) -> Array:
     """Angle (n,) [rad] along the parabola through three values, at 0, 1/2 and 1."""
-    before, between, after = (
-        (2 * done - 1) * (done - 1),
-        4 * done * (1 - done),
-        done * (2 * done - 1),
-    )
+    before, between = (2 * done - 1) * (done - 1), 4 * done * (1 - done)
+    after = done * (2 * done - 1)
     return np.radians(first_deg * before + middle_deg * between + last_deg * after)
 
 
@@ -235,7 +202,7 @@ def fall(duration_s: float, subject: Subject) -> PosesAt:
     # Gravity gives the pace.
     subject = replace(subject, tempo=math.sqrt(1.75 / subject.height_m))
     done = repetitions(subject, own, duration_s, sudden=_SUDDEN, extent=0.0)
-    falling = {"backward": _backward, "forward": _forward}[style]
+    falling = _backward if style == "backward" else _forward
 
     def poses(t: Array) -> Pose:
         # What is above the hips follows them.
@@ -248,23 +215,17 @@ def _arms(
     subject: Subject,
     thorax: Rotation,
     follows: Array,
-    *,
     forward: tuple[float, float],
     outward: tuple[float, float],
     elbow: tuple[float, float],
 ) -> dict[str, Arm]:
     """Arms that hang at first, with angles in the middle of a fall and on the floor [deg]."""
-    return {
-        side: swing_arm(
-            thorax,
-            side,
-            forward=_angle(follows, 4, forward[0] * subject.uneven[side], forward[1]),
-            outward=_angle(follows, 9, *outward),
-            elbow=_angle(follows, 14, *elbow),
-            wrist=0.0,
-        )
-        for side in SIDES
+    aside, bent = _angle(follows, 9, *outward), _angle(follows, 14, *elbow)
+    ahead = {
+        side: _angle(follows, 4, forward[0] * uneven, forward[1])
+        for side, uneven in subject.uneven.items()
     }
+    return {side: swing_arm(thorax, side, ahead[side], aside, bent, 0.0) for side in SIDES}
 
 
 def _backward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array) -> Pose:
@@ -278,14 +239,8 @@ def _backward(subject: Subject, own: SimpleNamespace, down: Array, follows: Arra
     twist = math.radians(own.twisted) * 4 * follows * (1 - follows)
     pelvis = about(z=0.4 * twist, y=_angle(follows, 1, 0.6 * own.crouched - 20, -84))
     thorax = about(z=twist, y=_angle(follows, 2, own.crouched - 12, -87))
-    arms = _arms(
-        subject,
-        thorax,
-        follows,
-        forward=(own.raised, 3),
-        outward=(0.7 * own.spread, own.spread),
-        elbow=(38, own.elbow),
-    )
+    outward = 0.7 * own.spread, own.spread
+    arms = _arms(subject, thorax, follows, (own.raised, 3), outward, (38, own.elbow))
     head = about(z=twist, y=_angle(follows, 3, 10, own.head))
     return replace(feet, root=root, pelvis=pelvis, thorax=thorax, head=head, arms=arms)
 
@@ -309,21 +264,8 @@ def _forward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array
     root = hips + pelvis.apply([0.0, 0.0, (ROOT - HIP) * height])
     head = about(y=_angle(follows, 3, 14, own.head))
     arms = _arms(
-        subject,
-        thorax,
-        follows,
-        forward=(own.reach, -4),
-        outward=(0.55 * own.spread, own.spread),
-        elbow=(26, 0),
+        subject, thorax, follows, (own.reach, -4), (0.55 * own.spread, own.spread), (26, 0)
     )
     ankles = {side: feet.ankles[side] + ankle for side in SIDES}
-    return replace(
-        feet,
-        root=root,
-        pelvis=pelvis,
-        thorax=thorax,
-        head=head,
-        ankles=ankles,
-        feet={side: about(y=pitch) for side in SIDES},
-        arms=arms,
-    )
+    feet = replace(feet, ankles=ankles, feet={side: about(y=pitch) for side in SIDES})
+    return replace(feet, root=root, pelvis=pelvis, thorax=thorax, head=head, arms=arms)

@@ -100,14 +100,11 @@ class Subject:
 
     def traits(self, table: str) -> SimpleNamespace:
         """All traits of a table of ``traits.toml``, drawn where they are ranges."""
-        return SimpleNamespace(
-            **{
-                name.replace(" ", "_"): self.drawn(name, *value)
-                if isinstance(value, list) and len(value) == 2
-                else value
-                for name, value in table_of(table).items()
-            }
-        )
+        own = SimpleNamespace()
+        for name, value in table_of(table).items():
+            ranged = isinstance(value, list) and len(value) == 2
+            setattr(own, name.replace(" ", "_"), self.drawn(name, *value) if ranged else value)
+        return own
 
     @property
     def other(self) -> str:
@@ -211,7 +208,6 @@ def _hanging(direction: Array, hinge: Array) -> Rotation:
 def swing_arm(
     thorax: Rotation,
     side: str,
-    *,
     forward: Array | float,
     outward: Array | float,
     elbow: Array,
@@ -310,9 +306,8 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
     under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
     fraction = smooth((t - at[under_way]) / np.diff(at)[under_way])
-    return np.asarray(
-        reached[under_way] + moves[under_way] * fraction.reshape(-1, *(1,) * (keys.ndim - 1))
-    )
+    fraction = fraction.reshape(-1, *(1,) * (keys.ndim - 1))
+    return np.asarray(reached[under_way] + moves[under_way] * fraction)
 
 
 def hermite(
@@ -326,11 +321,8 @@ def hermite(
     p0, v0, a0 = (np.asarray(value, dtype=np.float64) for value in begin)
     p1, v1, a1 = (np.asarray(value, dtype=np.float64) for value in end)
     u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
-    p, v, a = (
-        p1 - p0 - (v0 + a0 * span / 2) * span,
-        (v1 - v0 - a0 * span) * span,
-        (a1 - a0) * span**2,
-    )
+    p, v = p1 - p0 - (v0 + a0 * span / 2) * span, (v1 - v0 - a0 * span) * span
+    a = (a1 - a0) * span**2
     cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2
     free = p0 + v0 * span * u + a0 * span**2 / 2 * u**2
     return free + u**3 * (cubic + u * (quartic + u * quintic))
