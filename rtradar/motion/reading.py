@@ -76,9 +76,9 @@ def stature_of(nodes: Array) -> float:
         return float(np.nanmedian(np.linalg.norm(first - last, axis=1)))
 
     legs = [
-        span(of_node(nodes, f"{side}_{first}"), of_node(nodes, f"{side}_{last}"))
+        span(of_node(nodes, f"{side}_knee"), of_node(nodes, f"{side}_{end}"))
         for side in "lr"
-        for first, last in (("hip", "knee"), ("knee", "ankle"))
+        for end in ("hip", "ankle")
     ]
     trunk = span(middle(nodes, "shoulder"), middle(nodes, "hip"))
     head = span(of_node(nodes, "head"), middle(nodes, "shoulder"))

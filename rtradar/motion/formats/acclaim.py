@@ -155,14 +155,11 @@ def _hierarchy_line(
 
 def _parents_first(bones: dict[str, Bone], parents: dict[str, str], text: TextFile) -> list[Bone]:
     names = ["root"]
-    while len(names) < len(bones):
-        rest = [name for name in bones if name not in names]
+    while rest := [name for name in bones if name not in names]:
         ready = [name for name in rest if parents.get(name) in names]
         if not ready:
-            raise text.fail(
-                f"bone {rest[0]!r} does not hang on the root; list it in :hierarchy",
-                bones[rest[0]].line,
-            )
+            alone = f"bone {rest[0]!r} does not hang on the root; list it in :hierarchy"
+            raise text.fail(alone, bones[rest[0]].line)
         names += ready
     for name in names[1:]:
         bones[name].parent = names.index(parents[name])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Container, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -58,50 +58,42 @@ def load_bvh(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float
     return motion
 
 
-class _Words:
-    """Words of the text one after the other, wherever its lines end; braces stand alone."""
-
-    def __init__(self, text: TextFile) -> None:
-        self._text = text
-        self._words = self._read()
-        self._next: list[tuple[str, int]] = []
-        self.line = 0
-
-    def _read(self) -> Iterator[tuple[str, int]]:
-        for raw in self._text:
-            for word in raw.replace("{", " { ").replace("}", " } ").split():
-                yield word, self._text.line
-
-    def __iter__(self) -> Iterator[str]:
-        return self
-
-    def __next__(self) -> str:
-        word, self.line = self._next.pop() if self._next else next(self._words)
-        return word
-
-    def until(self, ends: Container[str]) -> list[str]:
-        """Take the words before one of these, in capitals, or all that are left."""
-        found = list[str]()
-        for word in self:
-            if word.upper() in ends:
-                self._next.append((word, self.line))
-                break
-            found.append(word)
-        return found
-
-
 _KEYS = frozenset(("ROOT", "JOINT", "END", "OFFSET", "CHANNELS", "MOTION", "{", "}"))
+
+
+def _clauses(text: TextFile) -> Iterator[tuple[str, list[str], int]]:
+    """Yield each key of a hierarchy, the words up to the next one, and the line of the key.
+
+    Lines may end anywhere, and braces need no blanks about them. Words before the first key have
+    an empty one.
+    """
+    key, words, line = "", list[str](), 1
+    for raw in text:
+        for word in raw.replace("{", " { ").replace("}", " } ").split():
+            if word.upper() not in _KEYS:
+                if key in ("{", "}"):
+                    raise text.fail(f"{word[:40]!r} is not expected in a BVH hierarchy")
+                words.append(word)
+                continue
+            yield key, words, line
+            key, words, line = word, [], text.line
+            if word.upper() == "MOTION":
+                yield key, words, line
+                return
+    yield key, words, line
 
 
 def _read_hierarchy(text: TextFile) -> list[Bone]:
     """Joints in the file's order (parents first), up to MOTION."""
     joints: list[Bone] = []
     stack: list[int] = []
-    words = _Words(text)
-    if next(words, "").upper() != "HIERARCHY":
-        raise text.fail("no HIERARCHY at the beginning; this is not a BVH file")
-    for word in words:
-        key, line = word.upper(), words.line
+    clauses = _clauses(text)
+    for word, words, line in clauses:
+        key = word.upper()
+        if not key:
+            if [given.upper() for given in words] != ["HIERARCHY"]:
+                raise text.fail("no HIERARCHY at the beginning; this is not a BVH file")
+            continue
         if key == "MOTION":
             if stack or not joints:
                 raise text.fail("MOTION before the hierarchy ends; a brace is missing", line)
@@ -111,8 +103,8 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
                 raise text.fail("a BVH file must have exactly one ROOT, first", line)
             if key != "ROOT" and not stack:
                 raise text.fail(f"{word} outside the braces of the root", line)
-            name = " ".join(words.until("{"))
-            if next(words, "") != "{":
+            name = " ".join(words)
+            if next(clauses, ("",))[0] != "{":
                 raise text.fail(f"{word} {name[:40]} without an opening brace", line)
             parent, taken = stack[-1] if stack else -1, {joint.name for joint in joints}
             if key == "END":
@@ -130,17 +122,14 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
                 raise text.fail("a closing brace too many", line)
             stack.pop()
         elif key == "OFFSET" and stack:
-            offset = text.numbers(words.until(_KEYS), line)
+            offset = text.numbers(words, line)
             if len(offset) != 3:
                 raise text.fail(f"OFFSET has {len(offset)} values; it needs three", line)
             joints[stack[-1]].offset = np.array(offset)
         elif key == "CHANNELS" and stack:
-            count, *given = words.until(_KEYS) or [""]
-            names = tuple(name.lower() for name in given)
-            whole = count == str(len(names)) and len(set(names)) == len(names)
-            if not whole or not all(
-                re.fullmatch("[xyz](position|rotation)", name) for name in names
-            ):
+            count, *names = [name.lower() for name in words or [""]]
+            known = [name for name in names if re.fullmatch("[xyz](position|rotation)", name)]
+            if count != str(len(names)) or len(set(known)) < len(names):
                 raise text.fail(
                     "CHANNELS needs a count and as many different Xposition ... Zrotation", line
                 )

@@ -123,14 +123,10 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
                 raise text.fail(f"rate_hz is {was}; it must not change, give time_s")
             text.check_size(len(joints), len(rows))
     values = np.array(rows).reshape(len(rows), len(header))
-    named = list(joints.values())
-    arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
-    if "up" in columns:
-        arrays["up"] = np.array(up)
-    if "time_s" in columns:
-        arrays["time_s"] = values[:, columns["time_s"]]
-    if "rate_hz" in columns:
-        arrays["rate_hz"] = values[:1, columns["rate_hz"]]
+    places = values[:, list(joints.values())]
+    arrays = {"joints": np.array(list(joints)), "positions": places, "up": np.array(up)}
+    arrays |= {key: values[:, k] for key, k in columns.items() if key == "time_s"}
+    arrays |= {key: values[:1, k] for key, k in columns.items() if key == "rate_hz"}
     return checked(path, arrays, rate_hz)
 
 

@@ -105,13 +105,8 @@ def motion_of(
             f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
-    to_world, unit_m, found = settled_nodes(
-        where,
-        nodes,
-        unit_m=unit_m,
-        up=up or recording.up,
-        usual=recording.usual or convention.up,
-    )
+    up, usual = up or recording.up, recording.usual or convention.up
+    to_world, unit_m, found = settled_nodes(where, nodes, unit_m=unit_m, up=up, usual=usual)
     rate_hz = 1 / float(np.median(np.diff(recording.times)))
     found = [*recording.findings, *found, rate_of(round(rate_hz, 3))]
     nodes = unit_m * nodes @ to_world.T
@@ -176,9 +171,8 @@ def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Arr
     breaks = 1 + np.flatnonzero(np.diff(times) > LONGEST_GAP_S)
     best = slice(0, 0)
     for begin, end in runs(~out):
-        for stretch in np.split(
-            np.arange(begin, end), breaks[(breaks > begin) & (breaks < end)] - begin
-        ):
+        inside = breaks[(breaks > begin) & (breaks < end)] - begin
+        for stretch in np.split(np.arange(begin, end), inside):
             whole = stretch[~unseen[stretch].any(axis=1)]
             if len(whole) and whole[-1] + 1 - whole[0] > best.stop - best.start:
                 best = slice(int(whole[0]), int(whole[-1]) + 1)

@@ -81,7 +81,7 @@ def load_c3d(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float
 
     An `InputError` names the marker and the frames, by the file's numbers.
     """
-    return _motion_of(_read_c3d(path), unit_m, up, rate_hz)
+    return _motion_of(read_c3d(path), unit_m, up, rate_hz)
 
 
 def load_trc(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
@@ -106,10 +106,8 @@ def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: floa
         names, rate = np.array([name.strip(" \0") for name in read.names]), np.array(read.rate_hz)
         given = {"positions": read.positions, "joints": names, "rate_hz": rate}
         return motion_of(replace(checked(path, given, None), usual=read.up), unit_m, up)
-    seen = chosen(read, NEEDED)
-    centres, pelvis, thorax = joint_centres(
-        dict(zip(NEEDED, np.moveaxis(bridged(seen), 1, 0), strict=True))
-    )
+    places = np.moveaxis(bridged(chosen(read, NEEDED)), 1, 0)
+    centres, pelvis, thorax = joint_centres(dict(zip(NEEDED, places, strict=True)))
     to_world, unit_m, found = settled_nodes(
         where, centres, unit_m=unit_m, unit_by=by, up=up or "", usual=read.up
     )
@@ -119,12 +117,8 @@ def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: floa
     return replace(motion, findings=(*found, rate_of(read.rate_hz), speed))
 
 
-def read_markers(path: Path, names: tuple[str, ...]) -> Points:
-    """Read some markers of a C3D file, gaps and all, in its axes and its unit."""
-    return chosen(_read_c3d(path), names)
-
-
-def _read_c3d(path: Path) -> Points:
+def read_c3d(path: Path) -> Points:
+    """Read the points of a C3D file, gaps and all, in its axes and its unit."""
     try:
         with (
             _Bounded(open_regular(path).detach()) as handle,
@@ -210,9 +204,8 @@ class _Bounded(io.BufferedReader):
     """A file that never reserves more memory for a read than the file has bytes."""
 
     def read(self, size: int | None = -1, /) -> bytes:
-        return super().read(
-            size if size is None or size < 0 else min(size, os.fstat(self.fileno()).st_size)
-        )
+        length = os.fstat(self.fileno()).st_size
+        return super().read(size if size is None or size < 0 else min(size, length))
 
 
 def _read(path: Path, handle: object) -> Points:
@@ -304,9 +297,8 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     left and up.
     """
     frames = _segments(markers)
-    shanks = [
-        np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"
-    ]
+    knees, ankles = ([markers[side + end] for side in "LR"] for end in ("KNE", "ANK"))
+    shanks = np.linalg.norm(np.subtract(knees, ankles), axis=2)
     size = float(np.median(shanks)) / SHANK_M
     centres = []
     for node in NODES:
@@ -338,14 +330,12 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
             middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
         )
     for side, sign in (("L", 1.0), ("R", -1.0)):
-        shoulder, elbow, knee, ankle = (
-            markers[side + name] for name in ("SHO", "ELB", "KNE", "ANK")
-        )
+        shoulder, elbow = markers[f"{side}SHO"], markers[f"{side}ELB"]
+        knee, ankle = markers[f"{side}KNE"], markers[f"{side}ANK"]
         wrist = middle(f"{side}WRA", f"{side}WRB")
         frames[f"{side} shank"] = _axes(up=knee - ankle, forward=markers[f"{side}TOE"] - ankle)
-        frames[f"{side} upper arm"] = _axes(
-            up=shoulder - elbow, forward=_bend(shoulder, elbow, wrist, thorax, sign)
-        )
+        bend = _bend(shoulder, elbow, wrist, thorax, sign)
+        frames[f"{side} upper arm"] = _axes(up=shoulder - elbow, forward=bend)
         frames[f"{side} forearm"] = _axes(up=elbow - wrist, forward=markers[f"{side}WRA"] - wrist)
     return frames
 
