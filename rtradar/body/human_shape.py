@@ -36,14 +36,12 @@ AGES = ("baby", "child", "young")
 
 _GENDERS = ("female", "male")
 _AVERAGE = "averagemuscle-averageweight"
+_PROPORTIONS = ("idealproportions", "uncommonproportions")
 _SHARES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("universal-{gender}-{age}-" + _AVERAGE, ("",)),
     ("{choice}-{gender}-{age}", ("african", "asian", "caucasian")),
     ("height/{gender}-{age}-" + _AVERAGE + "-{choice}", ("minheight", "maxheight")),
-    (
-        "proportions/{gender}-{age}-" + _AVERAGE + "-{choice}",
-        ("idealproportions", "uncommonproportions"),
-    ),
+    ("proportions/{gender}-{age}-" + _AVERAGE + "-{choice}", _PROPORTIONS),
 )
 """Files that make up the mean person of an age; the choices of each have equal shares."""
 
@@ -296,11 +294,9 @@ def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
     """Places (node, 3) of the nodes in the mesh of one age."""
     joints = np.zeros((len(NODES), 3))
     joints[KEYPOINT_NODES] = shapes.keypoints @ shapes.vertices[age]
-    for side in "LR":
-        for node, end in _TABLE["limb_ends"].items():
-            joints[NODES.index(f"{side.lower()}_{node}")] = shapes.joints[end.replace("@", side)][
-                age
-            ]
+    for side, (node, end) in itertools.product("LR", _TABLE["limb_ends"].items()):
+        own = shapes.joints[end.replace("@", side)]
+        joints[NODES.index(f"{side.lower()}_{node}")] = own[age]
     hips, shoulders = (middle(joints, node)[2] for node in ("hip", "shoulder"))
     spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _TABLE["spine"]])
     for node in _TRUNK:
@@ -343,9 +339,8 @@ def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
     still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(NODES), 1))
     quaternions = np.concatenate([still, motion.rotations[frames]])
     roots = np.zeros((len(quaternions), 3))
-    poses = replace(
-        motion, root_positions=roots, rotations=quaternions, first_frame_s=0.0, length_s=None
-    ).positions
+    frames_only: dict[str, Any] = {"first_frame_s": 0.0, "length_s": None}
+    poses = replace(motion, root_positions=roots, rotations=quaternions, **frames_only).positions
     best = int(np.argmin([_strain(joints, pose) for pose in poses]))
     from scipy.spatial.transform import Rotation  # slow to import
 

@@ -52,7 +52,8 @@ class Convention:
     """Joint names of one kind of file, as `plain` gives them.
 
     ``joints`` has the alternatives for each node, of which the first one that is there counts. The
-    others are described in ``names.toml``; ``open_ended`` is not ``complete``.
+    others are described in ``names.toml``; ``open_ended`` is not ``complete``, and such a skeleton
+    may lack some nodes.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Convention:
     low_pass_hz: float | None = None
     head_is_top: bool = False
     up: str = ""
+    may_lack: tuple[str, ...] = ()
 
     def found(self, there: Container[str]) -> dict[str, str]:
         """First alternative for each node whose joints are all there."""
@@ -74,6 +76,7 @@ class Convention:
     def missing(self, there: Container[str]) -> list[str]:
         """Names of the joints that are not there, where no alternative is."""
         known = self.found(there)
+        known |= dict.fromkeys(self.may_lack, "")
         last = [choices[-1] for node, choices in self.joints.items() if node not in known]
         return list(dict.fromkeys(one for each in last for one in _names(each) if one not in there))
 
@@ -98,33 +101,31 @@ def _read(path: Path, kind: str) -> tuple[Convention, ...]:
     for where, table in tables:
         check_keys(f"{path}: {where}", table, ("name",), _KEYS)
         named[table["name"]] = {**named.get(table.get("like", ""), {}), **table}
-    return tuple(_convention(path, table) for table in named.values())
+    return tuple(_convention(path, table, kind) for table in named.values())
 
 
-def _convention(path: Path, table: Mapping[str, Any]) -> Convention:
+def _convention(path: Path, table: Mapping[str, Any], kind: str) -> Convention:
+    open_ended = not table.get("complete", False)
     try:
-        left, right = table["sides"]
         texts = dict(table["middle"])
-        for side, name in (("l", left), ("r", right)):
+        for side, name in zip("lr", table["sides"], strict=True):
             for node, text in table["sided"].items():
                 texts[f"{side}_{node}"] = text.replace("@", name)
         joints = {node: tuple(re.split(r",\s*", text)) for node, text in texts.items()}
-        for choices in joints.values():
-            for choice in choices:
-                _fraction(choice)
+        for choice in itertools.chain(*joints.values()):
+            _fraction(choice)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"{path}: {table['name']}: sides, middle and sided are needed, as in names.toml of "
             f"rtradar ({brief(str(error))[1:-1]})"
         ) from None
-    return Convention(
-        table["name"],
-        joints,
-        not table.get("complete", False),
-        table.get("low_pass_hz"),
-        table.get("head_is_top", False),
-        table.get("up", ""),
-    )
+    own = {key: table[key] for key in ("low_pass_hz", "head_is_top", "up") if key in table}
+    if kind == "skeletons" and open_ended:
+        # No end site at all: the part starts and ends in one joint, and is extended from there.
+        for end in ("head", "l_hand", "r_hand"):
+            joints[end] += joints[NODE_PARENT[end]]
+        own["may_lack"] = ("thorax",)
+    return Convention(table["name"], joints, open_ended, **own)
 
 
 def _names(choice: str) -> list[str]:
@@ -136,10 +137,10 @@ def _fraction(choice: str) -> float:
     return float(choice.partition(" ")[2] or 0)
 
 
-def recognise(where: str, names: Sequence[str]) -> Convention:
+def recognise(where: str, names: Sequence[str], kind: _Kind = "joints") -> Convention:
     """Return the convention of joints by their names; an `InputError` names what is missing."""
     there = {plain(name) for name in names}
-    tried = [(known, known.missing(there)) for known in conventions("joints")]
+    tried = [(known, known.missing(there)) for known in conventions(kind)]
     best, lacking = min(tried, key=lambda one: len(one[1]))
     if lacking:
         raise unknown(where, names, tried)
@@ -283,25 +284,13 @@ def to_nodes(motion: Motion) -> Motion:
 def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     """The convention whose names fit, and the joint of each node it names."""
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
-    tried = []
-    for convention in conventions("skeletons"):
-        found = {
-            node: there[name] for node, name in convention.found(there).items() if name in there
-        }
-        missing = [node for node in convention.joints if node not in found]
-        if convention.open_ended:
-            # No end site at all: the part starts and ends in one joint, and is extended from there.
-            for node in [node for node in missing if node == "head" or node.endswith("_hand")]:
-                if NODE_PARENT[node] in found:
-                    found[node] = found[NODE_PARENT[node]]
-                missing.remove(node)
-            if missing == ["thorax"] and motion.parents[found["neck"]] >= 0:
-                # Without a neck the head's own parent is where the trunk ends.
-                found["thorax"], missing = motion.parents[found["neck"]], []
-        if not missing:
-            return convention, found
-        tried.append((convention, [" or ".join(convention.joints[node]) for node in missing]))
-    raise unknown(motion.name, motion.joints, tried)
+    convention = recognise(motion.name, motion.joints, "skeletons")
+    found = {node: there[name] for node, name in convention.found(there).items()}
+    if "thorax" not in found:  # without a neck the head's own parent is where the trunk ends
+        found["thorax"] = motion.parents[found["neck"]]
+        if found["thorax"] < 0:
+            raise unknown(motion.name, motion.joints, [(convention, convention.joints["thorax"])])
+    return convention, found
 
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:

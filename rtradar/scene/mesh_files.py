@@ -152,10 +152,8 @@ def _check_ply_header(where: str, content: bytes) -> None:
     for kind, count in re.findall(rb"element\s+(\S+)\s+(\d+)", head):
         most = MOST_FACES if kind == b"face" else 3 * MOST_FACES
         if len(count) > 12 or int(count) > most:
-            raise InputError(
-                f"{where} promises more elements {brief(kind.decode('ascii', 'replace'))} than the "
-                f"{most} allowed"
-            )
+            name = brief(kind.decode("ascii", "replace"))
+            raise InputError(f"{where} promises more elements {name} than the {most} allowed")
 
 
 def _check_glb_header(where: str, content: bytes) -> None:

@@ -28,12 +28,8 @@ ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
 """Limits of the size of furniture along its longest axis [m]."""
 
-BOX = Annotated[
-    Vector,
-    Limits(
-        SMALLEST_M, LARGEST_M, f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
-    ),
-]
+_LENGTHS = f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
+BOX = Annotated[Vector, Limits(SMALLEST_M, LARGEST_M, _LENGTHS)]
 
 _SHORTEST_M = 0.01
 """Least length of a wall's edge [m]."""
@@ -121,18 +117,11 @@ class Wall(Surface):
     def __post_init__(self) -> None:
         where = f"wall {brief(self.name)}"
         check_fields(self, f"{where}: ")
-        for key in ("edge_u_m", "edge_v_m"):
-            if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
-                raise InputError(
-                    f"{where}: {key} = {brief(getattr(self, key))}; an edge must be "
-                    f"{_SHORTEST_M} m long or more"
-                )
-        u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
-        if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
-            raise InputError(
-                f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)} "
-                "are not at right angles; a wall is a rectangle"
-            )
+        edges = f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)}"
+        if min(self.size_m) < _SHORTEST_M:
+            raise InputError(f"{edges}; an edge must be {_SHORTEST_M} m long or more")
+        if abs(np.dot(self.edge_u_m, self.edge_v_m)) > _SQUARE * self.area_m2:
+            raise InputError(f"{edges} are not at right angles; a wall is a rectangle")
         self._check_openings(where)
 
     def _check_openings(self, where: str) -> None:

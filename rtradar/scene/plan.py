@@ -62,9 +62,8 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
 def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     """Ends (2, 2) [m] of what is left of the foot of a wall between its openings."""
     way = foot.last - foot.first
-    edges = [np.array(edge)[:2] for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
-    lengths = [np.linalg.norm(edge) for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
-    along_u, along_v = (edge / length for edge, length in zip(edges, lengths, strict=True))
+    u, v = foot.wall.edge_u_m, foot.wall.edge_v_m
+    along_u, along_v = (np.array(edge[:2]) / np.linalg.norm(edge) for edge in (u, v))
     corner = np.array(foot.wall.corner_m)[:2]
     gaps = []
     for u, v, wide, high in foot.wall.openings:
@@ -264,12 +263,12 @@ _MOST_ROWS = 9
 def brief_rows(scene: Scene) -> dict[str, str]:
     """Return the rows of a scene's ``repr``."""
     rows = room_rows(scene)
-    kinds: list[tuple[str, Sequence[Wall | Furniture]]]
-    kinds = [("Walls", scene.walls), ("Furniture", scene.furniture)]
-    # Few scenes have objects: the others need not say so.
-    kinds += [("Objects", scene.objects)] if scene.objects else []
-    for kind, parts in kinds:
-        rows[kind] = f"{len(parts)}: {_names(parts)}" if parts else "none"
+    kinds = {"Walls": scene.walls, "Furniture": scene.furniture, "Objects": scene.objects}
+    for kind, parts in kinds.items():
+        # Few scenes have objects: the others need not say so.
+        if parts or kind != "Objects":
+            names = ", ".join(part.name for part in parts)
+            rows[kind] = f"{len(parts)}: {names}" if parts else "none"
     if scene.people:
         rows["People"] = f"{len(scene.people)}: {', '.join(map(_person, scene.people))}"
     if scene.materials:
@@ -289,12 +288,10 @@ def tables(scene: Scene) -> dict[str, dict[str, str]]:
     if scene.people:
         found[""]["People"] = ", ".join(map(_person, scene.people))
     for kind, rows in (("Walls", walls), ("Furniture", furniture), ("Objects", objects)):
-        count = len(rows)
-        if len(rows) > _MOST_ROWS:
-            left_out = count - _MOST_ROWS
-            rows = {**dict(list(rows.items())[:_MOST_ROWS]), "...": f"and {left_out} more"}
         if rows:
-            found[f"{kind} ({count})"] = rows
+            shown = found[f"{kind} ({len(rows)})"] = dict(list(rows.items())[:_MOST_ROWS])
+            if len(rows) > _MOST_ROWS:
+                shown["..."] = f"and {len(rows) - _MOST_ROWS} more"
     return found
 
 
@@ -315,10 +312,6 @@ def room_rows(scene: Scene) -> dict[str, str]:
     turned = f", turned by {scene.heading_deg:g}°" if scene.heading_deg else ""
     rows["Person"] = f"at {_point(scene.person_position_m)}{turned}"
     return rows
-
-
-def _names(parts: Iterable[Wall | Furniture]) -> str:
-    return ", ".join(part.name for part in parts)
 
 
 def _person(person: Person) -> str:

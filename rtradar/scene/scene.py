@@ -239,8 +239,8 @@ class Scene:
         >>> room.name, len(room.furniture)
         ('random:7', 3)
         """
-        asked = {"seed": seed, "furniture": furniture, "length_m": length_m, "width_m": width_m}
-        asked["height_m"] = height_m
+        asked = {"seed": seed, "furniture": furniture}
+        asked |= {"length_m": length_m, "width_m": width_m, "height_m": height_m}
         return cls.of_table({"name": f"{RANDOM_SCENE}{seed}", "random": asked})
 
     def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
@@ -365,12 +365,9 @@ class Scene:
         -------
         Radar
         """
-        given = {key: getattr(self, f"radar_{key}") for key in ANGLES}
-        given = {
-            key: value
-            for key, value in given.items()
-            if value is not None and getattr(radar, key) == 0
-        }
+        kept = [key for key in ANGLES if getattr(radar, key) == 0]
+        given = {key: getattr(self, f"radar_{key}") for key in kept}
+        given = {key: value for key, value in given.items() if value is not None}
         return replace(radar, **given) if given else radar
 
     def is_outside(self, place: Sequence[float]) -> bool:

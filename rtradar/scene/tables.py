@@ -35,10 +35,9 @@ if TYPE_CHECKING:
     from rtradar.motion import Motion
 
 _Place = Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])]
-_OF_PEOPLE = (
-    "skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing"
-)
-_OF_PEOPLE += " seed duration_s traits"
+_OF_PEOPLE = """\
+skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing seed
+duration_s traits"""
 """Keys that a person may have beside ``motion``."""
 
 _OF_ACTORS = ("seed", "traits")
@@ -84,13 +83,9 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield where a table of a scene names files, under which key, and the table of that key."""
-    for list_, keys in (
-        ("furniture", ("mesh",)),
-        ("objects", ("mesh",)),
-        ("people", ("motion", "skeleton")),
-    ):
-        for where, entry in tables_at(list_, table):
-            for key in keys:
+    for kind in ("furniture", "objects", "people"):
+        for where, entry in tables_at(kind, table):
+            for key in ("motion", "skeleton") if kind == "people" else ("mesh",):
                 text = entry.get(key)
                 named = isinstance(text, str) and (key != "mesh" or Path(text).suffix)
                 if named and not str(text).startswith(SYNTHETIC) and isinstance(entry, dict):
@@ -141,15 +136,12 @@ def fields_of(table: Table) -> dict[str, Any]:
         for key, value in radar.items():
             kind = Point if key == "position_m" else Angle
             fields[f"radar_{key}"] = read_value(kind, "[radar] ", key, value)
-    if "person" in table:
-        person = table_at("person", table)
-        check_keys("[person] ", person, *KEYS["[person]"])
-        if "position_m" in person:
-            place = person["position_m"]
-            fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
-        if "heading_deg" in person:
-            fields["heading_deg"] = person["heading_deg"]
-    return fields
+    person = dict(table_at("person", table))
+    check_keys("[person] ", person, *KEYS["[person]"])
+    if "position_m" in person:
+        place = person.pop("position_m")
+        fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
+    return fields | person
 
 
 def _own_materials(table: Table) -> dict[str, Material]:
@@ -168,9 +160,7 @@ def _room(table: Table, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     for side in ROOM_SIDES:
         key = side if side in table or side in ("floor", "ceiling") else "walls"
         if key not in table:
-            wanted = (
-                f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
-            )
+            wanted = f"[room.{side}]{', or [room.walls] for all four' * (key != side)}"
             raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
         surface = table_at(key, table, "room.")
         check_keys(f"[room.{key}] ", surface, *KEYS["a side of a room"])
@@ -243,11 +233,8 @@ def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
     found = []
     for where, entry in entries:
         check_keys(where, entry, *KEYS["[[people]]"])
-        own = {
-            key: value
-            for key, value in entry.items()
-            if key not in ("motion", "skeleton", "duration_s", *SAID, *_OF_ACTORS)
-        }
+        of_motion = ("motion", "skeleton", "duration_s", *SAID, *_OF_ACTORS)
+        own = {key: value for key, value in entry.items() if key not in of_motion}
         with prefixed(where):
             found.append(Person(_motion(entry, folder), **own))
     return tuple(found)
@@ -259,10 +246,12 @@ def _motion(entry: Table, folder: Path) -> Motion:
     if isinstance(entry["motion"], Motion):
         return entry["motion"]
     name = read_value(str, "person: ", "motion", entry["motion"])
-    if name.startswith(SYNTHETIC):
-        for key in ("skeleton", *SAID):
-            if key in entry:
-                raise InputError(f"{name}: only a recording has it; leave {key} out")
+    acted = name.startswith(SYNTHETIC)
+    for key in ("skeleton", *SAID) if acted else _OF_ACTORS:
+        if key in entry:
+            only = f"only {'a recording' if acted else 'a synthetic actor'} has it"
+            raise InputError(f"{key} = {brief(entry[key])} of {name}: {only}; leave {key} out")
+    if acted:
         asked = entry.get("duration_s", _ACTOR_S)
         duration_s = check_number("person", "duration_s", asked, 0.0, _LONGEST_S)
         activity, traits = name.removeprefix(SYNTHETIC), table_at("traits", entry)
@@ -271,9 +260,6 @@ def _motion(entry: Table, folder: Path) -> Motion:
             return synthetic_motion(activity, **given)
         except TypeError:  # a trait that is none, or of another kind
             raise InputError(f"traits = {brief(traits)}: no such traits of {name}") from None
-    for key in _OF_ACTORS:
-        if key in entry:
-            raise InputError(f"{key} = {brief(entry[key])}: only a synthetic actor has it")
     paths = {
         key: folder / read_value(str, "people: ", key, entry[key])
         for key in ("motion", "skeleton")
@@ -357,16 +343,8 @@ def random_room(table: Table) -> dict[str, Any]:
         left = round(float(high[1]) - 0.01, 2)
         corner = [between(low[0] + 0.2, high[0] - wide - 0.2), left, sill]
         up = min(between(0.9, 1.4), round(size[2] - sill - 0.2, 2))
-        walls.append(
-            {
-                "name": "window",
-                "corner_m": corner,
-                "edge_u_m": [wide, 0.0, 0.0],
-                "edge_v_m": [0.0, 0.0, up],
-                "material": "glass",
-                "thickness_m": 0.006,
-            }
-        )
+        edges = {"corner_m": corner, "edge_u_m": [wide, 0.0, 0.0], "edge_v_m": [0.0, 0.0, up]}
+        walls.append({"name": "window", **edges, "material": "glass", "thickness_m": 0.006})
     least, most = ranges["furniture"]
     furniture = []
     taken = [_FREE_M, np.stack([np.subtract(radar[:2], _RADAR_M), np.add(radar[:2], _RADAR_M)], 1)]
@@ -381,13 +359,12 @@ def random_room(table: Table) -> dict[str, Any]:
                 break
     sides = {name: side(_WALLS) for name in _SIDES}
     sides |= {"floor": side(_FLOORS), "ceiling": side(_CEILINGS)}
-    return {
+    found = {
         "description": f"{' by '.join(f'{length:g}' for length in size)} m, drawn at random",
         "radar": {"position_m": radar},
         "room": {"size_m": size, "corner_m": low.tolist(), **sides},
-        **({"walls": walls} if walls else {}),
-        **({"furniture": furniture} if furniture else {}),
     }
+    return found | {key: own for key, own in (("walls", walls), ("furniture", furniture)) if own}
 
 
 def _against(mesh: str, side: str, low: Any, high: Any, along: float) -> tuple[list[float], Any]:

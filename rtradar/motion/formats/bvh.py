@@ -92,7 +92,7 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
         key = word.upper()
         if not key:
             if [given.upper() for given in words] != ["HIERARCHY"]:
-                raise text.fail("no HIERARCHY at the beginning; this is not a BVH file")
+                raise text.fail("no HIERARCHY at the beginning; this is not a BVH file", line)
             continue
         if key == "MOTION":
             if stack or not joints:
