@@ -178,9 +178,6 @@ def node_positions(
     return found
 
 
-Array = NDArray[np.float64]
-
-
 def _chain(side: str, *nodes: str) -> dict[str, str]:
     """Parents of a limb's nodes; the first name is that of the node from which it starts."""
     limb = [nodes[0], *(f"{side}_{node}" for node in nodes[1:])]

@@ -324,18 +324,15 @@ class Furniture:
                 f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
                 f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
             )
+        endings = ", ".join(MESH_ENDINGS)
         if not self._settled and self.path.suffix.lower() not in MESH_ENDINGS:
+            raise InputError(f"{where}: mesh = {brief(self.path.name)}; allowed endings: {endings}")
+        if self._settled and (self.metres_per_unit is not None or self.sheet):
             raise InputError(
-                f"{where}: mesh = {brief(self.path.name)}; allowed endings: "
-                f"{', '.join(MESH_ENDINGS)}"
+                f"{where}: metres_per_unit and sheet belong to a file of one's own; "
+                f"{brief(self.mesh)} has both settled"
             )
-        if self._settled:
-            if self.metres_per_unit is not None or self.sheet:
-                raise InputError(
-                    f"{where}: metres_per_unit and sheet belong to a file of one's own; "
-                    f"{brief(self.mesh)} has both settled"
-                )
-        elif self.metres_per_unit is None:
+        if not self._settled and self.metres_per_unit is None:
             raise InputError(
                 f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
                 "1 for m, 0.001 for mm"

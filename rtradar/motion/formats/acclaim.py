@@ -112,8 +112,10 @@ def _bone_line(bone: Bone, key: str, words: list[str], text: TextFile) -> None:
         (bone.length,) = text.numbers(words[:1]) or (0.0,)
         if bone.length < 0:
             raise text.fail(f"bone {bone.name!r} has length {bone.length}; it must not be negative")
-    elif key in ("direction", "orientation"):
-        setattr(bone, {"direction": "offset", "orientation": "axis"}[key], _triple(words, text))
+    elif key == "direction":
+        bone.offset = _triple(words, text)
+    elif key == "orientation":
+        bone.axis = _triple(words, text)
     elif key == "position" and _triple(words, text).any():
         raise text.fail("a root position other than 0 0 0 is not supported; move it into the AMC")
     elif key == "axis":
@@ -135,10 +137,9 @@ def _bone_line(bone: Bone, key: str, words: list[str], text: TextFile) -> None:
 
 
 def _triple(words: list[str], text: TextFile) -> Array:
-    values = text.numbers(words[:3])
-    if len(values) != 3:
-        raise text.fail(f"{len(values)} numbers where three are needed")
-    return np.array(values)
+    if len(words) < 3:
+        raise text.fail(f"{len(words)} numbers where three are needed")
+    return np.array(text.numbers(words[:3]))
 
 
 def _hierarchy_line(

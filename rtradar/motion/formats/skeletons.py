@@ -158,12 +158,11 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
             f"every body part needs at least {MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers "
             "about it"
         )
-    held = {
-        key: sign_continuous(Rotation.from_matrix(axes).as_quat())
-        for key, axes in (("pelvis", pelvis), ("thorax", thorax))
-    }
+    hips, chest = (
+        sign_continuous(Rotation.from_matrix(axes).as_quat()) for axes in (pelvis, thorax)
+    )
     below = [node.split("_")[-1] in _ON_THE_PELVIS for node in NODES[1:]]
-    carriers = np.stack([held["pelvis" if low else "thorax"] for low in below], axis=1)
+    carriers = np.stack([hips if low else chest for low in below], axis=1)
     directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
     rotations = quaternion_multiply(carriers, _followed(directions))
     rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
@@ -174,7 +173,7 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
         parents=(-1, *parents),
         offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
         root_positions=centres[:, 0],
-        rotations=np.concatenate([held["pelvis"][:, None], rotations], axis=1),
+        rotations=np.concatenate([hips[:, None], rotations], axis=1),
         rate_hz=rate_hz,
     )
 

@@ -228,9 +228,9 @@ def quiet(subject: Subject, t: Array) -> Pose:
         upright * np.sin(lean), pendulum * np.sin(aside), ANKLE * height + upright * np.cos(lean)
     )
     body = about(y=lean)
-    out, forward, bent = math.radians(8), LEAN + math.radians(4), np.full(len(t), math.radians(12))
+    out, ahead, bent = math.radians(8), LEAN + math.radians(4), np.full(len(t), math.radians(12))
     uneven = subject.uneven.items()
-    arms = {side: swing_arm(body, side, forward, out, bent * own) for side, own in uneven}
+    arms = {side: swing_arm(body, side, ahead, out, bent * own) for side, own in uneven}
     head = about(y=np.full(len(t), math.radians(2)))
     feet = soles(subject, len(t), 1.1, 8.0)
     return replace(feet, root=root, pelvis=body, thorax=body, head=head, arms=arms)

@@ -14,6 +14,7 @@ from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rtradar.motion.synthetic.fighter import Fighter
 from rtradar.motion.synthetic.figure import (
@@ -38,13 +39,11 @@ def _kind(activity: str, style: str) -> SimpleNamespace:
     return SimpleNamespace(**table_of(f"{activity}_{style}"))
 
 
-def _shares(
-    activity: str, style: str, rng: np.random.Generator, favourites: Sequence[float]
-) -> Array:
+def _shares(activity: str, style: str, rng: np.random.Generator, favourites: ArrayLike) -> Array:
     """Probabilities of the kinds of a strike; a style that is one of them excludes the others."""
     if style in STYLES[activity]:
         return np.array([float(kind == style) for kind in STYLES[activity]])
-    return rng.dirichlet(favourites)
+    return rng.dirichlet(np.asarray(favourites))
 
 
 # -- kicks -----------------------------------------------------------------------------------------
