@@ -62,8 +62,8 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
 def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     """Ends (2, 2) [m] of what is left of the foot of a wall between its openings."""
     way = foot.last - foot.first
-    u, v = foot.wall.edge_u_m, foot.wall.edge_v_m
-    along_u, along_v = (np.array(edge[:2]) / np.linalg.norm(edge) for edge in (u, v))
+    edges = foot.wall.edge_u_m, foot.wall.edge_v_m
+    along_u, along_v = (np.array(edge[:2]) / np.linalg.norm(edge) for edge in edges)
     corner = np.array(foot.wall.corner_m)[:2]
     gaps = []
     for u, v, wide, high in foot.wall.openings:
@@ -263,6 +263,7 @@ _MOST_ROWS = 9
 def brief_rows(scene: Scene) -> dict[str, str]:
     """Return the rows of a scene's ``repr``."""
     rows = room_rows(scene)
+    kinds: dict[str, Sequence[Wall | Furniture]]
     kinds = {"Walls": scene.walls, "Furniture": scene.furniture, "Objects": scene.objects}
     for kind, parts in kinds.items():
         # Few scenes have objects: the others need not say so.

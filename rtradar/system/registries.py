@@ -37,8 +37,8 @@ READERS = Registry(
     "rtradar.readers",
     "motion reader",
     {
-        "amc": "rtradar.motion.formats.acclaim:load_amc",
-        "bvh": "rtradar.motion.formats.bvh:load_bvh",
+        "amc": "rtradar.motion.formats.rotations:load_amc",
+        "bvh": "rtradar.motion.formats.rotations:load_bvh",
         "c3d": "rtradar.motion.formats.markers:load_c3d",
         "npz": "rtradar.motion.formats.joints:load_npz",
         "csv": "rtradar.motion.formats.joints:load_csv",

@@ -85,6 +85,20 @@ def chain_to(bones: Sequence[Bone], last: int) -> list[int]:
     return chain
 
 
+def carrier_of(joints: Sequence[Bone], values: Array) -> int:
+    """Find the last joint of an unbranched chain from the root whose own position moves."""
+    top, carrier = 0, 0
+    while True:
+        children = [j for j, joint in enumerate(joints) if joint.parent == top]
+        if len(children) != 1:
+            return carrier
+        top = children[0]
+        # A joint that moves in its parent by less than a millionth of its distance is a bone.
+        least = 1e-6 * (1 + np.abs(joints[top].offset).max())
+        if np.ptp(joints[top].places(values), axis=0).max() > least:
+            carrier = top
+
+
 def posed(
     path: Path,
     bones: Sequence[Bone],

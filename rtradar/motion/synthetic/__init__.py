@@ -15,8 +15,6 @@ import numpy as np
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
-from rtradar.motion.synthetic.balance import stand
-from rtradar.motion.synthetic.daily import bend, fall, sit, squat, wave
 from rtradar.motion.synthetic.figure import (
     STYLES,
     PosesAt,
@@ -27,6 +25,7 @@ from rtradar.motion.synthetic.figure import (
 )
 from rtradar.motion.synthetic.gait import walk
 from rtradar.motion.synthetic.jacks import jumping_jack
+from rtradar.motion.synthetic.on_the_spot import bend, fall, sit, squat, stand, wave
 from rtradar.motion.synthetic.strikes import kick, punch
 from rtradar.recordings import SYNTHETIC, Source
 from rtradar.system.checks import brief
@@ -93,7 +92,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
     turns round within 1.5 m of the middle. Who stands sways by millimetres; who bends or squats
-    keeps the centre of mass over the feet (`rtradar.motion.synthetic.balance`). All but walks
+    keeps the centre of mass over the feet (`rtradar.motion.synthetic.on_the_spot`). All but walks
     repeat with short rests.
 
     Parameters
@@ -176,7 +175,8 @@ def _checked(asked: str, traits: Traits) -> tuple[str, _Chosen]:
                 f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(names)}"
             )
         given[name] = _parsed(value)
-    chosen = _Chosen(**given | traits)
+    every: dict[str, Any] = {**given, **traits}
+    chosen = _Chosen(**every)
     check_fields(chosen, f"synthetic {activity}: ")
     styles = STYLES.get(activity, ())
     if chosen.style not in ("", *styles):

@@ -8,6 +8,9 @@ high, foot 0.152 long. They give no joint centres inside trunk and foot; ours ar
 way from the middle to the side of the hips (0.191 wide), root 0.04 above them, spine in three equal
 parts to 0.83, base of the head at 0.885, ankle a quarter of the foot from the heel, toe node 0.012
 above the sole.
+
+Masses and the centres of segments are those of D. A. Winter, Biomechanics and Motor Control of
+Human Movement, table 4.1; trunk and head, which bend here, are split between their ends.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.motion.skeleton import NODES
+from rtradar.motion.quaternions import quaternion_rotate
+from rtradar.motion.skeleton import NODE_PARENT, NODES
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -282,6 +286,41 @@ def rotations(pose: Pose, height_m: float) -> Array:
         }
     shape = len(pose.root), 4
     return np.stack([np.broadcast_to(found[node].as_quat(), shape) for node in NODES], axis=1)
+
+
+_MASSES = {"thorax": (0.497, 0.5), "head": (0.081, 0.5)} | {
+    f"{side}_{node}": mass
+    for side in SIDES
+    for node, mass in {
+        "elbow": (0.028, 0.436),
+        "wrist": (0.016, 0.43),
+        "hand": (0.006, 0.506),
+        "knee": (0.1, 0.433),
+        "ankle": (0.0465, 0.433),
+        "toe": (0.0145, 0.5),
+    }.items()
+}
+"""Mass of the segment that ends in a node, relative to the body, and place of its centre on it."""
+
+
+def joints(pose: Pose, height_m: float) -> dict[str, Array]:
+    """Positions (n, 3) of all nodes [m]."""
+    turned, bones = rotations(pose, height_m), offsets(height_m)
+    found = {"root": pose.root}
+    for node, parent in NODE_PARENT.items():
+        found[node] = found[parent] + quaternion_rotate(turned[:, NODES.index(node)], bones[node])
+    return found
+
+
+def centre_of_mass(pose: Pose, height_m: float) -> Array:
+    """Centre of mass (n, 3) of a pose [m]."""
+    at = joints(pose, height_m)
+    starts = {**NODE_PARENT, "thorax": "root", "head": "thorax"}
+    centre = sum(
+        mass * (at[starts[node]] + part * (at[node] - at[starts[node]]))
+        for node, (mass, part) in _MASSES.items()
+    )
+    return np.asarray(centre) / sum(mass for mass, _ in _MASSES.values())
 
 
 # -- smooth functions of time (C2) -----------------------------------------------------------------
