@@ -45,18 +45,13 @@ def brief_rows(radar: Radar) -> dict[str, str]:
 def settings_rows(radar: Radar) -> dict[str, str]:
     """Return what was set, as texts with units by their labels."""
     stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
-    stated = {
-        "transmitted": (radar.transmit_power_dbm, "dBm"),
-        "noise figure": (radar.noise_figure_db, "dB"),
-    }
-    powers = [
-        f"{name} {value:g} {unit}" for name, (value, unit) in stated.items() if value is not None
-    ]
-    pairs = (
-        " (each line by itself)"
-        if radar.channels == "pairs" and radar.is_cross and radar.tx_y * radar.tx_z
-        else ""
-    )
+    powers = []
+    if radar.transmit_power_dbm is not None:
+        powers.append(f"transmitted {radar.transmit_power_dbm:g} dBm")
+    if radar.noise_figure_db is not None:
+        powers.append(f"noise figure {radar.noise_figure_db:g} dB")
+    in_pairs = radar.channels == "pairs" and radar.is_cross and radar.tx_y * radar.tx_z
+    pairs = " (each line by itself)" if in_pairs else ""
     names = {"tdm": "TDM, one Tx after the other", "fdm": "FDM, all Tx at once"}
     names["ddm"] = f"DDM, all Tx at once in {radar.n_doppler_bands} Doppler bands"
     names["bpm"] = "BPM, all Tx at once, told apart by the signs of their chirps"
@@ -66,12 +61,8 @@ def settings_rows(radar: Radar) -> dict[str, str]:
         f"{'vertical' if radar.polarization == 'v' else 'horizontal'} polarisation",
         "Chirp": f"{quantity(radar.chirp_duration_s, 's')}, {radar.samples_per_chirp} samples at "
         f"{quantity(radar.sample_rate_hz, 'Hz')}{idle}",
-        "Transmitters": _line(radar, radar.tx_y, radar.tx_z, radar.tx_spacing_wavelengths)
-        if radar.tx_positions_m is None
-        else f"{radar.n_tx} in a list",
-        "Receivers": _line(radar, radar.rx_y, radar.rx_z, radar.rx_spacing_wavelengths)
-        if radar.rx_positions_m is None
-        else f"{radar.n_rx} in a list",
+        "Transmitters": _lines(radar, "tx"),
+        "Receivers": _lines(radar, "rx"),
         "Channels": f"{radar.n_tx} Tx × {radar.n_rx} Rx = {radar.n_channels}{pairs}",
         "Multiplexing": names[radar.multiplexing],
         "Frame": f"{quantity(radar.frame_duration_s, 's')} every "
@@ -140,10 +131,15 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
     return tuple(name for name, measured in names if measured)
 
 
-def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:
-    lines = [f"{count} along {axis}" for axis, count in (("y", n_y), ("z", n_z)) if count]
-    apart = quantity(spacing_wavelengths * radar.start_wavelength_m, "m")
-    return f"{' and '.join(lines)}, {apart} apart" if max(n_y, n_z) > 1 else " and ".join(lines)
+def _lines(radar: Radar, kind: str) -> str:
+    """Say where the ``tx`` or the ``rx`` are."""
+    listed = getattr(radar, f"{kind}_positions_m")
+    if listed is not None:
+        return f"{len(listed)} in a list"
+    counts = {axis: getattr(radar, f"{kind}_{axis}") for axis in "yz"}
+    lines = " and ".join(f"{count} along {axis}" for axis, count in counts.items() if count)
+    apart_m = getattr(radar, f"{kind}_spacing_wavelengths") * radar.start_wavelength_m
+    return f"{lines}, {quantity(apart_m, 'm')} apart" if max(counts.values()) > 1 else lines
 
 
 def _antenna(antenna: Antenna | None) -> str:
@@ -208,13 +204,8 @@ def _draw_limits(radar: Radar, axes: Axes) -> None:
             *([f"beam: {rows['Angular resolution']}"] if measured_angles(radar) else []),
         )
     )
-    style: dict[str, Any] = {
-        "ha": "center",
-        "va": "center",
-        "fontsize": STYLE["font.size"],
-        "color": theme.text,
-    }
-    axes.text(0, farthest / 2, text, linespacing=1.2, **style)
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": STYLE["font.size"]}
+    axes.text(0, farthest / 2, text, linespacing=1.2, color=theme.text, **style)
     axes.set(xlim=(-1.2 * fastest, 1.2 * fastest), ylim=(0, 1.12 * farthest))
     axes.set(xlabel="Velocity [m/s]", ylabel="Range [m]")
     dress(axes, title="What it measures")

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NoReturn
 
+import numpy as np
+
 from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar.radar import Radar
 from rtradar.system.checks import brief, printable
@@ -237,16 +239,13 @@ def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places
             f"of {count} virtual antennas, and two spacings"
         )
     *steps, y_mm, z_mm = line.values
-    virtual = [
-        (1e-3 * y_mm * steps[k + 1], -1e-3 * z_mm * steps[k]) for k in range(0, 2 * count, 2)
-    ]
-    tx = [(y - virtual[0][0], z - virtual[0][1]) for y, z in virtual[::n_rx]]
-    rx = virtual[:n_rx]
-    for k, (y, z) in enumerate(virtual):
-        own, other = tx[k // n_rx], rx[k % n_rx]
-        if abs(own[0] + other[0] - y) + abs(own[1] + other[1] - z) > 1e-9:
-            line.refuse(f"virtual antenna {k + 1} is not where its Tx and its Rx put it")
-    return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
+    virtual = np.zeros((n_tx, n_rx, 3))
+    virtual[..., 2:0:-1] = np.reshape(steps, (n_tx, n_rx, 2)) * [-1e-3 * z_mm, 1e-3 * y_mm]
+    tx, rx = virtual[:, 0] - virtual[0, 0], virtual[0]
+    off = np.abs(tx[:, None] + rx - virtual).sum(axis=2).ravel() > 1e-9
+    if off.any():
+        line.refuse(f"virtual antenna {off.argmax() + 1} is not where its Tx and its Rx put it")
+    return tuple(map(tuple, tx.tolist())), tuple(map(tuple, rx.tolist()))
 
 
 def _commands(path: Path) -> tuple[_Commands, str | None]:
@@ -373,10 +372,8 @@ def _with_signs(
             "binary phase modulation (bpmCfg) must name two chirps of the frame, with the same two "
             "Tx"
         )
-    members = [one for one in range(4) if pair >> one & 1]
     order = [mask.bit_length() - 1 for mask in masks]
-    for chirp, own in zip(chirps, members, strict=True):
-        order[chirp] = own
+    order[chirps[0]], order[chirps[1]] = members = [one for one in range(4) if pair >> one & 1]
     others = [mask for chirp, mask in enumerate(masks) if chirp not in chirps]
     if any(mask.bit_count() > 1 for mask in others):
         line.refuse("several Tx transmit in a chirp that bpmCfg does not name")

@@ -92,7 +92,7 @@ def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    if _holds_rotations(arrays):
+    if "positions" not in arrays and {"poses", "root_orient", "pose_body"} & arrays.keys():
         text = "body: rotations on the skeleton of a mean person; betas are not read"
         made = checked(path, _as_positions(path, arrays), rate_hz)
         return replace(made, usual="z", findings=(Finding("body_model", "mean", text),))
@@ -243,11 +243,6 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
 
 
 # -- rotations of body models ----------------------------------------------------------------------
-
-
-def _holds_rotations(arrays: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether an archive holds rotations of a body model."""
-    return "positions" not in arrays and bool({"poses", "root_orient", "pose_body"} & set(arrays))
 
 
 def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
