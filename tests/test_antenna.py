@@ -129,22 +129,9 @@ def test_an_isotropic_antenna_is_the_same_all_round() -> None:
             {"gain_dbi": 10**400},
             "gain_dbi = a number of more than 20 digits; it must be a number from",
         ),
-        ({"pattern": "cosine", "exponent": math.nan}, "exponent = nan; it must be a number"),
         ({"azimuth_deg": [0]}, "'table' needs azimuth_deg and azimuth_db"),
         ({"gain": 3}, "unknown key 'gain'"),
         ({"two\nlines": 3}, r"unknown key 'two\\nlines'"),
-        (
-            {"pattern": "cosine", "exponent": 16**500},
-            "exponent = a number of more than 20 digits; it must be a number from 0",
-        ),
-        (
-            {"pattern": "isotropic", "exponent": 16**5000},
-            "exponent = a number of more than 20 digits; it must be a number from 0",
-        ),
-        (
-            {"gain_dbi": -(16**500)},
-            "gain_dbi = a number of more than 20 digits; it must be a number from -100",
-        ),
         ({"gain_dbi": float("nan")}, "gain_dbi = nan; it must be a number from -100"),
         (
             {"pattern": "table", "gain_dbi": 3, "azimuth_deg": 16**5000},

@@ -82,34 +82,27 @@ class Ellipsoids:
     semi_axes: NDArray[np.float64]
 
     def __init__(self, centres: ArrayLike, frames: ArrayLike, semi_axes: ArrayLike) -> None:
-        given = (centres, frames, semi_axes)
-        centre_array, frame_array, axis_array = (np.asarray(value, np.float64) for value in given)
-        parts = centre_array.shape[:1]
-        for name, array, shape in (
-            ("centres", centre_array, (*parts, 3)),
-            ("frames", frame_array, (*parts, 3, 3)),
-            ("semi_axes", axis_array, (*parts, 3)),
-        ):
-            if array.shape != shape or not parts or parts[0] == 0:
+        given = {"centres": centres, "frames": frames, "semi_axes": semi_axes}
+        arrays = {name: np.asarray(value, np.float64) for name, value in given.items()}
+        parts = arrays["centres"].shape[:1]
+        for name, array in arrays.items():
+            axes = (3, 3) if name == "frames" else (3,)
+            if array.shape != (*parts, *axes) or not array.size:
                 raise InputError(
-                    f"Ellipsoids.{name} has shape {array.shape}; it must be "
-                    f"{('part', *shape[1:])}, alike and at least 1 in part"
+                    f"Ellipsoids.{name} has shape {array.shape}; it must be {('part', *axes)}, "
+                    "alike and at least 1 in part"
                 )
             if not np.isfinite(array).all():
-                raise InputError(
-                    f"Ellipsoids.{name} holds NaN or infinity; every value must be finite"
-                )
+                raise InputError(f"Ellipsoids.{name} holds NaN or infinity; it must be finite")
             object.__setattr__(self, name, array)
-        if not (axis_array > 0).all():
+        least, turned = arrays["semi_axes"].min(), arrays["frames"]
+        if not least > 0:
+            raise InputError(f"Ellipsoids.semi_axes: the least is {least} m; it must be positive")
+        error = np.abs(np.swapaxes(turned, 1, 2) @ turned - np.eye(3)).max()
+        if error > 1e-6 or (np.linalg.det(turned) < 0).any():
             raise InputError(
-                f"Ellipsoids.semi_axes: the least is {axis_array.min()} m; every semi-axis must be "
-                "positive"
-            )
-        error = np.abs(np.swapaxes(frame_array, 1, 2) @ frame_array - np.eye(3)).max(initial=0.0)
-        if error > 1e-6 or (np.linalg.det(frame_array) < 0).any():
-            raise InputError(
-                "Ellipsoids.frames: not proper rotations; columns must be "
-                "orthonormal and right-handed"
+                "Ellipsoids.frames: not proper rotations; columns must be orthonormal and "
+                "right-handed"
             )
 
     def without_repeats(self) -> Ellipsoids:
@@ -126,12 +119,10 @@ class Ellipsoids:
         stretch = self.frames * self.semi_axes[:, None]
         shape = stretch @ np.swapaxes(stretch, 1, 2)
         kept: list[int] = []
-        for part, (centre, own, least) in enumerate(
-            zip(self.centres, shape, self.semi_axes.min(axis=1), strict=True)
-        ):
-            away = np.linalg.norm(self.centres[kept] - centre, axis=-1)
+        for part, least in enumerate(self.semi_axes.min(axis=1)):
+            away = np.linalg.norm(self.centres[kept] - self.centres[part], axis=-1)
             # S differs by 2 a da where a semi-axis a differs by da.
-            differs = np.abs(shape[kept] - own).max(axis=(1, 2), initial=0.0)
+            differs = np.abs(shape[kept] - shape[part]).max(axis=(1, 2), initial=0.0)
             if not ((away <= _SAME * least) & (differs <= 2 * _SAME * least**2)).any():
                 kept.append(part)
         if len(kept) == len(self.centres):
@@ -180,9 +171,7 @@ class Body:
             raise InputError(
                 f"Body: semi_axes have shape {axes.shape}; semi_axes must be ({len(PART_NAMES)}, 3)"
             )
-        good = (np.isfinite(axes) & (axes > 0)).all(axis=1)
-        if not good.all():
-            part = int(np.argmin(good))
+        for part in np.flatnonzero(~(np.isfinite(axes) & (axes > 0)).all(axis=1)):
             raise InputError(
                 f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes "
                 f"of {axes[part].tolist()} m; semi_axes must be positive and finite: give the bone "

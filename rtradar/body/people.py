@@ -143,8 +143,8 @@ class Person:
             Where the interval is not inside the recording.
         """
         put = place if self.placement == "standard" else keep_place
-        interval = start_s + self.start_s, duration_s
-        placed = put(self.motion, *interval, heading_deg + self.heading_deg)
+        turn = heading_deg + self.heading_deg
+        placed = put(self.motion, start_s + self.start_s, duration_s, turn)
         return placed.shifted([*self.position_m, 0.0])
 
 
@@ -316,9 +316,8 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     for person, rest in zip(people, left, strict=True):
         # Who ends early rests, unless nobody lasts that long.
         rests = duration_s is not None and 0 <= rest < duration_s <= max(left)
-        placed = person.placed(
-            settings.start_s, None if rests else duration_s, settings.heading_deg
-        )
+        interval = settings.start_s, None if rests else duration_s
+        placed = person.placed(*interval, settings.heading_deg)
         material = settings.body_material if person.material is None else person.material
         breathing = settings.breathing if person.breathing is None else person.breathing
         body = Body.from_motion(placed, breathing, material)

@@ -13,7 +13,7 @@ from typing import Any
 from rtradar.description.tables import KEPT_MOTION
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.motion.formats.saved import load_saved, save_motion
+from rtradar.motion.formats import load_saved, save_motion
 from rtradar.motion.synthetic import ACTORS
 from rtradar.recordings import SYNTHETIC
 from rtradar.scene.tables import files_of

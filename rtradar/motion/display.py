@@ -8,6 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.system.figure_style import (
+    LIGHT,
+    STYLE,
+    axes_given,
+    dress,
+    figure_for,
+    new_figure,
+    png_of,
+    theme_of,
+    write_heading,
+)
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
@@ -23,17 +35,13 @@ def rows(motion: Motion) -> dict[str, str]:
     path_m = float(np.linalg.norm(np.diff(roots[:, :2], axis=0), axis=1).sum())
     girth = "" if motion.girth == 1 else f", {motion.girth:.3g} times as thick as the nominal body"
     first, last = motion.joints[0], motion.joints[-1]
+    spans = [f"{axis} {_span(*ends)}" for axis, *ends in zip("xyz", low, high, strict=True)]
     return {
         "Duration": f"{motion.duration_s:.4g} s",
         "Frames": f"{len(motion.root_positions):,} at {motion.rate_hz:.5g} Hz",
         "Joints": f"{len(motion.joints)}, from {first} to {last}",
         "Height": f"{height_m:.3g} m from the lowest to the highest joint{girth}",
-        "Place": "root at "
-        + ", ".join(
-            f"{axis} {_span(least, most)}"
-            for axis, least, most in zip("xyz", low, high, strict=True)
-        )
-        + " m",
+        "Place": f"root at {', '.join(spans)} m",
         "Path": f"{path_m:.3g} m over the floor",
     }
 
@@ -47,13 +55,8 @@ def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.fl
     times = motion.frame_times
     inside = np.flatnonzero((times > -0.5 / motion.rate_hz) & (times <= motion.duration_s + 1e-9))
     some = inside[np.unique(np.linspace(0, len(inside) - 1, most).astype(int))]
-    taken = replace(
-        motion,
-        root_positions=motion.root_positions[some],
-        rotations=motion.rotations[some],
-        first_frame_s=0.0,
-        length_s=None,
-    )
+    rows = {"root_positions": motion.root_positions[some], "rotations": motion.rotations[some]}
+    taken = replace(motion, first_frame_s=0.0, length_s=None, **rows)
     return times[some], taken.positions
 
 
@@ -70,15 +73,6 @@ _POSES, _PATH_POSES = 6, 400
 
 def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     """Draw a motion from the side, and from above unless axes are given, as `Motion.plot` does."""
-    from rtradar.system.figure_style import (  # slow to import
-        STYLE,
-        axes_given,
-        dress,
-        figure_for,
-        theme_of,
-        write_heading,
-    )
-
     _, ax = axes_given(None, ax)
     _, path = poses(motion, _PATH_POSES)
     joints = path.reshape(-1, 3)
@@ -98,19 +92,15 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
     _draw(above, motion, path, (across, 1 - across))
     dress(side, title="As the radar sees it" if across else "From the side")
     dress(above, title="From above")
-    theme = theme_of(side)
-    style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
     write_heading(figure, f"Motion {motion.name}")
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=_POSES, labelcolor=theme.text, **style
-    )
+    style: dict[str, Any] = {"fontsize": STYLE["legend.fontsize"], "frameon": False}
+    style |= {"loc": "outside lower center", "ncols": _POSES, "labelcolor": theme_of(side).text}
+    figure.legend(handles=handles, **style)
     return side
 
 
 def picture_from_the_side(motion: Motion) -> bytes:
     """Draw the view from the side as a PNG file, for a card."""
-    from rtradar.system.figure_style import new_figure, png_of  # slow to import
-
     figure = new_figure(3.2)
     plot_motion(motion, figure.add_subplot())
     return png_of(figure)
@@ -126,8 +116,6 @@ def _draw(
     from matplotlib import colormaps  # slow to import
     from matplotlib.collections import LineCollection
     from matplotlib.lines import Line2D
-
-    from rtradar.system.figure_style import LIGHT, theme_of
 
     theme, view = theme_of(axes), list(seen)
     times, joints = poses(motion, _POSES)

@@ -126,11 +126,8 @@ class Motion:
             object.__setattr__(self, field, array)
         if len(set(self.joints)) != count:
             raise self._refusal("joint names repeat; every joint needs its own name")
-        if (
-            len(self.parents) != count
-            or self.parents[0] != -1
-            or any(not 0 <= p < j for j, p in enumerate(self.parents) if j)
-        ):
+        ordered = all(0 <= parent < j for j, parent in enumerate(self.parents) if j)
+        if len(self.parents) != count or self.parents[0] != -1 or not ordered:
             raise self._refusal("parents must name one root first (-1), and precede their children")
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
             raise self._refusal(f"rate_hz = {self.rate_hz}; it must be positive")
@@ -143,9 +140,8 @@ class Motion:
                 f"rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})"
             )
         last = self.first_frame_s + (frames - 1) / self.rate_hz
-        if self.first_frame_s > 0 or (
-            self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S
-        ):
+        given = self.length_s is not None
+        if self.first_frame_s > 0 or (given and not 0 <= self.duration_s <= last + _TIME_SLACK_S):
             raise self._refusal(
                 f"frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to "
                 f"{self.length_s} s"
@@ -250,11 +246,8 @@ class Motion:
             )
         instants = np.clip(instants, 0.0, self.duration_s)
         if len(self.root_positions) == 1:
-            roots, still = (
-                np.repeat(values, len(instants), axis=0)
-                for values in (self.root_positions, self.rotations)
-            )
-            return self._forward(roots, still), still
+            still = np.repeat(self.rotations, len(instants), axis=0)
+            return self._forward(self.root_positions, still), still
         positions = np.empty((len(instants), len(self.joints), 3))
         quaternions = np.empty((len(instants), len(self.joints), 4))
         found = positions, quaternions.reshape(len(instants), -1)

@@ -76,9 +76,9 @@ def stature_of(nodes: Array) -> float:
         return float(np.nanmedian(np.linalg.norm(first - last, axis=1)))
 
     legs = [
-        span(of_node(nodes, f"{side}_{first}"), of_node(nodes, f"{side}_{last}"))
+        span(of_node(nodes, f"{side}_knee"), of_node(nodes, f"{side}_{end}"))
         for side in "lr"
-        for first, last in (("hip", "knee"), ("knee", "ankle"))
+        for end in ("hip", "ankle")
     ]
     trunk = span(middle(nodes, "shoulder"), middle(nodes, "hip"))
     head = span(of_node(nodes, "head"), middle(nodes, "shoulder"))
@@ -286,14 +286,12 @@ def leading_t_pose(nodes: Array, rate_hz: float) -> int:
 
 
 def _in_t_pose(nodes: Array) -> bool:
-    across = of_node(nodes, "l_shoulder") - of_node(nodes, "r_shoulder")
-    across = across / np.linalg.norm(across, axis=1, keepdims=True)
-    for side, sign in (("l", 1.0), ("r", -1.0)):
-        arm = of_node(nodes, f"{side}_wrist") - of_node(nodes, f"{side}_shoulder")
-        level = sign * np.sum(arm * across, axis=1) / np.linalg.norm(arm, axis=1)
-        if (level < _ARMS_LEVEL).any():
-            return False
-    return True
+    shoulders = of_node(nodes, "l_shoulder"), of_node(nodes, "r_shoulder")
+    wrists = of_node(nodes, "l_wrist"), of_node(nodes, "r_wrist")
+    across = shoulders[0] - shoulders[1]
+    arms = np.stack([wrists[0] - shoulders[0], shoulders[1] - wrists[1]])
+    sizes = np.linalg.norm(arms, axis=2) * np.linalg.norm(across, axis=1)
+    return bool((np.sum(arms * across, axis=2) >= _ARMS_LEVEL * sizes).all())
 
 
 def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: float) -> Finding:

@@ -11,25 +11,171 @@ finger tips, base to top of the head, thorax to shoulder in a BVH whose neck and
 separate) the part is one rigid bone that always points from the one joint to the other and has the
 median of their distances as its length. Toe tips are up to 3 cm off by that in push-off, the others
 millimetres.
+
+Joints are known by their names in the files of many programs. The table is ``names.toml`` beside
+this module. Of one's own names a file of the same kind is made, and named by the environment
+variable ``RTRADAR_NAMES``.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Callable, Mapping
+import os
+import re
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import Convention, conventions, plain, unknown
 from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, smallest_rotation
+from rtradar.system.checks import brief, check_keys, read_toml, tables_at
 from rtradar.system.row_files import FileBackedRows, in_blocks
 
 Array = NDArray[np.float64]
+
+OWN_NAMES = "RTRADAR_NAMES"
+"""Environment variable that names a table of one's own."""
+
+_Kind = Literal["skeletons", "joints", "markers"]
+_KEYS = ("sides", "middle", "sided", "like", "complete", "low_pass_hz", "head_is_top", "up")
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Joint names of one kind of file, as `plain` gives them.
+
+    ``joints`` has the alternatives for each node, of which the first one that is there counts. The
+    others are described in ``names.toml``; ``open_ended`` is not ``complete``, and such a skeleton
+    may lack some nodes.
+    """
+
+    name: str
+    joints: Mapping[str, tuple[str, ...]]
+    open_ended: bool = True
+    low_pass_hz: float | None = None
+    head_is_top: bool = False
+    up: str = ""
+    may_lack: tuple[str, ...] = ()
+
+    def found(self, there: Container[str]) -> dict[str, str]:
+        """First alternative for each node whose joints are all there."""
+        known = {}
+        for node, choices in self.joints.items():
+            whole = [choice for choice in choices if all(one in there for one in _names(choice))]
+            if whole:
+                known[node] = whole[0]
+        return known
+
+    def missing(self, there: Container[str]) -> list[str]:
+        """Names of the joints that are not there, where no alternative is."""
+        known = self.found(there)
+        known |= dict.fromkeys(self.may_lack, "")
+        last = [choices[-1] for node, choices in self.joints.items() if node not in known]
+        return list(dict.fromkeys(one for each in last for one in _names(each) if one not in there))
+
+
+def plain(name: str) -> str:
+    """A joint's name without namespace (``mixamorig:``, ``Bip01``), case, spaces, underscores."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*|[Bb]ip\d+)", "", name).lower())
+
+
+def conventions(kind: _Kind) -> tuple[Convention, ...]:
+    """Every kind of skeleton, joints or markers that is understood; one's own come first."""
+    own, known = os.environ.get(OWN_NAMES, ""), _read(Path(__file__).with_name("names.toml"), kind)
+    return (*(_read(Path(own), kind) if own else ()), *known)
+
+
+@lru_cache(maxsize=4)
+def _read(path: Path, kind: str) -> tuple[Convention, ...]:
+    named = dict[str, Mapping[str, Any]]()
+    content = read_toml(path, "names of joints", "check the path")
+    with prefixed(f"{path}: "):
+        tables = list(tables_at(kind, content))
+    for where, table in tables:
+        check_keys(f"{path}: {where}", table, ("name",), _KEYS)
+        named[table["name"]] = {**named.get(table.get("like", ""), {}), **table}
+    return tuple(_convention(path, table, kind) for table in named.values())
+
+
+def _convention(path: Path, table: Mapping[str, Any], kind: str) -> Convention:
+    open_ended = not table.get("complete", False)
+    try:
+        texts = dict(table["middle"])
+        for side, name in zip("lr", table["sides"], strict=True):
+            for node, text in table["sided"].items():
+                texts[f"{side}_{node}"] = text.replace("@", name)
+        joints = {node: tuple(re.split(r",\s*", text)) for node, text in texts.items()}
+        for choice in itertools.chain(*joints.values()):
+            _fraction(choice)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"{path}: {table['name']}: sides, middle and sided are needed, as in names.toml of "
+            f"rtradar ({brief(str(error))[1:-1]})"
+        ) from None
+    own = {key: table[key] for key in ("low_pass_hz", "head_is_top", "up") if key in table}
+    if kind == "skeletons" and open_ended:
+        # No end site at all: the part starts and ends in one joint, and is extended from there.
+        for end in ("head", "l_hand", "r_hand"):
+            joints[end] += joints[NODE_PARENT[end]]
+        own["may_lack"] = ("thorax",)
+    return Convention(table["name"], joints, open_ended, **own)
+
+
+def _names(choice: str) -> list[str]:
+    """Names of the joints in a text such as ``a+b>c 0.4``."""
+    return re.split("[+>]", choice.partition(" ")[0])
+
+
+def _fraction(choice: str) -> float:
+    return float(choice.partition(" ")[2] or 0)
+
+
+def recognise(where: str, names: Sequence[str], kind: _Kind = "joints") -> Convention:
+    """Return the convention of joints by their names; an `InputError` names what is missing."""
+    there = {plain(name) for name in names}
+    tried = [(known, known.missing(there)) for known in conventions(kind)]
+    best, lacking = min(tried, key=lambda one: len(one[1]))
+    if lacking:
+        raise unknown(where, names, tried)
+    return best
+
+
+def unknown(
+    where: str, names: Sequence[str], tried: Sequence[tuple[Convention, Sequence[str]]]
+) -> InputError:
+    """Return the error for names of joints that fit no convention, of which these are lacking."""
+    nearest, lacking = min(tried, key=lambda one: len(one[1]))
+    if len(lacking) > len(nearest.joints) / 2:
+        return InputError(
+            f"{where}: its joints ({', '.join(names[:4])}, ...) are named as in no set that is "
+            f"known: {'; '.join(one.name for one, _ in tried)}; rename them after one of these, or "
+            f"name them in a table of your own ({OWN_NAMES})"
+        )
+    return InputError(
+        f"{where}: joints {', '.join(lacking)} of {nearest.name} are missing; rename or add them"
+    )
+
+
+def node_positions(
+    convention: Convention, names: Sequence[str], positions: Array, nodes: Sequence[str]
+) -> Array:
+    """Positions (frame, node, 3) of the nodes from those of joints (frame, joint, 3)."""
+    column = {plain(name): k for k, name in reversed(list(enumerate(names)))}
+    found, choices = np.empty((len(positions), len(nodes), 3)), convention.found(column)
+    for k, node in enumerate(nodes):
+        ends = [
+            np.mean([positions[:, column[name]] for name in end.split("+")], axis=0)
+            for end in choices[node].partition(" ")[0].split(">")
+        ]
+        found[:, k] = ends[0] + _fraction(choices[node]) * (ends[-1] - ends[0])
+    return found
 
 
 def _chain(side: str, *nodes: str) -> dict[str, str]:
@@ -135,25 +281,13 @@ def to_nodes(motion: Motion) -> Motion:
 def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     """The convention whose names fit, and the joint of each node it names."""
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
-    tried = []
-    for convention in conventions("skeletons"):
-        found = {
-            node: there[name] for node, name in convention.found(there).items() if name in there
-        }
-        missing = [node for node in convention.joints if node not in found]
-        if convention.open_ended:
-            # No end site at all: the part starts and ends in one joint, and is extended from there.
-            for node in [node for node in missing if node == "head" or node.endswith("_hand")]:
-                if NODE_PARENT[node] in found:
-                    found[node] = found[NODE_PARENT[node]]
-                missing.remove(node)
-            if missing == ["thorax"] and motion.parents[found["neck"]] >= 0:
-                # Without a neck the head's own parent is where the trunk ends.
-                found["thorax"], missing = motion.parents[found["neck"]], []
-        if not missing:
-            return convention, found
-        tried.append((convention, [" or ".join(convention.joints[node]) for node in missing]))
-    raise unknown(motion.name, motion.joints, tried)
+    convention = recognise(motion.name, motion.joints, "skeletons")
+    found = {node: there[name] for node, name in convention.found(there).items()}
+    if "thorax" not in found:  # without a neck the head's own parent is where the trunk ends
+        found["thorax"] = motion.parents[found["neck"]]
+        if found["thorax"] < 0:
+            raise unknown(motion.name, motion.joints, [(convention, convention.joints["thorax"])])
+    return convention, found
 
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:

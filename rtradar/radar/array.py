@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.radar.ambiguity import LinePattern
 from rtradar.radar.waveform import MOST, Waveform, positive
 from rtradar.system.fields import Angle, Limits
 
@@ -261,8 +260,21 @@ class Array(Waveform):
 
     @cached_property
     def patterns(self) -> tuple[LinePattern, LinePattern]:
-        """Far field of all virtual elements over the sines of azimuth and of elevation."""
-        y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
+        """Far field of all virtual elements over the sines of azimuth and of elevation.
+
+        Each line of a cross is taken for one without gaps, whose angles are those of
+        (:eq:`angle-axis`), and both for the longer one.
+        """
+        if not self.is_cross:
+            y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
+            return y, z
+        spacing = self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+        counts = self.tx_y * self.rx_y, self.tx_z * self.rx_z
+        width = min(180.0, math.degrees(0.886 / (max(*counts, 1) * spacing)))
+        y, z = (
+            LinePattern(count > 1, 1 / spacing, -math.inf, width if count > 1 else 180.0)
+            for count in counts
+        )
         return y, z
 
     @property
@@ -272,31 +284,22 @@ class Array(Waveform):
         Of a cross it is asin(lambda / 2d) (:eq:`angle-axis`), of a listed array half the sine of
         the first grating lobe, `LinePattern.grating_sine`.
         """
-        return self._cross_angle_deg if self.is_cross else self.patterns[0].max_angle_deg
+        return self.patterns[0].max_angle_deg
 
     @property
     def max_elevation_deg(self) -> float:
         """Elevation up to which no other direction looks alike [deg]; see `max_azimuth_deg`."""
-        return self._cross_angle_deg if self.is_cross else self.patterns[1].max_angle_deg
+        return self.patterns[1].max_angle_deg
 
     @property
     def max_angle_deg(self) -> float:
         """Unambiguous angle, the larger of those of azimuth and elevation [deg]."""
-        axes = self.max_azimuth_deg, self.max_elevation_deg
-        if self.is_cross:
-            return axes[0]
-        measured = [most for most, there in zip(axes, self.measures, strict=True) if there]
-        return max(measured, default=90.0)
-
-    @property
-    def _cross_angle_deg(self) -> float:
-        return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
+        measured = [one.max_angle_deg for one in self.patterns if one.wide]
+        return max(measured, default=self.max_azimuth_deg)
 
     @property
     def measures(self) -> tuple[bool, bool]:
         """Whether the radar measures azimuth, and whether it measures elevation."""
-        if self.is_cross:
-            return self.tx_y * self.rx_y > 1, self.tx_z * self.rx_z > 1
         y, z = self.patterns
         return y.wide, z.wide
 
@@ -308,31 +311,17 @@ class Array(Waveform):
         beam widths. Where the spacings of Tx and Rx of a cross do not fill a line without gaps, it
         is the width for a line of as many elements.
         """
-        if not self.is_cross:
-            return min(self.azimuth_resolution_deg, self.elevation_resolution_deg)
-        elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
-        if elements < 2:
-            return 180.0
-        return min(180.0, math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths)))
+        return min(self.azimuth_resolution_deg, self.elevation_resolution_deg)
 
     @property
     def azimuth_resolution_deg(self) -> float:
         """Half-power beam width in azimuth at broadside [deg]; 180 where it is not measured."""
-        return self._resolution_deg(0)
+        return self.patterns[0].width_deg
 
     @property
     def elevation_resolution_deg(self) -> float:
         """Half-power beam width in elevation at broadside [deg]; 180 where it is not measured."""
-        return self._resolution_deg(1)
-
-    def _resolution_deg(self, axis: int) -> float:
-        if not self.is_cross:
-            return self.patterns[axis].width_deg
-        return self.angle_resolution_deg if self.measures[axis] else 180.0
-
-    @property
-    def _virtual_spacing_wavelengths(self) -> float:
-        return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+        return self.patterns[1].width_deg
 
 
 def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:
@@ -361,3 +350,72 @@ def _rotation(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     left = [-cr * sy - sr * sp * cy, cr * cy - sr * sp * sy, sr * cp]
     up = [sr * sy - cr * sp * cy, -sr * cy - cr * sp * sy, cr * cp]
     return np.stack([np.stack(axis, axis=-1) for axis in (boresight, left, up)], axis=-1)
+
+
+GRATING_DB = -3.0
+"""A lobe beside the main lobe counts as a grating lobe from here on, below the main lobe [dB]."""
+
+_PER_WAVELENGTH = 64  # points over the finest ripple of the pattern, 1 / aperture
+_MOST_POINTS = 2**20
+_LEAST = 1e-6  # aperture below which elements are at one place [wavelengths]
+
+
+@dataclass(frozen=True)
+class LinePattern:
+    """What a beam of all elements shows of an echo whose sine differs by 0 to 2.
+
+    ``wide`` is whether elements differ in their place at all. ``grating_sine`` is the difference in
+    sine at which the first grating lobe is, 2 if there is none, and ``grating_db`` its power below
+    the main lobe. ``width_deg`` is the half-power width of the main lobe at broadside.
+    """
+
+    wide: bool
+    grating_sine: float
+    grating_db: float
+    width_deg: float
+
+    @property
+    def max_angle_deg(self) -> float:
+        """Angle between whose two ends no echo shows at another's place [deg]."""
+        return math.degrees(math.asin(min(1.0, self.grating_sine / 2)))
+
+    @classmethod
+    def of(cls, places: NDArray[np.float64]) -> LinePattern:
+        """Pattern of elements at these places (element,) along the line, in wavelengths."""
+        aperture = float(np.ptp(places))
+        if aperture < _LEAST:
+            return cls(False, 2.0, -math.inf, 180.0)
+        count = min(_MOST_POINTS, math.ceil(2 * _PER_WAVELENGTH * max(1.0, aperture)))
+        sines = np.linspace(0.0, 2.0, count + 1)
+        power = pattern(places, sines)
+        half = np.flatnonzero(power < 0.5)
+        width = 180.0
+        if len(half):
+            end = half[0]
+            inside = (power[end - 1] - 0.5) / (power[end - 1] - power[end])
+            edge = sines[end - 1] + inside * (sines[end] - sines[end - 1])
+            width = 2 * math.degrees(math.asin(min(1.0, edge)))
+        # The main lobe ends where the power has its first minimum.
+        rising = np.flatnonzero(np.diff(power) > 0)
+        if not len(rising):
+            return cls(True, 2.0, -math.inf, width)
+        beyond = power[rising[0] :]
+        peaks = np.flatnonzero((beyond[1:-1] >= beyond[:-2]) & (beyond[1:-1] > beyond[2:])) + 1
+        high = peaks[beyond[peaks] > 10 ** (GRATING_DB / 10)]
+        if not len(high):
+            return cls(True, 2.0, -math.inf, width)
+        first = rising[0] + high[0]
+        left, middle, right = power[first - 1 : first + 2]
+        shift = 0.5 * (left - right) / (left - 2 * middle + right)
+        sine = sines[first] + shift * sines[1]
+        level = float(pattern(places, np.array([sine]))[0])
+        return cls(True, float(sine), 10 * math.log10(level), width)
+
+
+def pattern(places: NDArray[np.float64], sines: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Power (sine,) of a beam of all elements (element,) [wavelengths], 1 at sine 0."""
+    distinct, count = np.unique(np.round(places, 9), return_counts=True)
+    field = np.zeros(len(sines), dtype=np.complex128)
+    for place, number in zip(distinct - distinct[0], count, strict=True):
+        field += number * np.exp(2j * np.pi * place * sines)
+    return np.abs(field / len(places)) ** 2

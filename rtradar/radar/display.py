@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from rtradar.antenna import Antenna
 from rtradar.cards import quantity
+from rtradar.system.figure_style import (
+    STYLE,
+    axes_given,
+    dress,
+    figure_for,
+    theme_of,
+    write_heading,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from rtradar.radar.radar import Radar
+
+
+_ANGLES = ("azimuth", "elevation")
 
 
 def brief_rows(radar: Radar) -> dict[str, str]:
@@ -30,18 +45,13 @@ def brief_rows(radar: Radar) -> dict[str, str]:
 def settings_rows(radar: Radar) -> dict[str, str]:
     """Return what was set, as texts with units by their labels."""
     stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
-    stated = {
-        "transmitted": (radar.transmit_power_dbm, "dBm"),
-        "noise figure": (radar.noise_figure_db, "dB"),
-    }
-    powers = [
-        f"{name} {value:g} {unit}" for name, (value, unit) in stated.items() if value is not None
-    ]
-    pairs = (
-        " (each line by itself)"
-        if radar.channels == "pairs" and radar.is_cross and radar.tx_y * radar.tx_z
-        else ""
-    )
+    powers = []
+    if radar.transmit_power_dbm is not None:
+        powers.append(f"transmitted {radar.transmit_power_dbm:g} dBm")
+    if radar.noise_figure_db is not None:
+        powers.append(f"noise figure {radar.noise_figure_db:g} dB")
+    in_pairs = radar.channels == "pairs" and radar.is_cross and radar.tx_y * radar.tx_z
+    pairs = " (each line by itself)" if in_pairs else ""
     names = {"tdm": "TDM, one Tx after the other", "fdm": "FDM, all Tx at once"}
     names["ddm"] = f"DDM, all Tx at once in {radar.n_doppler_bands} Doppler bands"
     names["bpm"] = "BPM, all Tx at once, told apart by the signs of their chirps"
@@ -51,12 +61,8 @@ def settings_rows(radar: Radar) -> dict[str, str]:
         f"{'vertical' if radar.polarization == 'v' else 'horizontal'} polarisation",
         "Chirp": f"{quantity(radar.chirp_duration_s, 's')}, {radar.samples_per_chirp} samples at "
         f"{quantity(radar.sample_rate_hz, 'Hz')}{idle}",
-        "Transmitters": _line(radar, radar.tx_y, radar.tx_z, radar.tx_spacing_wavelengths)
-        if radar.tx_positions_m is None
-        else f"{radar.n_tx} in a list",
-        "Receivers": _line(radar, radar.rx_y, radar.rx_z, radar.rx_spacing_wavelengths)
-        if radar.rx_positions_m is None
-        else f"{radar.n_rx} in a list",
+        "Transmitters": _lines(radar, "tx"),
+        "Receivers": _lines(radar, "rx"),
         "Channels": f"{radar.n_tx} Tx × {radar.n_rx} Rx = {radar.n_channels}{pairs}",
         "Multiplexing": names[radar.multiplexing],
         "Frame": f"{quantity(radar.frame_duration_s, 's')} every "
@@ -70,27 +76,21 @@ def settings_rows(radar: Radar) -> dict[str, str]:
 
 def limit_rows(radar: Radar) -> dict[str, str]:
     """Return the limits that follow from the settings, as texts with units by their labels."""
-    axes = " and ".join(measured_angles(radar))
-    beam, most = f"{radar.angle_resolution_deg:.3g}°", f"±{radar.max_angle_deg:.3g}° in {axes}"
-    gratings = {}
-    if not radar.is_cross:
-        own = {
-            "azimuth": (radar.max_azimuth_deg, radar.azimuth_resolution_deg),
-            "elevation": (radar.max_elevation_deg, radar.elevation_resolution_deg),
-        }
-        measured = [(name, *own[name]) for name in measured_angles(radar)]
-        most = ", ".join(f"±{angle:.3g}° in {name}" for name, angle, _ in measured)
-        beam = " and ".join(f"{width:.3g}°" for _, _, width in measured)
-        if lobes := _grating_lobes(radar):
-            gratings = {"Grating lobes": lobes}
+    measured = [(name, one) for name, one in zip(_ANGLES, radar.patterns, strict=True) if one.wide]
+    most: dict[str, list[str]] = {}
+    for name, one in measured:
+        most.setdefault(f"±{one.max_angle_deg:.3g}°", []).append(name)
+    reach = ", ".join(f"{angle} in {' and '.join(names)}" for angle, names in most.items())
+    beam = " and ".join(dict.fromkeys(f"{one.width_deg:.3g}°" for _, one in measured))
+    lobes = _grating_lobes(radar)
     return {
         "Maximum range": f"{radar.max_range_m:.4g} m",
         "Range resolution": f"{100 * radar.range_bin_m:.4g} cm",
         "Maximum velocity": f"±{radar.max_velocity_mps:.4g} m/s",
         "Velocity resolution": f"{radar.velocity_bin_mps:.3g} m/s",
-        "Maximum angle": most if axes else "not measured",
-        "Angular resolution": f"{beam} at boresight" if axes else "not measured",
-        **gratings,
+        "Maximum angle": reach or "not measured",
+        "Angular resolution": f"{beam} at boresight" if beam else "not measured",
+        **({"Grating lobes": lobes} if lobes else {}),
         "Wavelength": f"{quantity(radar.wavelength_m, 'm')} at the sweep centre",
         "Samples in a frame": f"{radar.chirps_per_frame * radar.n_rx * radar.samples_per_chirp:,}",
     }
@@ -105,7 +105,7 @@ def _turn(radar: Radar) -> str:
 
 def _grating_lobes(radar: Radar) -> str:
     """Say how far from an echo, in sines, its first grating lobe is, and how high."""
-    names = zip(("azimuth", "elevation"), radar.patterns, strict=True)
+    names = zip(_ANGLES, radar.patterns, strict=True)
     return ", ".join(
         f"{one.grating_sine:.3g} from an echo in the sine of {name}, {one.grating_db:.1f} dB"
         for name, one in names
@@ -127,17 +127,85 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
     -------
     tuple of str
     """
-    names = zip(("azimuth", "elevation"), radar.measures, strict=True)
+    names = zip(_ANGLES, radar.measures, strict=True)
     return tuple(name for name, measured in names if measured)
 
 
-def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:
-    lines = [f"{count} along {axis}" for axis, count in (("y", n_y), ("z", n_z)) if count]
-    apart = quantity(spacing_wavelengths * radar.start_wavelength_m, "m")
-    return f"{' and '.join(lines)}, {apart} apart" if max(n_y, n_z) > 1 else " and ".join(lines)
+def _lines(radar: Radar, kind: str) -> str:
+    """Say where the ``tx`` or the ``rx`` are."""
+    listed = getattr(radar, f"{kind}_positions_m")
+    if listed is not None:
+        return f"{len(listed)} in a list"
+    counts = {axis: getattr(radar, f"{kind}_{axis}") for axis in "yz"}
+    lines = " and ".join(f"{count} along {axis}" for axis, count in counts.items() if count)
+    apart_m = getattr(radar, f"{kind}_spacing_wavelengths") * radar.start_wavelength_m
+    return f"{lines}, {quantity(apart_m, 'm')} apart" if max(counts.values()) > 1 else lines
 
 
 def _antenna(antenna: Antenna | None) -> str:
     if antenna is None or antenna.pattern == "isotropic":
         return "isotropic"
     return f"{antenna.pattern}, peak {10 * math.log10(antenna.peak_gain):.3g} dBi"
+
+
+def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
+    """Draw the array of a radar, and beside it the limits, as `Radar.plot` does."""
+    _, ax = axes_given(None, ax)
+    if ax is not None:
+        _draw_array(radar, ax, f"{radar.name}: array, seen from behind")
+        return ax
+    figure = figure_for(4.3)
+    array, limits = figure.subplots(1, 2)
+    write_heading(figure, f"Radar {radar.name}")
+    _draw_array(radar, array, "Array, seen from behind")
+    _draw_limits(radar, limits)
+    return array
+
+
+def _draw_array(radar: Radar, axes: Axes, title: str) -> None:
+    theme = theme_of(axes)
+    tx, rx = (1e3 * places[:, 1:] for places in (radar.tx_m, radar.rx_m))
+    kept = np.unique(radar.rx_of_tx)
+    virtual = (tx[:, None] + rx[radar.rx_of_tx]).reshape(-1, 2)
+    blue, orange = theme.cycle[:2]
+    points: dict[str, Any] = {"linestyle": "none", "markerfacecolor": "none"}
+    drawn = {"s": virtual, "o": rx[kept], "^": tx}
+    styles: dict[str, dict[str, Any]] = {
+        "s": {"color": theme.faint, "markersize": 3, "label": f"{len(virtual)} virtual (Tx + Rx)"},
+        "o": {"color": blue, "markersize": 4.5, "label": f"{len(kept)} Rx"},
+        "^": {"color": orange, "markersize": 8, "label": f"{len(tx)} Tx"},
+    }
+    for marker, places in drawn.items():
+        axes.plot(*places.T, marker=marker, **points, **styles[marker])
+    reach = 1.12 * max(5.0, *(float(np.abs(places).max()) for places in drawn.values()))
+    upward = max(0.7 * reach, 1.12 * float(np.abs(virtual[:, 1]).max()))
+    # The view is that of the radar, which has y at its left. The legend is above the array.
+    axes.set(xlim=(reach, -reach), ylim=(-upward, upward + 0.75 * reach))
+    axes.set(xlabel="y [mm]", ylabel="z [mm]")
+    axes.set_aspect("equal")
+    axes.legend(loc="upper center", handletextpad=0.2, borderpad=0.3)
+    dress(axes, title=title)
+
+
+def _draw_limits(radar: Radar, axes: Axes) -> None:
+    from matplotlib.patches import Rectangle  # slow to import
+
+    theme, rows = theme_of(axes), limit_rows(radar)
+    fastest, farthest = radar.max_velocity_mps, radar.max_range_m
+    colour = theme.cycle[0]
+    size: dict[str, Any] = {"width": 2 * fastest, "height": farthest}
+    axes.add_patch(Rectangle((-fastest, 0), **size, facecolor=colour, alpha=0.18))
+    axes.add_patch(Rectangle((-fastest, 0), **size, fill=False, edgecolor=colour))
+    text = "\n\n".join(
+        (
+            f"{rows['Maximum range']} and {rows['Maximum velocity']}\nwithout ambiguity",
+            f"one cell: {rows['Range resolution']}\nby {rows['Velocity resolution']}",
+            f"angle: {rows['Maximum angle']}".replace(" and ", "\nand "),
+            *([f"beam: {rows['Angular resolution']}"] if measured_angles(radar) else []),
+        )
+    )
+    style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": STYLE["font.size"]}
+    axes.text(0, farthest / 2, text, linespacing=1.2, color=theme.text, **style)
+    axes.set(xlim=(-1.2 * fastest, 1.2 * fastest), ylim=(0, 1.12 * farthest))
+    axes.set(xlabel="Velocity [m/s]", ylabel="Range [m]")
+    dress(axes, title="What it measures")

@@ -326,9 +326,7 @@ class Radar(Schedule):
         >>> axes.get_xlabel()
         'y [mm]'
         """
-        from rtradar.radar.picture import plot_radar
-
-        return plot_radar(self, ax)
+        return display.plot_radar(self, ax)
 
     @property
     def watts_per_m2(self) -> float:

@@ -17,12 +17,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, NoReturn
 
+import numpy as np
+
 from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar.radar import Radar
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import read_bytes
 
 _MOST_BYTES, _MOST_CHIRPS = 1_000_000, 512
+
+_ODD = "the number of real samples is odd; half as many complex ones are made"
 
 _CEILING_DEG = 45.0
 """Tilt from which on a sensor looks down from a ceiling."""
@@ -34,18 +38,6 @@ _COUNTS: dict[str, Sequence[int]] = {**_TABLE["counts"], "antGeometryCfg": range
 """Commands that are read, with the numbers of values that they may have."""
 
 _PLATFORM = re.compile(r"%\s*platform\s*:\s*(\S+)", re.IGNORECASE)
-
-_NEEDED = ("profileCfg", "chirpCfg", "frameCfg", "channelCfg", "adcCfg")
-_NEEDED_LOW_POWER = ("chirpComnCfg", "chirpTimingCfg", "frameCfg", "channelCfg")
-
-# These start, stop, calibrate or show, and leave chirps, samples and detection as they are.
-_WITHOUT_EFFECT = re.compile(
-    "sensorSt(art|op)|flushCfg|lowPower(Cfg)?|guiMonitor|calibDcRangeSig|analogMonitor|calibData|"
-    "(comp|measure)RangeBiasAndRxChanPhase|CQ(RxSat|SigImg)Monitor|lvdsStreamCfg|antGeometry1|"
-    "antPhaseRot|factoryCalibCfg|adcDataSource|adcLogging|baudRate|runtimeCalibCfg"
-)
-_SWITCHES = ("clutterRemoval", "extendedMaxVelocity", "nearFieldCfg")
-"""Commands of the processing on the chip, of which a last 0 switches one off."""
 
 
 class _Line(NamedTuple):
@@ -86,30 +78,32 @@ def read_ti_cfg(path: str | Path, board: str | None = None) -> TiProfile:
     with prefixed(f"profile '{path}': "):
         commands, platform = _commands(path)
         low_power = "chirpComnCfg" in commands
-        for command in _NEEDED_LOW_POWER if low_power else _NEEDED:
+        needed = _TABLE["needed"]["low_power" if low_power else "sdk"]
+        for command in needed:
             if command not in commands:
                 raise InputError(f"it has no {command}; it must say it")
         read = _read_low_power if low_power else _read
-        return read(path, commands, platform, board)
+        return read(path, commands, platform, board, *(commands[one][-1] for one in needed))
 
 
 def _warn(path: Path, text: str) -> None:
     warnings.warn(f"profile '{path}': {text}", ValidityWarning, stacklevel=6)
 
 
-def _read(path: Path, commands: _Commands, platform: str | None, board: str | None) -> TiProfile:
-    """Read the commands of the mmWave SDK."""
+def _read(
+    path: Path, commands: _Commands, platform: str | None, board: str | None, *lines: _Line
+) -> TiProfile:
+    """Read the commands of the mmWave SDK; ``lines`` are those that are needed."""
     mode = commands.get("dfeDataOutputMode", [])
     if mode and mode[-1].values[0] != 1:
         mode[-1].refuse("dfeDataOutputMode must be 1, frames of one kind; others are not simulated")
-    frame, channels, adc = (commands[one][-1] for one in ("frameCfg", "channelCfg", "adcCfg"))
+    *_, frame, channels, adc = lines
     sequence = _sequence(path, commands, frame, channels)
     order, profile = sequence.order, sequence.profile
     base = Radar.preset(board or _board(path, commands, platform, profile.values[1]))
-    most_tx, most_rx = base.n_tx, base.n_rx
-    rx_mask = channels.whole(0, 1, 2**most_rx - 1, "the mask of Rx")
-    if max(order) >= most_tx:
-        channels.refuse(f"Tx {max(order) + 1} is on, and board {base.name} has {most_tx}")
+    rx_mask = channels.whole(0, 1, 2**base.n_rx - 1, "the mask of Rx")
+    if max(order) >= base.n_tx:
+        channels.refuse(f"Tx {max(order) + 1} is on, and board {base.name} has {base.n_tx}")
     if adc.whole(0, 0, 2, "the bits of a sample") != 2:
         adc.refuse("samples must have 16 bits (2); others are not read")
     if adc.values[1] not in (0, 1):
@@ -118,48 +112,40 @@ def _read(path: Path, commands: _Commands, platform: str | None, board: str | No
     q_first = buffer is not None and buffer.values[-3] == 1
     if buffer is not None and not set(buffer.values[-4:-1]) <= {0, 1}:
         buffer.refuse("the order of samples, Q first and the interleaving must be 0 or 1 each")
-    real = adc.values[1] == 0
-    loops = frame.whole(2, 1, 65536, "the number of loops")
-    period_ms = frame.values[5 if len(frame.values) == 8 else 4]
+    real, in_turn = adc.values[1] == 0, sequence.multiplexing == "tdm"
     tx = order if sequence.multiplexing == "ddm" else sorted(order)
-    positions = base.tx_positions_m, base.rx_positions_m
-    assert positions[0] is not None  # every board lists its antennas
-    assert positions[1] is not None
-    tdm = sequence.multiplexing == "tdm"
-    radar = dataclasses.replace(
-        base,
-        name=_named(base.name, path),
-        tx_positions_m=tuple(positions[0][one] for one in tx),
-        rx_positions_m=tuple(positions[1][k] for k in range(most_rx) if rx_mask >> k & 1),
-        tx_order=tuple(tx.index(one) for one in order) if tdm else None,
-        multiplexing=sequence.multiplexing,
-        chirps_per_frame=loops * sequence.cycles * len(order),
-        frame_period_s=1e-3 * period_ms,
-        transmit_power_dbm=_power(base, profile, tx),
+    places = _places_of(base)
+    fields = {
+        "tx_positions_m": tuple(places[0][one] for one in tx),
+        "tx_order": tuple(tx.index(one) for one in order) if in_turn else None,
+        "multiplexing": sequence.multiplexing,
+        "chirps_per_frame": frame.whole(2, 1, 65536, "the number of loops")
+        * sequence.cycles
+        * len(order),
+        "frame_period_s": 1e-3 * frame.values[5 if len(frame.values) == 8 else 4],
+        "transmit_power_dbm": _power(base, profile, tx),
         **_waveform(profile, real),
-        **_pose(commands, base),
-    )
+    }
+    radar = _radar(path, commands, base, places[1], rx_mask, fields)
     return TiProfile(radar, real, not real and q_first, rx_mask)
 
 
 def _read_low_power(
-    path: Path, commands: _Commands, platform: str | None, board: str | None
+    path: Path, commands: _Commands, platform: str | None, board: str | None, *lines: _Line
 ) -> TiProfile:
     """Read the commands of the low-power chips (xWRL), whose samples are real."""
-    common, timing, frame, channels = (commands[one][-1] for one in _NEEDED_LOW_POWER)
+    common, timing, frame, channels = lines
     name = (platform or "").lower()
     if len(frame.values) != 6:
         frame.refuse(f"frameCfg of a low-power chip has {len(frame.values)} values, not 6")
     base = Radar.preset(board or _BOARDS.get(name, "iwrl6432"))
     large = "684" in name
-    tx_places, rx_places = base.tx_positions_m, base.rx_positions_m
+    tx_places, rx_places = _places_of(base)
     if "antGeometryCfg" in commands:
         counts = (4, 4) if large else (base.n_tx, base.n_rx)
         tx_places, rx_places = _virtual_places(commands["antGeometryCfg"][-1], *counts)
     elif large:
         raise InputError("it has no antGeometryCfg, which says where antennas are")
-    assert tx_places is not None  # every board lists its antennas
-    assert rx_places is not None
     rx_mask = channels.whole(0, 1, 2 ** len(rx_places) - 1, "the mask of Rx")
     tx_mask = channels.whole(1, 1, 2 ** len(tx_places) - 1, "the mask of Tx")
     tx = [place for k, place in enumerate(tx_places) if tx_mask >> k & 1]
@@ -174,7 +160,7 @@ def _read_low_power(
     bursts, burst_us = frame.whole(3, 1, 4096, "the number of bursts"), frame.values[2]
     samples = common.whole(3, 2, 2048, "the number of samples")
     if samples % 2:
-        common.refuse("the number of real samples is odd; half as many complex ones are made")
+        common.refuse(_ODD)
     rate_hz = (200e6 if large else 100e6) / common.whole(0, 8, 100, "the divisor of the rate")
     ramp_us, idle_us, slope = common.values[5], timing.values[0], timing.values[3]
     if not (slope > 0 and ramp_us > 0 and chirps * (ramp_us + idle_us) <= burst_us * (1 + 1e-9)):
@@ -188,28 +174,57 @@ def _read_low_power(
             f"the {chirps} chirps of a burst are taken evenly over its "
             f"{burst_us:g} us; the chip transmits one every {ramp_us + idle_us:g} us, and pauses",
         )
-    radar = dataclasses.replace(
-        base,
-        name=_named("iwrl6844" if large else base.name, path),
-        tx_positions_m=tuple(tx),
-        rx_positions_m=tuple(rx_places[k] for k in range(len(rx_places)) if rx_mask >> k & 1),
-        tx_order=None,
-        multiplexing="bpm" if pattern == 4 else "tdm",
-        start_frequency_hz=1e9 * timing.values[4],
-        bandwidth_hz=1e6 * slope * ramp_us,
-        chirp_duration_s=1e-6 * ramp_us,
-        idle_s=1e-6 * (burst_us / chirps - ramp_us),
-        adc_start_s=timing.values[1] / rate_hz,
-        samples_per_chirp=samples // 2,
-        adc_rate_hz=rate_hz / 2,
-        chirps_per_frame=chirps * bursts,
-        frame_period_s=1e-3 * frame.values[4],
-        **_pose(commands, base),
-    )
+    fields = {
+        "tx_positions_m": tuple(tx),
+        "tx_order": None,
+        "multiplexing": "bpm" if pattern == 4 else "tdm",
+        "start_frequency_hz": 1e9 * timing.values[4],
+        "bandwidth_hz": 1e6 * slope * ramp_us,
+        "chirp_duration_s": 1e-6 * ramp_us,
+        "idle_s": 1e-6 * (burst_us / chirps - ramp_us),
+        "adc_start_s": timing.values[1] / rate_hz,
+        "samples_per_chirp": samples // 2,
+        "adc_rate_hz": rate_hz / 2,
+        "chirps_per_frame": chirps * bursts,
+        "frame_period_s": 1e-3 * frame.values[4],
+    }
+    base = dataclasses.replace(base, name="iwrl6844") if large else base
+    radar = _radar(path, commands, base, rx_places, rx_mask, fields)
     return TiProfile(radar, True, False, rx_mask)
 
 
 _Places = tuple[tuple[float, float, float], ...]
+
+
+def _places_of(board: Radar) -> tuple[_Places, _Places]:
+    """Places of the Tx and of the Rx of a board."""
+    if board.tx_positions_m is None or board.rx_positions_m is None:
+        raise InputError(f"{board.name} has lines of antennas, not places; name a board (--board)")
+    return board.tx_positions_m, board.rx_positions_m
+
+
+def _radar(
+    path: Path,
+    commands: _Commands,
+    board: Radar,
+    rx_places: _Places,
+    rx_mask: int,
+    fields: dict[str, Any],
+) -> Radar:
+    """Make the radar of a board, and of the fields that follow from the file.
+
+    Where the file says height and tilt of the sensor they count; beneath a ceiling it is above
+    x = 0. It is named by its board and its file, once where the file is named after the board.
+    """
+    name = printable(path.stem)
+    fields["name"] = name if board.name in name.lower() else f"{board.name} {name}"
+    fields["rx_positions_m"] = tuple(own for k, own in enumerate(rx_places) if rx_mask >> k & 1)
+    if "sensorPosition" in commands:
+        height_m, azimuth_deg, tilt_deg = commands["sensorPosition"][-1].values
+        place = (0.0, 0.0) if abs(tilt_deg) > _CEILING_DEG else board.position_m[:2]
+        fields |= {"position_m": (*place, height_m), "yaw_deg": -azimuth_deg}
+        fields["pitch_deg"] = -tilt_deg
+    return dataclasses.replace(board, **fields)
 
 
 def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places]:
@@ -224,27 +239,13 @@ def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places
             f"of {count} virtual antennas, and two spacings"
         )
     *steps, y_mm, z_mm = line.values
-    virtual = [
-        (1e-3 * y_mm * steps[k + 1], -1e-3 * z_mm * steps[k]) for k in range(0, 2 * count, 2)
-    ]
-    tx = [(y - virtual[0][0], z - virtual[0][1]) for y, z in virtual[::n_rx]]
-    rx = virtual[:n_rx]
-    for k, (y, z) in enumerate(virtual):
-        own, other = tx[k // n_rx], rx[k % n_rx]
-        if abs(own[0] + other[0] - y) + abs(own[1] + other[1] - z) > 1e-9:
-            line.refuse(f"virtual antenna {k + 1} is not where its Tx and its Rx put it")
-    return tuple((0.0, *place) for place in tx), tuple((0.0, *place) for place in rx)
-
-
-def _pose(commands: _Commands, base: Radar) -> dict[str, Any]:
-    """Height and tilt of the sensor where a file says them; beneath a ceiling it is above x = 0."""
-    if "sensorPosition" not in commands:
-        return {}
-    height_m, azimuth_deg, tilt_deg = commands["sensorPosition"][-1].values
-    x, y, _ = base.position_m
-    ceiling = abs(tilt_deg) > _CEILING_DEG
-    place = (0.0, 0.0, height_m) if ceiling else (x, y, height_m)
-    return {"position_m": place, "yaw_deg": -azimuth_deg, "pitch_deg": -tilt_deg}
+    virtual = np.zeros((n_tx, n_rx, 3))
+    virtual[..., 2:0:-1] = np.reshape(steps, (n_tx, n_rx, 2)) * [-1e-3 * z_mm, 1e-3 * y_mm]
+    tx, rx = virtual[:, 0] - virtual[0, 0], virtual[0]
+    off = np.abs(tx[:, None] + rx - virtual).sum(axis=2).ravel() > 1e-9
+    if off.any():
+        line.refuse(f"virtual antenna {off.argmax() + 1} is not where its Tx and its Rx put it")
+    return tuple(map(tuple, tx.tolist())), tuple(map(tuple, rx.tolist()))
 
 
 def _commands(path: Path) -> tuple[_Commands, str | None]:
@@ -270,19 +271,16 @@ def _commands(path: Path) -> tuple[_Commands, str | None]:
         if command in _COUNTS:
             found.setdefault(command, []).append(_line(number, command, words))
         elif command in _PROCESSING:
-            if command not in _SWITCHES or not words or words[-1] not in ("0", "0.0"):
+            if command not in _TABLE["switches"] or not words or words[-1] not in ("0", "0.0"):
                 processing.setdefault(command, number)
-        elif command and not _WITHOUT_EFFECT.fullmatch(command):
+        elif command and not re.fullmatch(_TABLE["without_effect"], command):
             unknown.setdefault(command, number)
     listed = [f"{brief(name)[1:-1]} (line {n})" for name, n in unknown.items()]
-    for name, n in processing.items():
-        listed.append(f"{name} (line {n}; {_PROCESSING[name]})")
+    listed += [f"{name} (line {n}; {_PROCESSING[name]})" for name, n in processing.items()]
     if listed:
         text = ", ".join(listed)
-        _warn(
-            path,
-            f"what these lines say is not read: {text if len(text) <= 700 else text[:697] + '...'}",
-        )
+        text = text if len(text) <= 700 else text[:697] + "..."
+        _warn(path, f"what these lines say is not read: {text}")
     return found, platform
 
 
@@ -374,10 +372,8 @@ def _with_signs(
             "binary phase modulation (bpmCfg) must name two chirps of the frame, with the same two "
             "Tx"
         )
-    members = [one for one in range(4) if pair >> one & 1]
     order = [mask.bit_length() - 1 for mask in masks]
-    for chirp, own in zip(chirps, members, strict=True):
-        order[chirp] = own
+    order[chirps[0]], order[chirps[1]] = members = [one for one in range(4) if pair >> one & 1]
     others = [mask for chirp, mask in enumerate(masks) if chirp not in chirps]
     if any(mask.bit_count() > 1 for mask in others):
         line.refuse("several Tx transmit in a chirp that bpmCfg does not name")
@@ -440,7 +436,7 @@ def _waveform(profile: _Line, real: bool) -> dict[str, Any]:
     if slope <= 0 or ramp_us <= 0:
         profile.refuse("the sweep must rise: slope and ramp end must be above 0")
     if real and samples % 2:
-        profile.refuse("the number of real samples is odd; half as many complex ones are made")
+        profile.refuse(_ODD)
     return {
         "start_frequency_hz": 1e9 * start_ghz,
         "bandwidth_hz": 1e6 * slope * ramp_us,
@@ -450,9 +446,3 @@ def _waveform(profile: _Line, real: bool) -> dict[str, Any]:
         "samples_per_chirp": samples // 2 if real else samples,
         "adc_rate_hz": 1e3 * rate_ksps / (2 if real else 1),
     }
-
-
-def _named(board: str, path: Path) -> str:
-    """Name a radar by its board and its file, once where the file is named after the board."""
-    name = printable(path.stem)
-    return name if board in name.lower() else f"{board} {name}"

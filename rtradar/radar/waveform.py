@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.system.fields import Limits
 
-MOST = 65536
-"""Largest count of samples, of antennas on a line, and of bands."""
+MOST, _MOST_SAMPLES = 65536, 16384
+"""Largest counts of antennas on a line and of bands, and of samples of a chirp, four times as
+many as chips of boards take."""
 
 
 def positive(least: float = 1e-15, most: float = 1e15) -> Limits:
@@ -32,7 +33,7 @@ class Waveform:
     start_frequency_hz: Annotated[float, positive(1e9, 300e9)] = 12e9
     bandwidth_hz: Annotated[float, positive(1e6, 100e9)] = 4e9
     chirp_duration_s: Annotated[float, positive(1e-15, 0.1)] = 62.5e-6
-    samples_per_chirp: Annotated[int, Limits(1, MOST)] = 256
+    samples_per_chirp: Annotated[int, Limits(1, _MOST_SAMPLES)] = 256
     adc_start_s: Annotated[float, Limits(0, 0.1)] = 0.0
     adc_rate_hz: Annotated[float | None, positive()] = None
 

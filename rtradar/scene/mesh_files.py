@@ -152,10 +152,8 @@ def _check_ply_header(where: str, content: bytes) -> None:
     for kind, count in re.findall(rb"element\s+(\S+)\s+(\d+)", head):
         most = MOST_FACES if kind == b"face" else 3 * MOST_FACES
         if len(count) > 12 or int(count) > most:
-            raise InputError(
-                f"{where} promises more elements {brief(kind.decode('ascii', 'replace'))} than the "
-                f"{most} allowed"
-            )
+            name = brief(kind.decode("ascii", "replace"))
+            raise InputError(f"{where} promises more elements {name} than the {most} allowed")
 
 
 def _check_glb_header(where: str, content: bytes) -> None:
@@ -216,7 +214,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
                 process=False,
                 skip_materials=True,
             )
-            parts = _parts(where, loaded)
+            mesh = _in_one(where, loaded)
     except InputError:
         raise
     except ImportError as error:  # trimesh looks for some packages only where a file needs them
@@ -227,30 +225,18 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
     except Exception as error:  # what trimesh raises at broken files is of any type
         reason = brief(str(error))[1:-1] or type(error).__name__
         raise InputError(f"{where} is broken or is no {ending[1:]} file: {reason}") from None
-    if not parts:
-        raise InputError(f"{where} has no triangles")
-    places, corners = zip(*parts, strict=True)
-    starts = np.cumsum([0, *map(len, places[:-1])])
-    shifted = [faces + start for faces, start in zip(corners, starts, strict=True)]
-    return np.concatenate(places), np.concatenate(shifted)
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
 
 
-def _parts(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
-    """Give the vertices and faces of every instance of every mesh in a scene of trimesh."""
-    placed = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
-    meshes = [(loaded.geometry[geometry], matrix) for _, matrix, geometry in placed]
-    solid = [(mesh, matrix) for mesh, matrix in meshes if hasattr(mesh, "faces")]
-    count = sum(len(mesh.faces) for mesh, _ in solid)
+def _in_one(where: str, loaded: Any) -> Any:
+    """Make one mesh of every instance of every mesh in a scene of trimesh."""
+    names = [loaded.graph[node][1] for node in loaded.graph.nodes_geometry]
+    count = sum(len(getattr(loaded.geometry[name], "faces", ())) for name in names)
     if count > MOST_FACES:
         raise InputError(f"{where} has {count} triangles; {MOST_FACES} are allowed")
-    parts = []
-    for mesh, matrix in solid:
-        vertices = np.asarray(mesh.vertices, dtype=np.float64)
-        faces = np.asarray(mesh.faces, dtype=np.int64)
-        # A reflection reverses the winding of the faces.
-        faces = faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces
-        parts.append((vertices @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3], faces))
-    return parts
+    if not count:
+        raise InputError(f"{where} has no triangles")
+    return loaded.to_mesh()
 
 
 def checked_triangles(

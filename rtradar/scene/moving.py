@@ -32,12 +32,8 @@ _MOST_FACES = 200_000
 MOST_WAY_POINTS = 10_000
 
 _Rate = Annotated[float, Limits(-1000, 1000)]
-_Points = Annotated[
-    tuple[Vector, ...] | None,
-    Limits(
-        -1000, 1000, f"it must be a list of 2 to {MOST_WAY_POINTS} way-points", (2, MOST_WAY_POINTS)
-    ),
-]
+_LISTED = f"it must be a list of 2 to {MOST_WAY_POINTS} way-points"
+_Points = Annotated[tuple[Vector, ...] | None, Limits(-1000, 1000, _LISTED, (2, MOST_WAY_POINTS))]
 
 
 class RigidMotion:
@@ -185,9 +181,8 @@ class FollowingPath(RigidMotion):
     def __post_init__(self) -> None:
         where = "motion FollowingPath: "
         check_fields(self, where)
-        if (self.velocity_mps is None) == (self.points_m is None) or (self.points_m is None) != (
-            self.times_s is None
-        ):
+        given = [own is not None for own in (self.velocity_mps, self.points_m, self.times_s)]
+        if given not in ([True, False, False], [False, True, True]):
             raise InputError(f"{where}give velocity_mps, or points_m with times_s")
         times = self.times_s or ()
         if len(times) != len(self.points_m or ()) or (np.diff(times) <= 0).any():

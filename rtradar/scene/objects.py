@@ -28,12 +28,8 @@ ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
 """Limits of the size of furniture along its longest axis [m]."""
 
-BOX = Annotated[
-    Vector,
-    Limits(
-        SMALLEST_M, LARGEST_M, f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
-    ),
-]
+_LENGTHS = f"it must be 3 numbers, lengths of {SMALLEST_M:g} to {LARGEST_M:g} m"
+BOX = Annotated[Vector, Limits(SMALLEST_M, LARGEST_M, _LENGTHS)]
 
 _SHORTEST_M = 0.01
 """Least length of a wall's edge [m]."""
@@ -121,18 +117,11 @@ class Wall(Surface):
     def __post_init__(self) -> None:
         where = f"wall {brief(self.name)}"
         check_fields(self, f"{where}: ")
-        for key in ("edge_u_m", "edge_v_m"):
-            if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
-                raise InputError(
-                    f"{where}: {key} = {brief(getattr(self, key))}; an edge must be "
-                    f"{_SHORTEST_M} m long or more"
-                )
-        u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
-        if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
-            raise InputError(
-                f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)} "
-                "are not at right angles; a wall is a rectangle"
-            )
+        edges = f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)}"
+        if min(self.size_m) < _SHORTEST_M:
+            raise InputError(f"{edges}; an edge must be {_SHORTEST_M} m long or more")
+        if abs(np.dot(self.edge_u_m, self.edge_v_m)) > _SQUARE * self.area_m2:
+            raise InputError(f"{edges} are not at right angles; a wall is a rectangle")
         self._check_openings(where)
 
     def _check_openings(self, where: str) -> None:
@@ -335,18 +324,15 @@ class Furniture:
                 f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
                 f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
             )
+        endings = ", ".join(MESH_ENDINGS)
         if not self._settled and self.path.suffix.lower() not in MESH_ENDINGS:
+            raise InputError(f"{where}: mesh = {brief(self.path.name)}; allowed endings: {endings}")
+        if self._settled and (self.metres_per_unit is not None or self.sheet):
             raise InputError(
-                f"{where}: mesh = {brief(self.path.name)}; allowed endings: "
-                f"{', '.join(MESH_ENDINGS)}"
+                f"{where}: metres_per_unit and sheet belong to a file of one's own; "
+                f"{brief(self.mesh)} has both settled"
             )
-        if self._settled:
-            if self.metres_per_unit is not None or self.sheet:
-                raise InputError(
-                    f"{where}: metres_per_unit and sheet belong to a file of one's own; "
-                    f"{brief(self.mesh)} has both settled"
-                )
-        elif self.metres_per_unit is None:
+        if not self._settled and self.metres_per_unit is None:
             raise InputError(
                 f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
                 "1 for m, 0.001 for mm"

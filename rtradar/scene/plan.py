@@ -1,8 +1,8 @@
-"""The plan of a scene: walls, furniture and radar seen from above, objects where they begin."""
+"""What a scene shows of itself: its room, walls and furniture, and its plan, seen from above."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene.objects import Wall
+from rtradar.scene.objects import ROOM_SIDES, Wall
 from rtradar.system.checks import brief, printable
 from rtradar.system.figure_labels import Label, around, place_labels
 from rtradar.system.figure_style import (
@@ -26,6 +26,8 @@ from rtradar.system.figure_style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from rtradar.body import Person
+    from rtradar.scene.objects import Furniture, Wall
     from rtradar.scene.scene import Scene
 
 _UPRIGHT = 0.5
@@ -60,9 +62,8 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
 def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     """Ends (2, 2) [m] of what is left of the foot of a wall between its openings."""
     way = foot.last - foot.first
-    edges = [np.array(edge)[:2] for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
-    lengths = [np.linalg.norm(edge) for edge in (foot.wall.edge_u_m, foot.wall.edge_v_m)]
-    along_u, along_v = (edge / length for edge, length in zip(edges, lengths, strict=True))
+    edges = foot.wall.edge_u_m, foot.wall.edge_v_m
+    along_u, along_v = (np.array(edge[:2]) / np.linalg.norm(edge) for edge in edges)
     corner = np.array(foot.wall.corner_m)[:2]
     gaps = []
     for u, v, wide, high in foot.wall.openings:
@@ -253,3 +254,81 @@ def _wall_label(foot: Foot, colour: str) -> Label:
             x, y = (first + fraction * along + depth * outward).tolist()
             places.append(((x, y), (distance * outward[0], distance * outward[1])))
     return Label(f"{wall.name}: {_slab(wall)}", places, colour, rotation)
+
+
+_MOST_ROWS = 9
+"""Most walls and most pieces of furniture that a card lists."""
+
+
+def brief_rows(scene: Scene) -> dict[str, str]:
+    """Return the rows of a scene's ``repr``."""
+    rows = room_rows(scene)
+    kinds: dict[str, Sequence[Wall | Furniture]]
+    kinds = {"Walls": scene.walls, "Furniture": scene.furniture, "Objects": scene.objects}
+    for kind, parts in kinds.items():
+        # Few scenes have objects: the others need not say so.
+        if parts or kind != "Objects":
+            names = ", ".join(part.name for part in parts)
+            rows[kind] = f"{len(parts)}: {names}" if parts else "none"
+    if scene.people:
+        rows["People"] = f"{len(scene.people)}: {', '.join(map(_person, scene.people))}"
+    if scene.materials:
+        rows["Materials"] = ", ".join(material.name for material in scene.materials)
+    return {label.lower(): value for label, value in rows.items()}
+
+
+def tables(scene: Scene) -> dict[str, dict[str, str]]:
+    """Return the tables of a scene's card by their headings."""
+    walls = {
+        wall.name: f"{wall.material.name}, {1e3 * wall.thickness_m:g} mm, {_faces(wall)}"
+        for wall in scene.walls
+    }
+    furniture = {piece.name: _piece(piece) for piece in scene.furniture}
+    objects = {piece.name: _piece(piece) for piece in scene.objects}
+    found = {"": room_rows(scene)}
+    if scene.people:
+        found[""]["People"] = ", ".join(map(_person, scene.people))
+    for kind, rows in (("Walls", walls), ("Furniture", furniture), ("Objects", objects)):
+        if rows:
+            shown = found[f"{kind} ({len(rows)})"] = dict(list(rows.items())[:_MOST_ROWS])
+            if len(rows) > _MOST_ROWS:
+                shown["..."] = f"and {len(rows) - _MOST_ROWS} more"
+    return found
+
+
+def room_rows(scene: Scene) -> dict[str, str]:
+    """Return what the scene is as a whole, as texts with units by their labels."""
+    rows = {"Description": scene.description}
+    sides = [wall.corners for wall in scene.walls if wall.name in ROOM_SIDES]
+    if len(sides) == len(ROOM_SIDES):
+        size_m = np.ptp(np.concatenate(sides), axis=0)
+        rows["Room"] = f"{' × '.join(f'{length:.4g}' for length in size_m)} m"
+    place = scene.radar_position_m
+    rows["Radar"] = "at its own position" if place is None else f"at {_point(place)}"
+    if place is not None and scene.is_outside(place):
+        rows["Radar"] += ", outside of the room"
+    for name in ("yaw", "pitch", "roll"):
+        if (angle := getattr(scene, f"radar_{name}_deg")) is not None:
+            rows["Radar"] += f", {name} {angle:g}°"
+    turned = f", turned by {scene.heading_deg:g}°" if scene.heading_deg else ""
+    rows["Person"] = f"at {_point(scene.person_position_m)}{turned}"
+    return rows
+
+
+def _person(person: Person) -> str:
+    turned = f", turned by {person.heading_deg:g}°" if person.heading_deg else ""
+    return f"{person.motion.name} at {_point(person.position_m)}{turned}"
+
+
+def _point(position_m: Iterable[float]) -> str:
+    return f"({', '.join(f'{value:g}' for value in position_m)}) m"
+
+
+def _faces(wall: Wall) -> str:
+    height_m, width_m = sorted(map(float, map(np.linalg.norm, (wall.edge_u_m, wall.edge_v_m))))
+    return f"{width_m:.4g} × {height_m:.4g} m"
+
+
+def _piece(piece: Furniture) -> str:
+    turned = f", turned by {piece.yaw_deg:g}°" if piece.yaw_deg else ""
+    return f"{piece.material.name}, at {_point(piece.position_m)}{turned}"

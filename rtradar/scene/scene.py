@@ -16,12 +16,20 @@ from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
 from rtradar.errors import InputError, ValidityWarning, prefixed
 from rtradar.radar import Radar
 from rtradar.radar.array import UsualPlace
-from rtradar.scene import display
+from rtradar.scene import plan
 from rtradar.scene.materials import Material
 from rtradar.scene.moving import Object
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Wall
-from rtradar.scene.random_rooms import FURNITURE, HEIGHT_M, LENGTH_M, WIDTH_M
-from rtradar.scene.tables import ANGLES, drawn, fields_of, rooted
+from rtradar.scene.tables import (
+    ANGLES,
+    FURNITURE,
+    HEIGHT_M,
+    LENGTH_M,
+    WIDTH_M,
+    drawn,
+    fields_of,
+    rooted,
+)
 from rtradar.system.checks import Table, Vector, brief, printable
 from rtradar.system.fields import Angle, Limits, MaybeEmpty, Point, check_fields
 from rtradar.system.registries import RANDOM_SCENE, scene_table
@@ -119,16 +127,14 @@ class Scene:
                 raise InputError(f"{where}people must be a tuple of Person")
 
     def __repr__(self) -> str:
-        return text_card("Scene", self.name, display.brief_rows(self))
+        return text_card("Scene", self.name, plan.brief_rows(self))
 
     def _repr_html_(self) -> str:
-        from rtradar.scene.plan import picture_of_plan
-
         picture = None
         if self._parts:
             with suppress(InputError):  # the file of a mesh may be gone
-                picture = picture_of_plan(self)
-        return html_card("Scene", self.name, display.tables(self), picture=picture)
+                picture = plan.picture_of_plan(self)
+        return html_card("Scene", self.name, plan.tables(self), picture=picture)
 
     @classmethod
     def load(cls, source: str | Path) -> Scene:
@@ -233,8 +239,8 @@ class Scene:
         >>> room.name, len(room.furniture)
         ('random:7', 3)
         """
-        asked = {"seed": seed, "furniture": furniture, "length_m": length_m, "width_m": width_m}
-        asked["height_m"] = height_m
+        asked = {"seed": seed, "furniture": furniture}
+        asked |= {"length_m": length_m, "width_m": width_m, "height_m": height_m}
         return cls.of_table({"name": f"{RANDOM_SCENE}{seed}", "random": asked})
 
     def plot(self, radar: Radar | Axes | None = None, ax: Axes | None = None) -> Axes:
@@ -260,9 +266,7 @@ class Scene:
         >>> axes.get_xlabel()
         'x [m]'
         """
-        from rtradar.scene.plan import plot_scene
-
-        return plot_scene(self, radar, ax)
+        return plan.plot_scene(self, radar, ax)
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -361,12 +365,9 @@ class Scene:
         -------
         Radar
         """
-        given = {key: getattr(self, f"radar_{key}") for key in ANGLES}
-        given = {
-            key: value
-            for key, value in given.items()
-            if value is not None and getattr(radar, key) == 0
-        }
+        kept = [key for key in ANGLES if getattr(radar, key) == 0]
+        given = {key: getattr(self, f"radar_{key}") for key in kept}
+        given = {key: value for key, value in given.items() if value is not None}
         return replace(radar, **given) if given else radar
 
     def is_outside(self, place: Sequence[float]) -> bool:

@@ -98,10 +98,8 @@ def slab(
     loop = np.where(window, 1.0, loop)
     reflected = np.where(window, 0.0, face * (1 - through**2) / loop)
     transmitted = np.where(window, through, (1 - face**2) * through / loop)
-    return (
-        np.where(conducts, _perfect(polarization), reflected),
-        np.where(conducts, 0.0, transmitted),
-    )
+    reflected = np.where(conducts, _perfect(polarization), reflected)
+    return reflected, np.where(conducts, 0.0, transmitted)
 
 
 def slab_passes(

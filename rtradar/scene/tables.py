@@ -1,4 +1,4 @@
-"""The tables of a scene file: their keys, and what is made of them."""
+"""The tables of a scene file: their keys, what is made of them, and rooms drawn at random."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+import numpy as np
+
 from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed
 from rtradar.recordings import SAID, SYNTHETIC, said_of
 from rtradar.scene.materials import MATERIALS, Material, own_material
+from rtradar.scene.mesh_files import read_mesh
 from rtradar.scene.moving import Object, motion_of
 from rtradar.scene.objects import BOX, ROOM_SIDES, Furniture, Surface, Wall, room_walls
-from rtradar.scene.random_rooms import RANDOM, random_room
 from rtradar.system.checks import (
     Table,
     brief,
@@ -24,17 +26,18 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
-from rtradar.system.fields import Angle, Limits, Point, keys_of, read_value
+from rtradar.system.fields import Angle, Limits, Point, keys_of, read_value, within
+from rtradar.system.files import shipped_folder
+from rtradar.system.seeds import check_seed
 
 if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.motion import Motion
 
 _Place = Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])]
-_OF_PEOPLE = (
-    "skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing"
-)
-_OF_PEOPLE += " seed duration_s traits"
+_OF_PEOPLE = """\
+skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing seed
+duration_s traits"""
 """Keys that a person may have beside ``motion``."""
 
 _OF_ACTORS = ("seed", "traits")
@@ -44,6 +47,17 @@ _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 Piece = TypeVar("Piece", Wall, Furniture, Object)
 
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
+
+FURNITURE, LENGTH_M, WIDTH_M, HEIGHT_M = (2, 7), (5.5, 8.0), (3.4, 6.5), (2.3, 3.0)
+"""Ranges from which a room is drawn: pieces of furniture, and sizes along x, y and z [m]."""
+
+RANDOM: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = {
+    "furniture": (FURNITURE, (0, 20)),
+    "length_m": (LENGTH_M, (5.5, 30.0)),
+    "width_m": (WIDTH_M, (3.0, 30.0)),
+    "height_m": (HEIGHT_M, (2.2, 10.0)),
+}
+"""Keys of ``[random]`` beside the seed, with these ranges and what they must be within."""
 
 
 def _of_mesh(kind: type, *needed: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -69,13 +83,9 @@ KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 def files_of(table: Table) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield where a table of a scene names files, under which key, and the table of that key."""
-    for list_, keys in (
-        ("furniture", ("mesh",)),
-        ("objects", ("mesh",)),
-        ("people", ("motion", "skeleton")),
-    ):
-        for where, entry in tables_at(list_, table):
-            for key in keys:
+    for kind in ("furniture", "objects", "people"):
+        for where, entry in tables_at(kind, table):
+            for key in ("motion", "skeleton") if kind == "people" else ("mesh",):
                 text = entry.get(key)
                 named = isinstance(text, str) and (key != "mesh" or Path(text).suffix)
                 if named and not str(text).startswith(SYNTHETIC) and isinstance(entry, dict):
@@ -126,15 +136,12 @@ def fields_of(table: Table) -> dict[str, Any]:
         for key, value in radar.items():
             kind = Point if key == "position_m" else Angle
             fields[f"radar_{key}"] = read_value(kind, "[radar] ", key, value)
-    if "person" in table:
-        person = table_at("person", table)
-        check_keys("[person] ", person, *KEYS["[person]"])
-        if "position_m" in person:
-            place = person["position_m"]
-            fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
-        if "heading_deg" in person:
-            fields["heading_deg"] = person["heading_deg"]
-    return fields
+    person = dict(table_at("person", table))
+    check_keys("[person] ", person, *KEYS["[person]"])
+    if "position_m" in person:
+        place = person.pop("position_m")
+        fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
+    return fields | person
 
 
 def _own_materials(table: Table) -> dict[str, Material]:
@@ -153,9 +160,7 @@ def _room(table: Table, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     for side in ROOM_SIDES:
         key = side if side in table or side in ("floor", "ceiling") else "walls"
         if key not in table:
-            wanted = (
-                f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
-            )
+            wanted = f"[room.{side}]{', or [room.walls] for all four' * (key != side)}"
             raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
         surface = table_at(key, table, "room.")
         check_keys(f"[room.{key}] ", surface, *KEYS["a side of a room"])
@@ -228,11 +233,8 @@ def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
     found = []
     for where, entry in entries:
         check_keys(where, entry, *KEYS["[[people]]"])
-        own = {
-            key: value
-            for key, value in entry.items()
-            if key not in ("motion", "skeleton", "duration_s", *SAID, *_OF_ACTORS)
-        }
+        of_motion = ("motion", "skeleton", "duration_s", *SAID, *_OF_ACTORS)
+        own = {key: value for key, value in entry.items() if key not in of_motion}
         with prefixed(where):
             found.append(Person(_motion(entry, folder), **own))
     return tuple(found)
@@ -244,10 +246,12 @@ def _motion(entry: Table, folder: Path) -> Motion:
     if isinstance(entry["motion"], Motion):
         return entry["motion"]
     name = read_value(str, "person: ", "motion", entry["motion"])
-    if name.startswith(SYNTHETIC):
-        for key in ("skeleton", *SAID):
-            if key in entry:
-                raise InputError(f"{name}: only a recording has it; leave {key} out")
+    acted = name.startswith(SYNTHETIC)
+    for key in ("skeleton", *SAID) if acted else _OF_ACTORS:
+        if key in entry:
+            only = f"only {'a recording' if acted else 'a synthetic actor'} has it"
+            raise InputError(f"{key} = {brief(entry[key])} of {name}: {only}; leave {key} out")
+    if acted:
         asked = entry.get("duration_s", _ACTOR_S)
         duration_s = check_number("person", "duration_s", asked, 0.0, _LONGEST_S)
         activity, traits = name.removeprefix(SYNTHETIC), table_at("traits", entry)
@@ -256,9 +260,6 @@ def _motion(entry: Table, folder: Path) -> Motion:
             return synthetic_motion(activity, **given)
         except TypeError:  # a trait that is none, or of another kind
             raise InputError(f"traits = {brief(traits)}: no such traits of {name}") from None
-    for key in _OF_ACTORS:
-        if key in entry:
-            raise InputError(f"{key} = {brief(entry[key])}: only a synthetic actor has it")
     paths = {
         key: folder / read_value(str, "people: ", key, entry[key])
         for key in ("motion", "skeleton")
@@ -275,3 +276,112 @@ def _motion(entry: Table, folder: Path) -> Motion:
     assert recording.source is not None  # it was read from a file
     keys = {**recording.source.keys, "duration_s": duration_s}
     return ended.made_from(recording.source._replace(keys=keys))
+
+
+# -- rooms that are drawn at random ----------------------------------------------------------------
+#
+# A room has six sides, at times a window, and furniture along its walls. The radar stands before
+# the near wall. What a person needs to walk toward it stays free, and half a metre about it.
+
+_WALLS = {"plasterboard": (0.0125, 0.03), "concrete": (0.1, 0.25), "chipboard": (0.016, 0.04)}
+_FLOORS = {"concrete": (0.1, 0.25), "wood": (0.015, 0.03)}
+_CEILINGS = {"concrete": (0.1, 0.25), "plasterboard": (0.0125, 0.025)}
+"""Materials of the sides, known from 1 to 100 GHz, with the least and largest thickness [m]."""
+
+_PIECES = {
+    "bed": "wood", "chair": "wood", "coffee-table": "wood", "desk": "chipboard", "door": "wood",
+    "lamp": "metal", "radiator": "metal", "shelf": "chipboard", "sofa": "wood", "table": "wood",
+    "wardrobe": "chipboard",
+}  # fmt: skip
+"""Furniture, which are meshes that come along, and the material of each."""
+
+_SIDES = {"near": 0, "right": 90, "far": 180, "left": -90}
+"""Walls that furniture stands at, and how it is turned to look into the room [deg]."""
+
+_FREE_M = np.array([[-1.9, 1.9], [-0.8, 0.8]])
+_RADAR_M, _GAP_M, _TRIES = 0.5, 0.05, 30
+
+
+def random_room(table: Table) -> dict[str, Any]:
+    """Draw the table of a scene from a seed and ranges, the values under ``[random]``.
+
+    An `InputError` is raised where a key is unknown or a range has no meaning.
+    """
+    check_keys("[random] ", table, ("seed",), tuple(RANDOM))
+    check_seed("[random] ", table["seed"])
+    ranges = {
+        key: read_value(
+            Annotated[tuple[int, int], within(*limits, "whole numbers")]
+            if key == "furniture"
+            else Annotated[tuple[float, float], within(*limits)],
+            "[random] ",
+            key,
+            table.get(key, usual),
+        )
+        for key, (usual, limits) in RANDOM.items()
+    }
+    draw = np.random.default_rng(table["seed"])
+
+    def between(low: float, high: float, digits: int = 2) -> float:
+        return round(float(draw.uniform(low, high)), digits)
+
+    def side(materials: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+        material = str(draw.choice(list(materials)))
+        thickness_m = between(*materials[material], digits=4)
+        rough_m = between(1e-4, 5e-4, digits=5)
+        return {"material": material, "thickness_m": thickness_m, "roughness_m": rough_m}
+
+    size = [between(*ranges[key]) for key in ("length_m", "width_m", "height_m")]
+    radar = [-between(2.6, 3.2), between(-0.5, 0.5), between(0.9, 1.5)]
+    low = np.array([radar[0] - between(0.3, 0.4), between(-0.1, 0.1) - size[1] / 2])
+    low = np.round(low, 2)
+    high = np.round(low + size[:2], 2)
+    walls = []
+    if draw.random() < 0.5:
+        wide, sill = between(0.8, 2.0), between(0.7, 1.0)
+        # 1 cm before the left wall.
+        left = round(float(high[1]) - 0.01, 2)
+        corner = [between(low[0] + 0.2, high[0] - wide - 0.2), left, sill]
+        up = min(between(0.9, 1.4), round(size[2] - sill - 0.2, 2))
+        edges = {"corner_m": corner, "edge_u_m": [wide, 0.0, 0.0], "edge_v_m": [0.0, 0.0, up]}
+        walls.append({"name": "window", **edges, "material": "glass", "thickness_m": 0.006})
+    least, most = ranges["furniture"]
+    furniture = []
+    taken = [_FREE_M, np.stack([np.subtract(radar[:2], _RADAR_M), np.add(radar[:2], _RADAR_M)], 1)]
+    for number in range(1, 1 + int(draw.integers(int(least), int(most) + 1))):
+        for _ in range(_TRIES):
+            mesh, at = str(draw.choice(list(_PIECES))), str(draw.choice(list(_SIDES)))
+            place, box = _against(mesh, at, low, high, draw.random())
+            if _fits(box, low, high, taken):
+                taken.append(box)
+                piece = {"name": f"{mesh} {number}", "mesh": mesh, "material": _PIECES[mesh]}
+                furniture.append({**piece, "position_m": [*place, 0.0], "yaw_deg": _SIDES[at]})
+                break
+    sides = {name: side(_WALLS) for name in _SIDES}
+    sides |= {"floor": side(_FLOORS), "ceiling": side(_CEILINGS)}
+    found = {
+        "description": f"{' by '.join(f'{length:g}' for length in size)} m, drawn at random",
+        "radar": {"position_m": radar},
+        "room": {"size_m": size, "corner_m": low.tolist(), **sides},
+    }
+    return found | {key: own for key, own in (("walls", walls), ("furniture", furniture)) if own}
+
+
+def _against(mesh: str, side: str, low: Any, high: Any, along: float) -> tuple[list[float], Any]:
+    """Put a piece with its back to a wall: its place [x, y] and the box (2, 2) it covers [m]."""
+    vertices = read_mesh(shipped_folder("meshes") / f"{mesh}.ply").vertices[:, :2]
+    turn = np.radians(_SIDES[side])
+    vertices = vertices @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    own = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1)
+    axis, first = (0 if side in ("near", "far") else 1), side in ("near", "right")
+    place = low - own[:, 0] + along * (high - low - (own[:, 1] - own[:, 0]))
+    place[axis] = (low - own[:, 0] + 0.02)[axis] if first else (high - own[:, 1] - 0.02)[axis]
+    place = np.round(place, 2)
+    return place.tolist(), own + place[:, None]
+
+
+def _fits(box: Any, low: Any, high: Any, taken: list[Any]) -> bool:
+    """Tell whether a box is inside the room, and clear of all others."""
+    inside = (box[:, 0] >= low + 0.01).all() and (box[:, 1] <= high - 0.01).all()
+    apart = ((box[:, 0] >= own[:, 1] + _GAP_M) | (box[:, 1] <= own[:, 0] - _GAP_M) for own in taken)
+    return bool(inside and all(one.any() for one in apart))

@@ -221,9 +221,9 @@ RADARS = Registry(
     "rtradar.radars",
     "radar",
     {
-        "paper-12ghz": "rtradar.radar.presets:paper_12ghz",
-        "paper-77ghz": "rtradar.radar.presets:paper_77ghz",
-        **{name: f"rtradar.radar.presets:{name}" for name in (*BOARDS, "radhar", "mars")},
+        "paper-12ghz": "rtradar.radar:paper_12ghz",
+        "paper-77ghz": "rtradar.radar:paper_77ghz",
+        **{name: f"rtradar.radar:{name}" for name in (*BOARDS, "radhar", "mars")},
     },
 )
 """Radars that have a name: each is made by a function without arguments."""
@@ -235,13 +235,13 @@ READERS = Registry(
     "rtradar.readers",
     "motion reader",
     {
-        "amc": "rtradar.motion.formats.acclaim:load_amc",
-        "bvh": "rtradar.motion.formats.bvh:load_bvh",
-        "c3d": "rtradar.motion.formats.c3d:load_c3d",
+        "amc": "rtradar.motion.formats.rotations:load_amc",
+        "bvh": "rtradar.motion.formats.rotations:load_bvh",
+        "c3d": "rtradar.motion.formats.markers:load_c3d",
         "npz": "rtradar.motion.formats.joints:load_npz",
         "csv": "rtradar.motion.formats.joints:load_csv",
-        "trc": "rtradar.motion.formats.c3d:load_trc",
-        "motion": "rtradar.motion.formats.saved:load_saved",
+        "trc": "rtradar.motion.formats.markers:load_trc",
+        "motion": "rtradar.motion.formats:load_saved",
     },
 )
 """Readers of motion files, by the ending of the file without the dot."""

@@ -132,7 +132,7 @@ MIRROR, STRETCH = np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 1.0 + 1e-5])
         ({"semi_axes": [[1.0, 1.0, np.nan]] * 2}, "semi_axes holds NaN or infinity"),
         (
             {"semi_axes": [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]},
-            "the least is 0.0 m; every semi-axis must be positive",
+            "the least is 0.0 m; it must be positive",
         ),
         ({"frames": [np.eye(3), MIRROR]}, "orthonormal and right-handed"),
         ({"frames": [STRETCH, np.eye(3)]}, "orthonormal and right-handed"),

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body import PART_NAMES
-from rtradar.body.human import shape
-from rtradar.body.human.mesh import loop_subdivision
+from rtradar.body import human_shape as shape
+from rtradar.body.human import loop_subdivision
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
 
 needs_anny = pytest.mark.skipif(

@@ -12,7 +12,7 @@ from rtradar.campaign import build_dataset
 from rtradar.campaign.samples import plan_samples
 from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
-from rtradar.motion.formats.saved import save_motion
+from rtradar.motion.formats import save_motion
 from rtradar.system.checks import read_toml
 
 SPEC = """

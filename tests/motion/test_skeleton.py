@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.motion.names import plain
 from rtradar.motion.quaternions import quaternion_multiply
-from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.motion.skeleton import NODES, plain, to_nodes
 
 
 def bvh_like(

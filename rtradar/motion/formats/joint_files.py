@@ -35,7 +35,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.formats.text_file import TextFile
-from rtradar.motion.names import plain
+from rtradar.motion.skeleton import plain
 from rtradar.recordings import UPWARD, Finding
 from rtradar.system.checks import brief, check_number
 from rtradar.system.files import read_arrays
@@ -92,7 +92,7 @@ def read_npz(path: Path, rate_hz: float | None = None) -> JointRecording:
             f"{path}: not an archive of NumPy, or a damaged one ({brief(str(error))[1:-1]}); "
             f"{_NEEDED}, written with numpy.savez"
         ) from None
-    if _holds_rotations(arrays):
+    if "positions" not in arrays and {"poses", "root_orient", "pose_body"} & arrays.keys():
         text = "body: rotations on the skeleton of a mean person; betas are not read"
         made = checked(path, _as_positions(path, arrays), rate_hz)
         return replace(made, usual="z", findings=(Finding("body_model", "mean", text),))
@@ -123,14 +123,10 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
                 raise text.fail(f"rate_hz is {was}; it must not change, give time_s")
             text.check_size(len(joints), len(rows))
     values = np.array(rows).reshape(len(rows), len(header))
-    named = list(joints.values())
-    arrays: dict[str, Any] = {"joints": np.array(list(joints)), "positions": values[:, named]}
-    if "up" in columns:
-        arrays["up"] = np.array(up)
-    if "time_s" in columns:
-        arrays["time_s"] = values[:, columns["time_s"]]
-    if "rate_hz" in columns:
-        arrays["rate_hz"] = values[:1, columns["rate_hz"]]
+    places = values[:, list(joints.values())]
+    arrays = {"joints": np.array(list(joints)), "positions": places, "up": np.array(up)}
+    arrays |= {key: values[:, k] for key, k in columns.items() if key == "time_s"}
+    arrays |= {key: values[:1, k] for key, k in columns.items() if key == "rate_hz"}
     return checked(path, arrays, rate_hz)
 
 
@@ -247,11 +243,6 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
 
 
 # -- rotations of body models ----------------------------------------------------------------------
-
-
-def _holds_rotations(arrays: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether an archive holds rotations of a body model."""
-    return "positions" not in arrays and bool({"poses", "root_orient", "pose_body"} & set(arrays))
 
 
 def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:

@@ -1,7 +1,7 @@
 """Recordings of joint positions, such as cameras with depth and body models give.
 
 What is measured joint by joint is made the motion of a rigid skeleton: the 22 nodes are taken from
-the joints (`rtradar.motion.names`), gaps are bridged, joints of cameras pass a low-pass, all is
+the joints (`rtradar.motion.skeleton`), gaps are bridged, joints of cameras pass a low-pass, all is
 sampled evenly, heads and feet are completed, the floor is found, and the bones are given their
 median lengths (`markers.rigid_motion`).
 
@@ -34,9 +34,8 @@ from rtradar.motion.formats.joint_files import (
     read_csv,
     read_npz,
 )
-from rtradar.motion.formats.markers import level_axes, rigid_motion, runs, unit
+from rtradar.motion.formats.skeletons import level_axes, rigid_motion, runs, unit
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import Convention, node_positions, recognise
 from rtradar.motion.reading import (
     settled_nodes,
     stature_of,
@@ -47,8 +46,11 @@ from rtradar.motion.skeleton import (
     MINIMUM_PART_M,
     NODE_PARENTS,
     NODES,
+    Convention,
     middle,
+    node_positions,
     of_node,
+    recognise,
 )
 from rtradar.recordings import Finding, rate_of, tall
 
@@ -103,13 +105,8 @@ def motion_of(
             f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
-    to_world, unit_m, found = settled_nodes(
-        where,
-        nodes,
-        unit_m=unit_m,
-        up=up or recording.up,
-        usual=recording.usual or convention.up,
-    )
+    up, usual = up or recording.up, recording.usual or convention.up
+    to_world, unit_m, found = settled_nodes(where, nodes, unit_m=unit_m, up=up, usual=usual)
     rate_hz = 1 / float(np.median(np.diff(recording.times)))
     found = [*recording.findings, *found, rate_of(round(rate_hz, 3))]
     nodes = unit_m * nodes @ to_world.T
@@ -174,9 +171,8 @@ def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Arr
     breaks = 1 + np.flatnonzero(np.diff(times) > LONGEST_GAP_S)
     best = slice(0, 0)
     for begin, end in runs(~out):
-        for stretch in np.split(
-            np.arange(begin, end), breaks[(breaks > begin) & (breaks < end)] - begin
-        ):
+        inside = breaks[(breaks > begin) & (breaks < end)] - begin
+        for stretch in np.split(np.arange(begin, end), inside):
             whole = stretch[~unseen[stretch].any(axis=1)]
             if len(whole) and whole[-1] + 1 - whole[0] > best.stop - best.start:
                 best = slice(int(whole[0]), int(whole[-1]) + 1)

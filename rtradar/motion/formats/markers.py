@@ -1,4 +1,9 @@
-"""Conversion of markers on the skin to the 22 nodes of the body, and of these to a rigid skeleton.
+"""Recordings of points: C3D of optical systems, and TRC of OpenSim, OpenCap and Motion Analysis.
+
+The points are markers of CMU, HDM05 or Plug-in Gait, from which joints are found, or joints.
+
+The axes of C3D files are usually those of the world: Vicon's z is up, and C3D (x, y, z) = AMC
+(z, x, y). A file may say another axis in POINT:Y_SCREEN.
 
 The marker set is the one of 41 markers that CMU and HDM05 recordings carry, in Vicon's names: four
 on the head (LFHD, RFHD, LBHD, RBHD), C7, T10, CLAV and STRN about the chest, four on the waist
@@ -23,24 +28,232 @@ HDM05, technical report CG-2007-2, Universitaet Bonn, 2007.
 
 from __future__ import annotations
 
+import io
+import os
 import tomllib
+import warnings
 from collections.abc import Mapping
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.interpolate import CubicSpline
 
 from rtradar.errors import InputError
+from rtradar.motion.formats.joint_files import check_places, checked
+from rtradar.motion.formats.joints import motion_of
+from rtradar.motion.formats.skeletons import level_axes, rigid_motion, runs, unit
+from rtradar.motion.formats.text_file import TextFile
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import (
-    quaternion_multiply,
-    quaternion_rotate,
-    sign_continuous,
-    smallest_rotation,
-)
-from rtradar.motion.skeleton import MINIMUM_PART_M, NODE_PARENT, NODES
+from rtradar.motion.reading import settled_nodes, warn_of_speed
+from rtradar.motion.skeleton import NODES, OWN_NAMES, conventions, plain
+from rtradar.recordings import UNITS_M, UPWARD, rate_of
+from rtradar.system.checks import brief, check_number
+from rtradar.system.files import open_regular
+
+LONGEST_GAP_S = 0.1
+"""Longest gap of a marker that is bridged [s]."""
+
+
+class Points(NamedTuple):
+    """Points (frame, point, 3) in the axes and the unit of a file, NaN where one was not seen.
+
+    ``first_frame`` is the number of the first frame in the file, ``rate_key`` what the file calls
+    its rate, ``unit`` is in its words, and ``up`` the axis that is up, as the file or the format
+    says.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    positions: NDArray[Any]
+    rate_hz: float
+    first_frame: int
+    unit: str
+    up: str
+    rate_key: str
+
+
+def load_c3d(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
+    """Read a C3D file, and find the 22 joints of a rigid skeleton from its points.
+
+    An `InputError` names the marker and the frames, by the file's numbers.
+    """
+    return _motion_of(read_c3d(path), unit_m, up, rate_hz)
+
+
+def load_trc(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
+    """Read a TRC file, and find the 22 joints of a rigid skeleton from its points.
+
+    An `InputError` names the line, or the marker and the frames.
+    """
+    return _motion_of(_read_trc(path), unit_m, up, rate_hz)
+
+
+def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: float | None) -> Motion:
+    path, where = read.path, str(read.path)
+    if rate_hz is not None:
+        read = read._replace(rate_hz=rate_hz)
+    if not len(read.positions):
+        raise InputError(f"{path}: no frame of markers in this file; export it again")
+    check_number(where, f"{read.rate_key} [frames a second]", read.rate_hz, 1.0, 100_000.0)
+    by, unit_m = "given" if unit_m else "the file says", unit_m or UNITS_M.get(read.unit.lower())
+    there = {plain(label) for label in read.names}
+    known = min(conventions("joints"), key=lambda known: len(known.missing(there)))
+    if not known.missing(there):
+        names, rate = np.array([name.strip(" \0") for name in read.names]), np.array(read.rate_hz)
+        given = {"positions": read.positions, "joints": names, "rate_hz": rate}
+        return motion_of(replace(checked(path, given, None), usual=read.up), unit_m, up)
+    places = np.moveaxis(bridged(chosen(read, NEEDED)), 1, 0)
+    centres, pelvis, thorax = joint_centres(dict(zip(NEEDED, places, strict=True)))
+    to_world, unit_m, found = settled_nodes(
+        where, centres, unit_m=unit_m, unit_by=by, up=up or "", usual=read.up
+    )
+    turned = unit_m * centres @ to_world.T, to_world @ pelvis, to_world @ thorax
+    motion = rigid_motion(path.stem, *turned, read.rate_hz)
+    speed = warn_of_speed(where, motion.joints, motion.positions, read.rate_hz)
+    return replace(motion, findings=(*found, rate_of(read.rate_hz), speed))
+
+
+def read_c3d(path: Path) -> Points:
+    """Read the points of a C3D file, gaps and all, in its axes and its unit."""
+    try:
+        with (
+            _Bounded(open_regular(path).detach()) as handle,
+            warnings.catch_warnings(record=True) as caught,
+        ):
+            warnings.simplefilter("always")
+            read = _read(path, handle)
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot read this C3D file ({error.strerror or error}); check the path"
+        ) from None
+    except MemoryError:
+        raise
+    except Exception as error:  # the reader fails in many ways on bytes that are no C3D file
+        reason = " ".join(str(error).split())[:100]
+        raise InputError(
+            f"{path}: not a C3D file, or a damaged one ({reason}); export it again"
+        ) from None
+    if any("end of file" in str(warning.message) for warning in caught):
+        raise InputError(
+            f"{path}: ends after {len(read.positions)} frames where its header promises more; the "
+            "file is cut off"
+        )
+    return read
+
+
+def _read_trc(path: Path) -> Points:
+    """Read a table of tabs, below a header of five lines."""
+    with TextFile(path, "TRC") as text:
+        lines = iter(text)
+        first = next(lines, "")
+        names = next(lines, "").split()
+        said = dict(zip(names, next(lines, "").split(), strict=False))
+        if not first.startswith("PathFileType") or not {"DataRate", "Units"} <= said.keys():
+            raise text.fail("not a TRC file (PathFileType, then DataRate, Units, ...)")
+        labels = [word.strip() for word in next(lines, "").split("\t")[2:] if word.strip()]
+        next(lines, "")
+        rows, width = list[list[float]](), 2 + 3 * len(labels)
+        for line in lines:
+            cells = [cell.strip() for cell in line.rstrip("\r\n").split("\t")]
+            if not any(cells):
+                continue
+            if len([cell for cell in cells[width:] if cell]) or len(cells) < 2:
+                raise text.fail(f"{len(cells)} cells where {len(labels)} markers have {width}")
+            rows.append(text.cells((cells + width * [""])[2:width]))
+            text.check_size(len(labels), len(rows))
+        (rate,) = text.numbers([said["DataRate"]], 3)
+    places = np.array(rows).reshape(len(rows), len(labels), 3)
+    return Points(path, tuple(labels), places, rate, 1, said["Units"], "y", "DataRate")
+
+
+def chosen(read: Points, names: tuple[str, ...]) -> Points:
+    """Choose some markers; one at the origin to the last bit was not seen."""
+    columns = [_column(read.path, read.names, name) for name in names]
+    return read._replace(names=names, positions=check_places(read.path, read.positions[:, columns]))
+
+
+def bridged(seen: Points) -> NDArray[np.float64]:
+    """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines."""
+    positions = seen.positions.astype(np.float64)
+    frames = np.arange(len(positions))
+    for k, name in enumerate(seen.names):
+        unseen = np.isnan(positions[:, k, 0])
+        if not unseen.any():
+            continue
+        for begin, end in runs(unseen):
+            first, last = seen.first_frame + begin, seen.first_frame + end - 1
+            where = f"{seen.path}: marker {name} is not seen in frames {first} to {last}"
+            if begin == 0 or end == len(positions):
+                raise InputError(
+                    f"{where}, at an end of the recording; cut these frames off, or fill the gap"
+                )
+            if end - begin > LONGEST_GAP_S * seen.rate_hz:
+                raise InputError(
+                    f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s "
+                    "are bridged, fill this one"
+                )
+        positions[unseen, k] = CubicSpline(frames[~unseen], positions[~unseen, k])(frames[unseen])
+    return positions
+
+
+class _Bounded(io.BufferedReader):
+    """A file that never reserves more memory for a read than the file has bytes."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        length = os.fstat(self.fileno()).st_size
+        return super().read(size if size is None or size < 0 else min(size, length))
+
+
+def _read(path: Path, handle: object) -> Points:
+    import c3d  # not before a file asks for it
+
+    reader = c3d.Reader(handle)
+    if reader.point_used < 1:
+        raise ValueError("it holds no points")
+
+    def text(key: str) -> str:
+        parameter = reader.get(key)
+        return "" if parameter is None else str(parameter.string_value).strip(" \0")
+
+    frames = [points for _, points, _ in reader.read_frames(copy=True)]
+    points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
+    places = np.where(points[..., 3:4] < 0, np.float32(np.nan), points[..., :3])
+    up = text("POINT:Y_SCREEN").lower().removeprefix("+")
+    return Points(
+        path,
+        tuple(str(label) for label in reader.point_labels),
+        places,
+        float(reader.point_rate),
+        int(reader.first_frame),
+        text("POINT:UNITS"),
+        up if up in UPWARD else "z",
+        "POINT:RATE",
+    )
+
+
+def _column(path: Path, labels: tuple[str, ...], name: str) -> int:
+    """Column of a marker, by its name in the set of CMU or by that of another set."""
+    key = f"{name[0]}_{name[1:]}" if len(name) > 3 and name[0] in "LR" else name
+    others = (known.joints.get(key.lower(), ()) for known in conventions("markers"))
+    wanted = [plain(name), *chain.from_iterable(others)]
+    there = [plain(label) for label in labels]
+    found = next((one for one in wanted if one in there), None)
+    if found is None:
+        some = brief(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
+        raise InputError(
+            f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the markers of "
+            f"CMU, HDM05 and Plug-in Gait are understood, rename or add it ({OWN_NAMES})"
+        )
+    if there.count(found) > 1:
+        raise InputError(
+            f"{path}: marker {name} is there {there.count(found)} times; keep one person's markers"
+        )
+    return there.index(found)
+
 
 Array = NDArray[np.float64]
 
@@ -84,9 +297,8 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     left and up.
     """
     frames = _segments(markers)
-    shanks = [
-        np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"
-    ]
+    knees, ankles = ([markers[side + end] for side in "LR"] for end in ("KNE", "ANK"))
+    shanks = np.linalg.norm(np.subtract(knees, ankles), axis=2)
     size = float(np.median(shanks)) / SHANK_M
     centres = []
     for node in NODES:
@@ -118,14 +330,12 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
             middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
         )
     for side, sign in (("L", 1.0), ("R", -1.0)):
-        shoulder, elbow, knee, ankle = (
-            markers[side + name] for name in ("SHO", "ELB", "KNE", "ANK")
-        )
+        shoulder, elbow = markers[f"{side}SHO"], markers[f"{side}ELB"]
+        knee, ankle = markers[f"{side}KNE"], markers[f"{side}ANK"]
         wrist = middle(f"{side}WRA", f"{side}WRB")
         frames[f"{side} shank"] = _axes(up=knee - ankle, forward=markers[f"{side}TOE"] - ankle)
-        frames[f"{side} upper arm"] = _axes(
-            up=shoulder - elbow, forward=_bend(shoulder, elbow, wrist, thorax, sign)
-        )
+        bend = _bend(shoulder, elbow, wrist, thorax, sign)
+        frames[f"{side} upper arm"] = _axes(up=shoulder - elbow, forward=bend)
         frames[f"{side} forearm"] = _axes(up=elbow - wrist, forward=markers[f"{side}WRA"] - wrist)
     return frames
 
@@ -152,78 +362,8 @@ def _middle(markers: Mapping[str, Array], *names: str) -> Array:
     return np.asarray(np.mean([markers[name] for name in names], axis=0))
 
 
-def unit(vectors: Array) -> Array:
-    """Unit vectors along some."""
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-
-
 def _axes(*, up: Array, forward: Array) -> Array:
     """Axes with this up, and forward as near to ``forward`` as that allows."""
     z = unit(up)
     y = unit(np.cross(z, forward))
     return np.stack([np.cross(y, z), y, z], axis=2)
-
-
-def level_axes(left: Array, forward: Array) -> Array:
-    """Axes with this left, and forward as near to ``forward`` as that allows."""
-    y = unit(left)
-    z = unit(np.cross(forward, y))
-    return np.stack([np.cross(y, z), y, z], axis=2)
-
-
-_ON_THE_PELVIS = ("lowerback", "upperback", "hip", "knee", "ankle", "toe")
-"""Nodes whose bones rotate with the pelvis where they do not bend, the others with the chest."""
-
-
-def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_hz: float) -> Motion:
-    """Make the motion of a rigid skeleton whose bones point as the joints do.
-
-    A bone is as long as its joints are apart in the median. Joints do not say how a bone is rotated
-    about itself: seen from pelvis or chest it takes from frame to frame the smallest rotation to
-    its next direction, so that nothing on it spins. Arguments are as `joint_centres` gives them, in
-    the world [m].
-    """
-    parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
-    bones = centres[:, 1:] - centres[:, parents]
-    spans = np.linalg.norm(bones, axis=2)
-    for bone, frame in np.argwhere(~(spans.T > MINIMUM_PART_M / 2)):
-        ends = f"{NODE_PARENT[NODES[1 + bone]]!r} and {NODES[1 + bone]!r}"
-        raise InputError(
-            f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; "
-            f"every body part needs at least {MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers "
-            "about it"
-        )
-    held = {
-        key: sign_continuous(Rotation.from_matrix(axes).as_quat())
-        for key, axes in (("pelvis", pelvis), ("thorax", thorax))
-    }
-    below = [node.split("_")[-1] in _ON_THE_PELVIS for node in NODES[1:]]
-    carriers = np.stack([held["pelvis" if low else "thorax"] for low in below], axis=1)
-    directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
-    rotations = quaternion_multiply(carriers, _followed(directions))
-    rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
-    lengths = np.median(spans, axis=0)
-    return Motion(
-        name=name,
-        joints=NODES,
-        parents=(-1, *parents),
-        offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
-        root_positions=centres[:, 0],
-        rotations=np.concatenate([held["pelvis"][:, None], rotations], axis=1),
-        rate_hz=rate_hz,
-    )
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Begin and end, which is one past the last, of each run of True in a mask (frame,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
-
-
-def _followed(directions: Array) -> Array:
-    """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
-    rotations = np.empty((*directions.shape[:2], 4))
-    rotations[0] = [0.0, 0.0, 0.0, 1.0]
-    for frame, step in enumerate(smallest_rotation(directions[:-1], directions[1:])):
-        rotations[frame + 1] = quaternion_multiply(step, rotations[frame])
-    return rotations / np.linalg.norm(rotations, axis=2, keepdims=True)

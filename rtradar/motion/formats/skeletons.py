@@ -1,4 +1,4 @@
-"""Skeletons of files whose bones rotate, and the rigid motion that the values of frames make.
+"""Rigid motions, of files whose bones rotate and of joints that were measured one by one.
 
 A bone has channels, whose values follow each other in a frame: positions, and angles about the axes
 of the bone. It rotates with its parent, and on top of that by its own angles.
@@ -15,8 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import quaternion_rotate, quaternions_to_world, to_world
+from rtradar.motion.quaternions import (
+    quaternion_multiply,
+    quaternion_rotate,
+    quaternions_to_world,
+    sign_continuous,
+    smallest_rotation,
+    to_world,
+)
+from rtradar.motion.skeleton import MINIMUM_PART_M, NODE_PARENT, NODES
 from rtradar.system.row_files import FileBackedRows, column, in_blocks
 
 Array = NDArray[np.float64]
@@ -76,6 +85,20 @@ def chain_to(bones: Sequence[Bone], last: int) -> list[int]:
     return chain
 
 
+def carrier_of(joints: Sequence[Bone], values: Array) -> int:
+    """Find the last joint of an unbranched chain from the root whose own position moves."""
+    top, carrier = 0, 0
+    while True:
+        children = [j for j, joint in enumerate(joints) if joint.parent == top]
+        if len(children) != 1:
+            return carrier
+        top = children[0]
+        # A joint that moves in its parent by less than a millionth of its distance is a bone.
+        least = 1e-6 * (1 + np.abs(joints[top].offset).max())
+        if np.ptp(joints[top].places(values), axis=0).max() > least:
+            carrier = top
+
+
 def posed(
     path: Path,
     bones: Sequence[Bone],
@@ -123,3 +146,74 @@ def _rotations(bones: Sequence[Bone], values: Array) -> Array:
             local = axes * local * axes.inv()
         world.append(local if bone.parent < 0 else world[bone.parent] * local)
     return np.stack([rotation.as_quat() for rotation in world], axis=1)
+
+
+# -- from places of joints -------------------------------------------------------------------------
+
+_ON_THE_PELVIS = ("lowerback", "upperback", "hip", "knee", "ankle", "toe")
+"""Nodes whose bones rotate with the pelvis where they do not bend, the others with the chest."""
+
+
+def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_hz: float) -> Motion:
+    """Make the motion of a rigid skeleton whose bones point as the joints do.
+
+    A bone is as long as its joints are apart in the median. Joints do not say how a bone is rotated
+    about itself: seen from pelvis or chest it takes from frame to frame the smallest rotation to
+    its next direction, so that nothing on it spins. Arguments are as `joint_centres` gives them, in
+    the world [m].
+    """
+    parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
+    bones = centres[:, 1:] - centres[:, parents]
+    spans = np.linalg.norm(bones, axis=2)
+    for bone, frame in np.argwhere(~(spans.T > MINIMUM_PART_M / 2)):
+        ends = f"{NODE_PARENT[NODES[1 + bone]]!r} and {NODES[1 + bone]!r}"
+        raise InputError(
+            f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; "
+            f"every body part needs at least {MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers "
+            "about it"
+        )
+    hips, chest = (
+        sign_continuous(Rotation.from_matrix(axes).as_quat()) for axes in (pelvis, thorax)
+    )
+    below = [node.split("_")[-1] in _ON_THE_PELVIS for node in NODES[1:]]
+    carriers = np.stack([hips if low else chest for low in below], axis=1)
+    directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
+    rotations = quaternion_multiply(carriers, _followed(directions))
+    rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
+    lengths = np.median(spans, axis=0)
+    return Motion(
+        name=name,
+        joints=NODES,
+        parents=(-1, *parents),
+        offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
+        root_positions=centres[:, 0],
+        rotations=np.concatenate([hips[:, None], rotations], axis=1),
+        rate_hz=rate_hz,
+    )
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Begin and end, which is one past the last, of each run of True in a mask (frame,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask, [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _followed(directions: Array) -> Array:
+    """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
+    rotations = np.empty((*directions.shape[:2], 4))
+    rotations[0] = [0.0, 0.0, 0.0, 1.0]
+    for frame, step in enumerate(smallest_rotation(directions[:-1], directions[1:])):
+        rotations[frame + 1] = quaternion_multiply(step, rotations[frame])
+    return rotations / np.linalg.norm(rotations, axis=2, keepdims=True)
+
+
+def unit(vectors: Array) -> Array:
+    """Unit vectors along some."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
+def level_axes(left: Array, forward: Array) -> Array:
+    """Axes with this left, and forward as near to ``forward`` as that allows."""
+    y = unit(left)
+    z = unit(np.cross(forward, y))
+    return np.stack([np.cross(y, z), y, z], axis=2)

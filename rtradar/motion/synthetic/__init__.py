@@ -6,15 +6,15 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any, TypedDict, Unpack
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
-from rtradar.motion.synthetic.balance import stand
-from rtradar.motion.synthetic.daily import bend, fall, sit, squat, wave
 from rtradar.motion.synthetic.figure import (
     STYLES,
     PosesAt,
@@ -23,11 +23,13 @@ from rtradar.motion.synthetic.figure import (
     offsets,
     rotations,
 )
-from rtradar.motion.synthetic.gait import walk, walk_in_place
-from rtradar.motion.synthetic.jacks import jump, jumping_jack
-from rtradar.motion.synthetic.strikes import boxing, kick, punch
+from rtradar.motion.synthetic.gait import walk
+from rtradar.motion.synthetic.jacks import jumping_jack
+from rtradar.motion.synthetic.on_the_spot import bend, fall, sit, squat, stand, wave
+from rtradar.motion.synthetic.strikes import kick, punch
 from rtradar.recordings import SYNTHETIC, Source
-from rtradar.system.checks import brief, check_number, is_whole
+from rtradar.system.checks import brief
+from rtradar.system.fields import Limits, check_fields, rules_of
 from rtradar.system.registries import check_activity
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
@@ -47,10 +49,10 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "bend": bend,
     "squat": squat,
     "wave": wave,
-    "jump": jump,
+    "jump": partial(jumping_jack, activity="jump"),
     "fall": fall,
-    "walk_in_place": walk_in_place,
-    "boxing": boxing,
+    "walk_in_place": partial(walk, table="walk_in_place"),
+    "boxing": partial(punch, boxing=True),
 }
 """Activities of the actors, by name."""
 
@@ -69,15 +71,19 @@ class Traits(TypedDict, total=False):
     take: int
 
 
-_RANGES = {
-    "duration_s": (3.0, 1e-6, 3600.0),
-    "height_m": (1.75, 0.8, 2.5),
-    "build": (1.0, 0.4, 2.5),
-    "tempo": (1.0, 0.4, 2.0),
-    "amplitude": (1.0, 0.3, 1.25),
-    "rate_hz": (120.0, 30.0, 10_000.0),
-}
-"""Default, least and largest value of each trait that is a number."""
+@dataclass(frozen=True, kw_only=True)
+class _Chosen:
+    """Traits of an actor, those that are not given by their defaults."""
+
+    duration_s: Annotated[float, Limits(1e-6, 3600.0)] = 3.0
+    height_m: Annotated[float, Limits(0.8, 2.5)] = 1.75
+    build: Annotated[float, Limits(0.4, 2.5)] = 1.0
+    tempo: Annotated[float, Limits(0.4, 2.0)] = 1.0
+    amplitude: Annotated[float, Limits(0.3, 1.25)] = 1.0
+    rate_hz: Annotated[float, Limits(30.0, 10_000.0)] = 120.0
+    side: Literal["left", "right"] = "left"
+    style: Any = ""
+    take: Annotated[int, Limits(0, 2**63, "it must be a whole number, zero or more")] = 0
 
 
 def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> Motion:
@@ -86,7 +92,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
     turns round within 1.5 m of the middle. Who stands sways by millimetres; who bends or squats
-    keeps the centre of mass over the feet (`rtradar.motion.synthetic.balance`). All but walks
+    keeps the centre of mass over the feet (`rtradar.motion.synthetic.on_the_spot`). All but walks
     repeat with short rests.
 
     Parameters
@@ -126,8 +132,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
     """
     asked = activity
     activity, chosen = _checked(asked, traits)
-    subject, height_m = _subject(activity, seed, chosen), chosen["height_m"]
-    duration_s, rate_hz = chosen["duration_s"], chosen["rate_hz"]
+    subject, height_m = _subject(activity, seed, chosen), chosen.height_m
+    duration_s, rate_hz = chosen.duration_s, chosen.rate_hz
     # Poses are made twice: how far down all must come is not known before the last, and too many
     # would have to be kept.
     poses_at = ACTIVITIES[activity](duration_s, subject)
@@ -149,41 +155,33 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         rotations=rotated.rows(),
         rate_hz=rate_hz,
         length_s=duration_s,
-        girth=chosen["build"] * height_m / 1.75,
+        girth=chosen.build * height_m / 1.75,
     )
     own = {name: value for name, value in traits.items() if name != "duration_s"}
     keys = {"motion": f"{SYNTHETIC}{asked}", "seed": seed, "duration_s": duration_s}
     return motion.turned(math.pi).made_from(Source(keys | ({"traits": own} if own else {}), {}))
 
 
-def _checked(asked: str, traits: Traits) -> tuple[str, dict[str, Any]]:
-    """The activity, and all its traits, those that are not given by their defaults."""
+def _checked(asked: str, traits: Traits) -> tuple[str, _Chosen]:
+    """The activity, and all its traits."""
     check_activity(asked)
     activity, *texts = asked.split(",")
-    defaults = {name: default for name, (default, _, _) in _RANGES.items()}
-    chosen: dict[str, Any] = {"side": "left", "style": "", "take": 0, **defaults}
-    for name in traits:
-        if name not in chosen:
-            raise TypeError(f"synthetic_motion() got an unexpected keyword argument {name!r}")
+    names = [key for key in rules_of(_Chosen) if key not in ("duration_s", "rate_hz")]
+    given: dict[str, Any] = {}
     for text in texts:
         name, _, value = text.partition("=")
-        names = [known for known in chosen if known not in ("duration_s", "rate_hz")]
         if name not in names or not value:
             raise InputError(
                 f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(names)}"
             )
-        chosen[name] = _parsed(value)
-    chosen |= traits
-    for name, allowed in (("side", ("left", "right")), ("style", STYLES.get(activity, ()))):
-        if chosen[name] not in allowed and (name, chosen[name]) != ("style", ""):
-            raise InputError(
-                f"{name} {brief(chosen[name])} of {activity}; allowed are "
-                f"{', '.join(allowed) or 'none'}"
-            )
-    if not is_whole(chosen["take"]) or chosen["take"] < 0:
-        raise InputError(f"take {chosen['take']!r}; it must be a whole number, zero or more")
-    for name, (_, low, high) in _RANGES.items():
-        check_number(f"synthetic {activity}", name, chosen[name], low, high)
+        given[name] = _parsed(value)
+    every: dict[str, Any] = {**given, **traits}
+    chosen = _Chosen(**every)
+    check_fields(chosen, f"synthetic {activity}: ")
+    styles = STYLES.get(activity, ())
+    if chosen.style not in ("", *styles):
+        allowed = ", ".join(styles) or "none"
+        raise InputError(f"style {brief(chosen.style)} of {activity}; allowed are {allowed}")
     return activity, chosen
 
 
@@ -194,21 +192,21 @@ def _parsed(value: str) -> float | str:
     return value
 
 
-def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:
+def _subject(activity: str, seed: int, chosen: _Chosen) -> Subject:
     """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
     own = check_seed("", seed), list(ACTIVITIES).index(activity)
     rng = np.random.default_rng(stream(*own))
     spread = (1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)).tolist()
     phase, manner = float(rng.uniform()), int(rng.integers(2**32))
-    if chosen["take"]:
-        phase = float(np.random.default_rng(stream(*own, int(chosen["take"]))).uniform())
+    if chosen.take:
+        phase = float(np.random.default_rng(stream(*own, int(chosen.take))).uniform())
     return Subject(
-        height_m=chosen["height_m"],
-        side=chosen["side"][0],
-        tempo=chosen["tempo"] * spread[0],
-        amplitude=chosen["amplitude"] * spread[1],
+        height_m=chosen.height_m,
+        side=chosen.side[0],
+        tempo=chosen.tempo * spread[0],
+        amplitude=chosen.amplitude * spread[1],
         phase=phase,
         uneven={"l": spread[2], "r": spread[3]},
-        style=chosen["style"],
+        style=chosen.style,
         manner=manner,
     )

@@ -8,6 +8,9 @@ high, foot 0.152 long. They give no joint centres inside trunk and foot; ours ar
 way from the middle to the side of the hips (0.191 wide), root 0.04 above them, spine in three equal
 parts to 0.83, base of the head at 0.885, ankle a quarter of the foot from the heel, toe node 0.012
 above the sole.
+
+Masses and the centres of segments are those of D. A. Winter, Biomechanics and Motor Control of
+Human Movement, table 4.1; trunk and head, which bend here, are split between their ends.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.motion.skeleton import NODES
+from rtradar.motion.quaternions import quaternion_rotate
+from rtradar.motion.skeleton import NODE_PARENT, NODES
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -100,14 +104,11 @@ class Subject:
 
     def traits(self, table: str) -> SimpleNamespace:
         """All traits of a table of ``traits.toml``, drawn where they are ranges."""
-        return SimpleNamespace(
-            **{
-                name.replace(" ", "_"): self.drawn(name, *value)
-                if isinstance(value, list) and len(value) == 2
-                else value
-                for name, value in table_of(table).items()
-            }
-        )
+        own = SimpleNamespace()
+        for name, value in table_of(table).items():
+            ranged = isinstance(value, list) and len(value) == 2
+            setattr(own, name.replace(" ", "_"), self.drawn(name, *value) if ranged else value)
+        return own
 
     @property
     def other(self) -> str:
@@ -211,7 +212,6 @@ def _hanging(direction: Array, hinge: Array) -> Rotation:
 def swing_arm(
     thorax: Rotation,
     side: str,
-    *,
     forward: Array | float,
     outward: Array | float,
     elbow: Array,
@@ -288,6 +288,41 @@ def rotations(pose: Pose, height_m: float) -> Array:
     return np.stack([np.broadcast_to(found[node].as_quat(), shape) for node in NODES], axis=1)
 
 
+_MASSES = {"thorax": (0.497, 0.5), "head": (0.081, 0.5)} | {
+    f"{side}_{node}": mass
+    for side in SIDES
+    for node, mass in {
+        "elbow": (0.028, 0.436),
+        "wrist": (0.016, 0.43),
+        "hand": (0.006, 0.506),
+        "knee": (0.1, 0.433),
+        "ankle": (0.0465, 0.433),
+        "toe": (0.0145, 0.5),
+    }.items()
+}
+"""Mass of the segment that ends in a node, relative to the body, and place of its centre on it."""
+
+
+def joints(pose: Pose, height_m: float) -> dict[str, Array]:
+    """Positions (n, 3) of all nodes [m]."""
+    turned, bones = rotations(pose, height_m), offsets(height_m)
+    found = {"root": pose.root}
+    for node, parent in NODE_PARENT.items():
+        found[node] = found[parent] + quaternion_rotate(turned[:, NODES.index(node)], bones[node])
+    return found
+
+
+def centre_of_mass(pose: Pose, height_m: float) -> Array:
+    """Centre of mass (n, 3) of a pose [m]."""
+    at = joints(pose, height_m)
+    starts = {**NODE_PARENT, "thorax": "root", "head": "thorax"}
+    centre = sum(
+        mass * (at[starts[node]] + part * (at[node] - at[starts[node]]))
+        for node, (mass, part) in _MASSES.items()
+    )
+    return np.asarray(centre) / sum(mass for mass, _ in _MASSES.values())
+
+
 # -- smooth functions of time (C2) -----------------------------------------------------------------
 
 
@@ -310,9 +345,8 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
     under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
     fraction = smooth((t - at[under_way]) / np.diff(at)[under_way])
-    return np.asarray(
-        reached[under_way] + moves[under_way] * fraction.reshape(-1, *(1,) * (keys.ndim - 1))
-    )
+    fraction = fraction.reshape(-1, *(1,) * (keys.ndim - 1))
+    return np.asarray(reached[under_way] + moves[under_way] * fraction)
 
 
 def hermite(
@@ -326,11 +360,8 @@ def hermite(
     p0, v0, a0 = (np.asarray(value, dtype=np.float64) for value in begin)
     p1, v1, a1 = (np.asarray(value, dtype=np.float64) for value in end)
     u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
-    p, v, a = (
-        p1 - p0 - (v0 + a0 * span / 2) * span,
-        (v1 - v0 - a0 * span) * span,
-        (a1 - a0) * span**2,
-    )
+    p, v = p1 - p0 - (v0 + a0 * span / 2) * span, (v1 - v0 - a0 * span) * span
+    a = (a1 - a0) * span**2
     cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2
     free = p0 + v0 * span * u + a0 * span**2 / 2 * u**2
     return free + u**3 * (cubic + u * (quartic + u * quintic))

@@ -55,14 +55,9 @@ class Step(NamedTuple):
     vigour: float
 
 
-def walk(duration_s: float, subject: Subject) -> PosesAt:
-    """A walk, facing and starting along +x."""
-    return _Walker(duration_s, subject, f"walk_{subject.style or 'normal'}").poses
-
-
-def walk_in_place(duration_s: float, subject: Subject) -> PosesAt:
-    """Steps on the spot, facing +x."""
-    return _Walker(duration_s, subject, "walk_in_place").poses
+def walk(duration_s: float, subject: Subject, table: str = "") -> PosesAt:
+    """A walk, facing and starting along +x; by default that of the subject's style."""
+    return _Walker(duration_s, subject, table or f"walk_{subject.style or 'normal'}").poses
 
 
 class _Walker:
@@ -183,19 +178,13 @@ class _Walker:
             beat = -sign * np.cos(phase - own.arm_lag)
             loss = 1 - own.lame_arm * (side == self.subject.side)
             swing = own.arm * self.subject.amplitude * self.subject.uneven[side] * loss
-            arms[side] = swing_arm(
-                thorax,
-                side,
-                forward=own.arm_forward + swing * vigour * beat + lean,
-                outward=own.arm_outward,
-                elbow=own.elbow + own.elbow_swing * loss * vigour * (1 + beat) / 2,
-            )
+            ahead = own.arm_forward + swing * vigour * beat + lean
+            elbow = own.elbow + own.elbow_swing * loss * vigour * (1 + beat) / 2
+            arms[side] = swing_arm(thorax, side, ahead, own.arm_outward, elbow)
+        root_x = x + forward * np.cos(heading) - aside * np.sin(heading)
+        root_y = y + forward * np.sin(heading) + aside * np.cos(heading)
         return Pose(
-            root=xyz(
-                x + forward * np.cos(heading) - aside * np.sin(heading),
-                y + forward * np.sin(heading) + aside * np.cos(heading),
-                height * (ROOT - 0.004 - down),
-            ),
+            root=xyz(root_x, root_y, height * (ROOT - 0.004 - down)),
             pelvis=pelvis,
             thorax=thorax,
             head=about(z=heading, y=math.radians(4) - 0.4 * back),
@@ -256,10 +245,8 @@ class _Foot:
             down = (t >= step.time) & (t < lift)
             ankle[down] = self._standing(step, t[down])
             swings = (t >= lift) & (t < after.time)
-            begin, end = (
-                state(partial(self._standing, one), time)
-                for one, time in ((step, lift), (after, after.time))
-            )
+            begin = state(partial(self._standing, step), lift)
+            end = state(partial(self._standing, after), after.time)
             path = hermite(t[swings], (lift, after.time), begin, end)
             swung = (t[swings] - lift) / (after.time - lift)
             ankle[swings] = path + own.clearance * self.height * bump(swung)[:, None] * UP

@@ -212,10 +212,10 @@ class _Jumper:
         own, height, close, span = self.own, self.subject.height_m, self.close, self.span
         # A jumper does not move before the first hop of a set and after the last: further sets do
         # not matter.
+        begun = [hops[0].begin - self.hop_s < t[-1] for hops in self.sets]
+        ended = [hops[-1].end + self.hop_s <= t[0] for hops in self.sets]
         near = [
-            k
-            for k, one in enumerate(self.sets)
-            if one[0].begin - self.hop_s < t[-1] and one[-1].end + self.hop_s > t[0]
+            k for k, (here, over) in enumerate(zip(begun, ended, strict=True)) if here and not over
         ]
         hops = [hop for k in near for hop in self.sets[k]]
         rises = [sum((_through(t, self.knots[k][of]) for k in near), 0 * t) for of in range(3)]
@@ -226,9 +226,8 @@ class _Jumper:
         airborne = sum((bump((t - hop.begin) / hop.span) for hop in hops), 0 * t)
         roll = heels / self.heel[2]
         pitch = _pitch(heels / height)
-        ankle = rolled(pitch, height) + xyz(
-            -own.trail * height * airborne, 0.0, ANKLE * height + ankles_rise - heels
-        )
+        trail, above = own.trail * height * airborne, ANKLE * height + ankles_rise - heels
+        ankle = rolled(pitch, height) + xyz(-trail, 0.0, above)
         lean = np.radians(own.lean + own.crouch * (height * ROOT - z) / (0.1 * height))
         lean += math.radians(own.nod) * self._wavering(t, "nod")
         turn = math.radians(own.turn) * self._wavering(t, "turn")
@@ -255,13 +254,10 @@ class _Jumper:
 
     def _wavering(self, t: Array, what: str) -> Array:
         """Slow swings (n,) from -1 to 1 of ``what``: nobody does the same all the time."""
-        rates = {f"{what} of a jack": 0.5, f"slow {what}": 0.31}
-        turns = t / self.hop_s
-        swings = [
-            np.sin(2 * np.pi * (rate * turns + self.subject.drawn(name, 0.0, 1.0)))
-            for name, rate in rates.items()
-        ]
-        return np.asarray(0.5 * (swings[0] + swings[1]))
+        turns, swings = t / self.hop_s, 0 * t
+        for name, rate in ((f"{what} of a jack", 0.5), (f"slow {what}", 0.31)):
+            swings += np.sin(2 * np.pi * (rate * turns + self.subject.drawn(name, 0.0, 1.0)))
+        return np.asarray(0.5 * swings)
 
     def _arms(self, t: Array, hops: list[_Flight], thorax: Rotation) -> dict[str, Arm]:
         """Arms that go up aside as the feet go apart, and swing forward."""
@@ -295,14 +291,9 @@ class _Jumper:
         return arms
 
 
-def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
-    """Jumping jacks, facing +x."""
-    return _Jumper(subject, "jumping_jack", duration_s).poses
-
-
-def jump(duration_s: float, subject: Subject) -> PosesAt:
-    """Jumps with both legs on the spot, facing +x."""
-    return _Jumper(subject, "jump", duration_s).poses
+def jumping_jack(duration_s: float, subject: Subject, activity: str = "jumping_jack") -> PosesAt:
+    """Jumping jacks, or jumps with both legs on the spot, facing +x."""
+    return _Jumper(subject, activity, duration_s).poses
 
 
 def _between(

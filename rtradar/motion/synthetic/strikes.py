@@ -14,6 +14,7 @@ from functools import cache, partial
 from types import SimpleNamespace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rtradar.motion.synthetic.fighter import Fighter
 from rtradar.motion.synthetic.figure import (
@@ -38,8 +39,11 @@ def _kind(activity: str, style: str) -> SimpleNamespace:
     return SimpleNamespace(**table_of(f"{activity}_{style}"))
 
 
-def _only(activity: str, style: str) -> Array:
-    return np.array([float(kind == style) for kind in STYLES[activity]])
+def _shares(activity: str, style: str, rng: np.random.Generator, favourites: ArrayLike) -> Array:
+    """Probabilities of the kinds of a strike; a style that is one of them excludes the others."""
+    if style in STYLES[activity]:
+        return np.array([float(kind == style) for kind in STYLES[activity]])
+    return rng.dirichlet(np.asarray(favourites))
 
 
 # -- kicks -----------------------------------------------------------------------------------------
@@ -58,11 +62,7 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     own.pace *= subject.tempo
     # Each has one or two favourites; spins are rare.
     rng = np.random.default_rng([subject.manner, 1])
-    shares = (
-        _only("kick", subject.style)
-        if subject.style
-        else rng.dirichlet([0.9, 0.35, 0.6, 0.12, 0.5])
-    )
+    shares = _shares("kick", subject.style, rng, [0.9, 0.35, 0.6, 0.12, 0.5])
     fighter = Fighter(subject, stance, own)
     leg, t = subject.side, -1.6 * subject.phase
     while t < duration_s + 0.5:
@@ -186,27 +186,13 @@ def _swing(fighter: Fighter, leg: str, begin: float, end: float) -> None:
 # -- punches ---------------------------------------------------------------------------------------
 
 
-def punch(duration_s: float, subject: Subject) -> PosesAt:
-    """Punches of any kind, alone or a few in a row, facing +x."""
-    return _combinations(duration_s, subject, boxing=False)
-
-
-def boxing(duration_s: float, subject: Subject) -> PosesAt:
-    """Shadow boxing: combinations, steps between them, and a trunk that weaves, facing +x."""
-    return _combinations(duration_s, subject, boxing=True)
-
-
 def _habits(subject: Subject, *, boxing: bool) -> SimpleNamespace:
     """How a subject punches; ``shares`` are the probabilities of the kinds."""
     style, rng = subject.style, np.random.default_rng([subject.manner, 2])
     if boxing and not style:
         style = STYLES["boxing"][int(rng.choice(len(_BOXERS), p=_BOXERS))]
     own = subject.traits(f"boxing_{style}" if boxing else "punch")
-    own.shares = (
-        _only("punch", style)
-        if style in STYLES["punch"]
-        else rng.dirichlet(np.array(own.favourites) + 1e-3)
-    )
+    own.shares = _shares("punch", style, rng, np.array(own.favourites) + 1e-3)
     own.in_turn = style == "steady"
     if own.in_turn:
         own.most, own.stepping, own.weaving, own.bow = int(own.many), 0.0, 0.0, 0.0
@@ -220,7 +206,11 @@ def _habits(subject: Subject, *, boxing: bool) -> SimpleNamespace:
     return own
 
 
-def _combinations(duration_s: float, subject: Subject, *, boxing: bool) -> PosesAt:
+def punch(duration_s: float, subject: Subject, *, boxing: bool = False) -> PosesAt:
+    """Punches of any kind, alone or a few in a row, facing +x.
+
+    Boxers make combinations, step between them, and their trunk weaves.
+    """
     own = _habits(subject, boxing=boxing)
     stance = subject.traits("boxing_stance" if boxing else "punch_stance")
     stance.lead = subject.other

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body, unit_sphere
 from rtradar.body.body import Poses
-from rtradar.body.human.mesh import MOST_DIVISIONS, loop_subdivision
+from rtradar.body.human import MOST_DIVISIONS, loop_subdivision
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets

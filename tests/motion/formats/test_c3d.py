@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import load_motion
-from rtradar.motion.formats.c3d import LONGEST_GAP_S, _Bounded, read_markers
-from rtradar.motion.formats.markers import NEEDED
+from rtradar.motion.formats.markers import LONGEST_GAP_S, NEEDED, _Bounded, chosen, read_c3d
 from rtradar.motion.skeleton import NODES, to_nodes
 
 FRAMES, RATE = 90, 120.0
@@ -209,7 +208,7 @@ def test_a_file_that_says_y_is_up_is_turned(tmp_path: Path, walk: np.ndarray) ->
 def test_positions_are_those_that_another_reader_finds(tmp_path: Path, walk: np.ndarray) -> None:
     walk[20:25, HDM05.index("LKNE")] = np.nan
     path = write(tmp_path / "walk.c3d", walk)
-    ours = read_markers(path, NEEDED)
+    ours = chosen(read_c3d(path), NEEDED)
     other = ezc3d.c3d(str(path))
     labels = other["parameters"]["POINT"]["LABELS"]["value"]
     theirs = (

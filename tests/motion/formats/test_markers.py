@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.markers import (
-    CENTRES,
-    NEEDED,
-    SHANK_M,
-    joint_centres,
-    rigid_motion,
-)
+from rtradar.motion.formats.markers import CENTRES, NEEDED, SHANK_M, joint_centres
+from rtradar.motion.formats.skeletons import rigid_motion
 from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton import NODE_PARENT, NODES
 

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.body.human.fit import KEYPOINT_NODES, Fit, fit_to
-from rtradar.body.human.shape import data_folder
+from rtradar.body.human_shape import KEYPOINT_NODES, Fit, data_folder, fit_to
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.motion import Motion
@@ -134,10 +133,8 @@ class HumanMesh:
         count = len(positions)
         turns: Any = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix()
         bones = turns.reshape(count, -1, 3, 3)[:, self.fit.turned_by] @ self.fit.mounting
-        rows = np.concatenate(
-            [np.swapaxes(bones, 2, 3), positions[:, list(NODE_PARENTS[1:]), None]], axis=2
-        )
-        rows = rows.reshape(count, -1, 3)
+        starts = positions[:, list(NODE_PARENTS[1:]), None]
+        rows = np.concatenate([np.swapaxes(bones, 2, 3), starts], axis=2).reshape(count, -1, 3)
         moves = self.fit.keypoint_moves(rows, positions[:, KEYPOINT_NODES])
         return np.concatenate([rows, moves], axis=1)
 
@@ -221,18 +218,16 @@ class HumanMesh:
             raise InputError(
                 f"HumanMesh: divisions = {divisions}; allowed are 0 to {MOST_DIVISIONS}"
             )
-        if divisions not in self._kept:
-            if divisions == 0:
-                self._kept[0] = self.fit.skinning, self.fit.faces
-            else:
-                features, faces = self._divided(divisions - 1)
-                smooth, finer = loop_subdivision(faces, features.shape[0])
-                self._kept[divisions] = smooth @ features, finer
+        for number in range(len(self._kept), divisions + 1):
+            features, faces = self._kept[number - 1]
+            smooth, finer = loop_subdivision(faces, features.shape[0])
+            self._kept.append((smooth @ features, finer))
         return self._kept[divisions]
 
     @cached_property
-    def _kept(self) -> dict[int, tuple[Any, NDArray[np.int64]]]:
-        return {}
+    def _kept(self) -> list[tuple[Any, NDArray[np.int64]]]:
+        """Skinning and faces of the mesh, and of those divided ones that were asked for."""
+        return [(self.fit.skinning, self.fit.faces)]
 
 
 def loop_subdivision(faces: NDArray[np.int64], vertices: int) -> tuple[Any, NDArray[np.int64]]:
@@ -262,16 +257,10 @@ def loop_subdivision(faces: NDArray[np.int64], vertices: int) -> tuple[Any, NDAr
     own, count = own.reshape(-1, 3), len(edges)
     opposite = np.roll(faces, 1, axis=1)
     number = np.arange(count)
-    middles = coo_matrix(
-        (
-            np.concatenate([np.full(2 * count, 3 / 8), np.full(own.size, 1 / 8)]),
-            (
-                np.concatenate([number, number, own.ravel()]),
-                np.concatenate([edges[:, 0], edges[:, 1], opposite.ravel()]),
-            ),
-        ),
-        shape=(count, vertices),
-    ).tocsr()
+    shares = np.concatenate([np.full(2 * count, 3 / 8), np.full(own.size, 1 / 8)])
+    rows = np.concatenate([number, number, own.ravel()])
+    columns = np.concatenate([edges[:, 0], edges[:, 1], opposite.ravel()])
+    middles = coo_matrix((shares, (rows, columns)), shape=(count, vertices)).tocsr()
     neighbours = coo_matrix((np.ones(count), edges.T), shape=(vertices, vertices)).tocsr()
     neighbours = neighbours + neighbours.T
     valence = np.asarray(neighbours.sum(axis=1)).ravel()
