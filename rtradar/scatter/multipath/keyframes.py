@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.mirrors import received_from_conductors
+from rtradar.kernels.scatter.rooms import received_from_conductors
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
