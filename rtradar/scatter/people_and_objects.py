@@ -25,7 +25,7 @@ from rtradar.scatter.rigid.bounces import rigid_echoes
 from rtradar.scatter.rigid.echoes import RigidEchoes
 from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 _INSTANTS = 8

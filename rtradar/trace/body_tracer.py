@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.facet_rays import facet_rays, first_occluders
-from rtradar.kernels.scatter.near_rays import near_rays
+from rtradar.kernels.scatter.rays import facet_rays, first_occluders, near_rays
 from rtradar.system.threads import thread_map
 from rtradar.trace.rays import any_met, ball_around
 

@@ -12,11 +12,10 @@ from pathlib import Path
 import pytest
 
 from rtradar.errors import BackendError, InputError
-from rtradar.trace.backends import backend as backends
-from rtradar.trace.backends import llvm, probe
-from rtradar.trace.backends.backend import Backend, BackendWarning, select, use
-from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
-from rtradar.trace.backends.probe import ProbeResult
+from rtradar.trace import backend as backends
+from rtradar.trace import probe
+from rtradar.trace.backend import Backend, BackendWarning, select, use
+from rtradar.trace.probe import ENVIRONMENT_VARIABLE, Library, ProbeResult
 
 BAD = Library("/lib/libLLVM-15.so.1", "environment")
 WHEEL = Library("/venv/lib/libLLVM.so.23.1", "wheel")
@@ -140,12 +139,12 @@ def test_environment_then_wheel_then_system_newest_first(
         files[name] = tmp_path / name
         files[name].touch()
     (tmp_path / "libLLVM-19.0.so").symlink_to(files["libLLVM-19.so.1"])
-    monkeypatch.setattr(llvm, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
-    monkeypatch.setattr(llvm, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
+    monkeypatch.setattr(probe, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
+    monkeypatch.setattr(probe, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
     monkeypatch.setattr(sys, "prefix", str(tmp_path / "none"))
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path / "none"))
     monkeypatch.setenv(ENVIRONMENT_VARIABLE, str(files["libLLVM-15.so.1"]))
-    found = [(Path(library.path).name, library.origin) for library in llvm.candidates()]
+    found = [(Path(library.path).name, library.origin) for library in probe.candidates()]
     assert found == [
         ("libLLVM-15.so.1", "environment"),
         ("libLLVM.so.23.1", "wheel"),
@@ -268,7 +267,7 @@ def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: 
 @pytest.mark.slow
 def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
     """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
-    libraries = [library for library in llvm.candidates() if library.version]
+    libraries = [library for library in probe.candidates() if library.version]
     if not libraries:
         pytest.skip("this machine has no libLLVM of a known version")
     for library in libraries:
@@ -281,14 +280,14 @@ def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
 def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
     bad = [
         library.path
-        for library in llvm.candidates()
+        for library in probe.candidates()
         if not probe.probe_backend("llvm_ad_rgb", library).good
     ]
     if not bad:
         pytest.skip("this machine has no libLLVM that is bad")
     script = """
 import warnings
-from rtradar.trace.backends.backend import loaded_llvm_version, select, use
+from rtradar.trace.backend import loaded_llvm_version, select, use
 warnings.simplefilter("ignore")
 backend = select("cpu")
 mi = use(backend)

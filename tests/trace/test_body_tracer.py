@@ -13,7 +13,7 @@ import rtradar as rt
 from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.scatter import build_model
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer, UnitSphere
 
 Array = NDArray[np.float64]

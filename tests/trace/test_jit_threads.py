@@ -14,7 +14,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, thread_map
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import UnitSphere
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
@@ -81,9 +81,9 @@ def in_a_new_process(program: str, threads: int) -> list[str]:
 def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
     program = f"""
 import numpy as np
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.backends.jit_threads import MANY_RAYS
+from rtradar.trace.backend import MANY_RAYS
 mi = use(select("{backend.kind}"))
 import drjit as dr
 surfaces = MeshTracer(mi, np.array([[[1.0, -9.0, -9.0], [1.0, 9.0, -9.0], [1.0, 0.0, 9.0]]]))
@@ -98,8 +98,8 @@ for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS
 
 def test_threads_of_who_came_first_are_left_alone(backend: Backend) -> None:
     program = f"""
-from rtradar.trace.backends.backend import select, use
-from rtradar.trace.backends.jit_threads import MANY_RAYS, grow_for
+from rtradar.trace.backend import select, use
+from rtradar.trace.backend import MANY_RAYS, grow_for
 backend = select("{backend.kind}")
 import os
 os.environ["DRJIT_LIBLLVM_PATH"] = backend.llvm_path or ""

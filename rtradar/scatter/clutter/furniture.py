@@ -33,7 +33,7 @@ from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
 from rtradar.scene import Furniture, Material, Scene, reflection
 from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.surfaces import Surfaces
+from rtradar.trace.rays import Surfaces
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -27,13 +27,13 @@ from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes
 from rtradar.scatter.clutter.wall_returns import rough_returns, specular_returns
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scene import Scene
-from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.occluders import Occluders
 
 MOST_ORDER = 3
 KEPT_ROOMS = 2
 """Rooms that stay in memory once they are traced; a furnished one may take 100 MB, to which
-`rtradar.signal.static_clutter` adds its echoes once more, in groups."""
+`rtradar.signal.clutter` adds its echoes once more, in groups."""
 
 
 @dataclass(frozen=True)

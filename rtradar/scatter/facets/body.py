@@ -31,7 +31,7 @@ from rtradar.scatter.facets.surfaces import (
     subdivisions_for,
 )
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

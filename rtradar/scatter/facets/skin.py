@@ -44,7 +44,7 @@ from rtradar.scatter.facets.surfaces import (
 )
 from rtradar.scatter.ray_tubes.tubes import in_four
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from rtradar.scatter.facets.surfaces import (
     subdivisions_for,
 )
 from rtradar.scatter.target import target_mesh
-from rtradar.trace.backends.backend import select
+from rtradar.trace.backend import select
 
 if TYPE_CHECKING:
     import trimesh

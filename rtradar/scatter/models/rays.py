@@ -27,10 +27,10 @@ from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.surfaces import Surfaces
+from rtradar.trace.rays import Surfaces
 
 ANCHOR_S = 10e-3
 """Time between keyframes of people of ellipsoids [s]."""

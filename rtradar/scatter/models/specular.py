@@ -25,7 +25,7 @@ from rtradar.scatter.specular_point.second_term import check_terms, with_second_
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
 from rtradar.scatter.target import sum_of_echoes, target_geometry
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Visibility = Literal["sharp", "gradual"]

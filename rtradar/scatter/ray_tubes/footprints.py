@@ -28,7 +28,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
+from rtradar.kernels.scatter.triangles import Tubes, radiate_tubes
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.system.threads import in_threads
 

@@ -25,7 +25,7 @@ from rtradar.antenna import Antenna
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.ray_tubes.footprints import Footprints
 from rtradar.scatter.ray_tubes.tubes import Grid
-from rtradar.trace.surfaces import Surfaces
+from rtradar.trace.rays import Surfaces
 
 MOST_SPLITS = 3
 """A tube becomes 64 at most."""

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from references.cases import Pair, kernel_case
-from rtradar.kernels.scatter.facet_rays import facet_rays, first_occluders
-from rtradar.kernels.scatter.near_rays import NEAR, near_rays
+from rtradar.kernels.scatter.rays import NEAR, facet_rays, first_occluders, near_rays
 
 
 def body_and_lines(poses: int, seed: int = 0) -> tuple[tuple[np.ndarray, ...], ...]:

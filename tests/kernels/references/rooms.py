@@ -7,7 +7,7 @@ import numpy as np
 from references.cases import Pair, filled, kernel_case
 from references.specular_point import geometry
 from rtradar.kernels.elementary import add_blended, cubic_weights, hermite_weights, smoothstep
-from rtradar.kernels.scatter.envelope import fill_envelope
+from rtradar.kernels.scatter.facets import fill_envelope
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.rooms import (
     Blend,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from references.rays import body_and_lines
-from rtradar.kernels.scatter.near_rays import NEAR, near_rays
+from rtradar.kernels.scatter.rays import NEAR, near_rays
 
 
 def test_rays_start_two_radii_before_a_part_and_end_at_the_target() -> None:

@@ -12,7 +12,7 @@ from rtradar.scatter.clutter.wall_returns import rough_returns
 from rtradar.scatter.multipath.slab_series import WHOLE
 from rtradar.scatter.multipath.wall_interaction import after_slab
 from rtradar.scene import Scene, Wall, material, slab
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=(-8, 0, 1), samples_per_chirp=1024)

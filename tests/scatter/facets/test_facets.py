@@ -16,7 +16,7 @@ from rtradar.scatter.common.polarization import Polarization, copolar
 from rtradar.scatter.facets.radiation import facet_integral
 from rtradar.scatter.facets.surfaces import ellipsoid_facets, mesh_facets, subdivisions_for
 from rtradar.scatter.facets.target import facet_scattering
-from rtradar.trace.backends.backend import use
+from rtradar.trace.backend import use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

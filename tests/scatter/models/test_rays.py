@@ -16,7 +16,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.models.rays import Rays
 from rtradar.scatter.ray_tubes.target import rays_scattering
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 Array = NDArray[np.float64]
 FAR = 1e6

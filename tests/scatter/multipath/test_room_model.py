@@ -23,7 +23,7 @@ from rtradar.scatter.multipath.room_keyframes import KEYFRAMES_S
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 Array = NDArray[np.float64]
 Make = Callable[..., Any]

@@ -17,7 +17,7 @@ from rtradar.scatter.specular_point.visibility import (
     trace_keyframe,
     unobstructed,
 )
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

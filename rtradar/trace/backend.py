@@ -3,23 +3,36 @@
 Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for the life of the
 process. Versions 15 and 16 are loaded and then abort the process, so a library is tried in another
 process before it is loaded here.
+
+Dr.Jit has one thread in this process until many rays come at once, and none is taken away. Its
+threads wait for work awake, 20 ms each time, on cores on which ours have other work: for few rays
+that costs more than it saves. To take them away again is not possible. Dr.Jit 1.5.0 tells a thread
+to stop and then looks whether it sleeps, without a fence in between. One that falls asleep in that
+moment gets no message, and `set_thread_count` waits for it for ever.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import threading
 import warnings
 from dataclasses import dataclass
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Literal
+from typing import Any, Literal
 
 from rtradar.errors import BackendError, InputError
 from rtradar.system.clock import warming_up
-from rtradar.trace.backends.jit_threads import begin_with_one
-from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
-from rtradar.trace.backends.probe import ProbeResult, probe_backend
+from rtradar.system.threads import thread_count
+from rtradar.trace.probe import (
+    ENVIRONMENT_VARIABLE,
+    WHEEL,
+    Library,
+    ProbeResult,
+    candidates,
+    probe_backend,
+)
 
 Kind = Literal["llvm", "scalar", "cuda"]
 
@@ -95,7 +108,7 @@ def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
     Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
-    thread until many rays come (`rtradar.trace.backends.jit_threads`); where it was imported
+    thread until many rays come (`rtradar.trace.backend`); where it was imported
     before, it keeps the threads it has. A `BackendError` is raised if Dr.Jit was imported with
     another libLLVM since the backend was selected, or the variant cannot be set.
     """
@@ -177,3 +190,30 @@ def _works(kind: Kind) -> bool:
     except BackendError:
         return False
     return True
+
+
+# -- threads of Dr.Jit --
+
+
+MANY_RAYS = 1 << 16
+"""Least number of rays traced at once that all cores share."""
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def begin_with_one() -> None:
+    """Give Dr.Jit one thread; call it before Dr.Jit computes anything and has others."""
+    import drjit as dr
+
+    dr.set_thread_count(1)
+
+
+def grow_for(mi: Any, rays: int) -> None:
+    """Give Dr.Jit all threads that this process may use, if so many rays are to be traced."""
+    if rays < MANY_RAYS or not mi.variant().startswith("llvm"):
+        return
+    import drjit as dr
+
+    with _ONE_AT_A_TIME:
+        if dr.thread_count() < thread_count():
+            dr.set_thread_count(thread_count())
