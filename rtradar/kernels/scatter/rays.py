@@ -21,46 +21,6 @@ NEAR = 1.1
 
 
 @inlined()
-def _bundle(places, group, counts, middle, radius):
-    """Add up the mean (group, 3) of one end of the lines, and the largest square from it."""
-    for line in range(len(group)):
-        for i in range(3):
-            middle[group[line], i] += places[line, i] / counts[group[line]]
-    for line in range(len(group)):
-        away = minus(places[line], middle[group[line]])
-        radius[group[line]] = max(radius[group[line]], dot(away, away))
-
-
-@inlined()
-def _near_parts(origins, targets, group, own, pose, centres, longest):
-    """Return which parts' bounding balls come near the lines of a group, (group, part)."""
-    groups, parts = len(own), centres.shape[1]
-    middles, radii = np.zeros((groups, 2, 3)), np.zeros((groups, 2))
-    counts = np.zeros(groups)
-    for line in range(len(group)):
-        counts[group[line]] += 1
-    _bundle(origins, group, counts, middles[:, 0], radii[:, 0])
-    _bundle(targets, group, counts, middles[:, 1], radii[:, 1])
-    near = np.zeros((groups, parts), dtype=np.bool_)
-    for g in range(groups):
-        a, b = middles[g, 0], middles[g, 1]
-        way = minus(b, a)
-        first, last = math.sqrt(radii[g, 0]), math.sqrt(radii[g, 1])
-        span = dot(way, way)
-        length = math.sqrt(span)
-        for part in range(parts):
-            if part != own[g] and counts[g] > 0:
-                gap = minus(centres[pose[g], part], a)
-                fraction = min(1.0, max(0.0, dot(gap, way) / max(span, 1e-300)))
-                aside = minus(gap, scaled(way, fraction))
-                # The bundle narrows towards one end: its width is taken before this part.
-                before = max(0.0, fraction - NEAR * longest[part] / max(length, 1e-300))
-                wide = max(first + before * (last - first), last) if first > last else last
-                near[g, part] = math.sqrt(dot(aside, aside)) < NEAR * longest[part] + wide
-    return near
-
-
-@inlined()
 def unit_sphere_maps(frames, semi_axes):
     """Maps (pose, part, 3, 3) from world axes to those in which a part is the unit sphere."""
     maps = np.empty(frames.shape)
@@ -82,6 +42,17 @@ def longest_axes(semi_axes):
     return longest
 
 
+@inlined()
+def _grown(rays):
+    """Twice the room; number by number, as to assign slices takes seconds to compile."""
+    rows, columns = rays.shape
+    out = np.empty((rows, 2 * columns), dtype=rays.dtype)
+    for row in range(rows):
+        for column in range(columns):
+            out[row, column] = rays[row, column]
+    return out
+
+
 @compiled()
 def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     """Return one ray for each line of sight and each part that this line comes near.
@@ -95,30 +66,21 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     most two radii before the point nearest to the centre of the unit sphere; the unit direction;
     the length.
     """
-    parts = len(semi_axes)
-    longest = longest_axes(semi_axes)
-    # First pass over the bounding balls alone, which says how much room the rays take.
-    near = _near_parts(origins, targets, group, own, pose, centres, longest)
-    near_count, near_part = np.zeros(len(own), dtype=np.int64), np.empty(near.shape, dtype=np.int64)
-    for g in range(len(own)):
-        for part in range(parts):
-            if near[g, part]:
-                near_part[g, near_count[g]] = part
-                near_count[g] += 1
-    most = 0
-    for line in range(len(group)):
-        most += near_count[group[line]]
-    maps = unit_sphere_maps(frames, semi_axes)
-    rays, whose = np.empty((7, most), dtype=np.float32), np.empty((2, most), dtype=np.int64)
+    maps, longest = unit_sphere_maps(frames, semi_axes), longest_axes(semi_axes)
+    rays, whose = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
     count = 0
     for line in range(len(group)):
-        g = group[line]
-        origin = origins[line]
-        way = minus(targets[line], origin)
-        for n in range(near_count[g]):
-            part = near_part[g, n]
-            m = maps[pose[g], part]
-            start, along = turned(m, minus(origin, centres[pose[g], part])), turned(m, way)
+        g, origin = group[line], origins[line]
+        way, at = minus(targets[line], origin), pose[g]
+        over_square = 1 / max(dot(way, way), 1e-300)
+        for part in range(len(semi_axes)):
+            # By the bounding ball first, which rules out most.
+            gap, reach = minus(centres[at, part], origin), NEAR * longest[part]
+            aside = minus(gap, scaled(way, dot(gap, way) * over_square))
+            if part == own[g] or dot(aside, aside) > reach * reach:
+                continue
+            m = maps[at, part]
+            start, along = turned(m, minus(origin, centres[at, part])), turned(m, way)
             span, back = dot(along, along), -dot(start, along)
             # The least square of the distance along the line, times its span: no division.
             square = dot(start, start)
@@ -127,6 +89,8 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
             )
             if (least if back > 0 else square * span) > NEAR * NEAR * span:
                 continue
+            if count == rays.shape[1]:
+                rays, whose = _grown(rays), _grown(whose)
             # float32 is too coarse for a far antenna: the ray starts two radii before that point.
             scale = 1 / math.sqrt(span)
             ahead = max(min(1.0, max(0.0, back * scale * scale)) - 2 * scale, 0.0)
@@ -187,17 +151,6 @@ def _facing(local, x, y, z, axes, margin, faces, begin):
         met = (back - math.sqrt(max(chord, 0.0))) / span
         faces[vertex] = 0.0 if along < 0 and along * along > margin * margin * size else 1.0
         begin[vertex] = met if along < 0 and chord > 0 else 1.0
-
-
-@inlined()
-def _grown(rays):
-    """Twice the room; number by number, as to assign slices takes seconds to compile."""
-    rows, columns = rays.shape
-    out = np.empty((rows, 2 * columns), dtype=rays.dtype)
-    for row in range(rows):
-        for column in range(columns):
-            out[row, column] = rays[row, column]
-    return out
 
 
 @inlined()
