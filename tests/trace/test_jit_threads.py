@@ -112,27 +112,6 @@ print(drjit.thread_count())
     assert in_a_new_process(program, threads=2) == ["4"]
 
 
-def test_no_model_takes_threads_of_dr_jit_away(
-    backend: Backend, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # It can wait for ever for one that falls asleep in the same moment.
-    use(backend)
-    import drjit as dr
-
-    dr.set_thread_count(max(2, dr.thread_count()))  # something to take away
-    given: list[int] = []
-    monkeypatch.setattr(dr, "set_thread_count", given.append)
-    body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
-    for fidelity, options in (
-        ("specular", {}),
-        ("specular", {"visibility": "gradual"}),
-        ("physical-optics", {}),
-        ("rays", {}),
-    ):
-        build_model(fidelity, SMALL, body, variant=backend.kind, **options).echoes(np.arange(2))
-    assert all(count >= dr.thread_count() for count in given)
-
-
 @pytest.mark.usefixtures("four_threads")
 def test_physical_optics_is_the_same_with_any_number_of_threads_and_any_blocks(
     backend: Backend, monkeypatch: pytest.MonkeyPatch
