@@ -21,28 +21,6 @@ NEAR = 1.1
 
 
 @inlined()
-def unit_sphere_maps(frames, semi_axes):
-    """Maps (pose, part, 3, 3) from world axes to those in which a part is the unit sphere."""
-    maps = np.empty(frames.shape)
-    for pose in range(len(frames)):
-        for part in range(len(semi_axes)):
-            for i in range(3):
-                for j in range(3):
-                    maps[pose, part, i, j] = frames[pose, part, j, i] / semi_axes[part, i]
-    return maps
-
-
-@inlined()
-def longest_axes(semi_axes):
-    """Return the longest semi-axis of each part (part,) [m]."""
-    longest = np.zeros(len(semi_axes))
-    for part in range(len(semi_axes)):
-        for i in range(3):
-            longest[part] = max(longest[part], semi_axes[part, i])
-    return longest
-
-
-@inlined()
 def _grown(rays):
     """Twice the room; number by number, as to assign slices takes seconds to compile."""
     rows, columns = rays.shape
@@ -54,26 +32,25 @@ def _grown(rays):
 
 
 @compiled()
-def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
+def near_rays(origins, targets, group, own, pose, centres, maps, longest):
     """Return one ray for each line of sight and each part that this line comes near.
 
     Lines (line, 3) go from ``origins`` to ``targets`` [m]. Those of one ``group (line,)`` end on
     the part ``own (group,)``, -1 for none, which cannot occlude them, of the body in one of its
-    poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``frames (pose, part, 3, 3)``, and
-    ``semi_axes (part, 3)``.
+    poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``maps (pose, part, 3, 3)`` to the axes
+    where a part is the unit sphere, and its ``longest (part,)`` semi-axis [m].
 
     Returned are rays (7, ray) float32, and of each its line and that part (2, ray): the start, at
     most two radii before the point nearest to the centre of the unit sphere; the unit direction;
     the length.
     """
-    maps, longest = unit_sphere_maps(frames, semi_axes), longest_axes(semi_axes)
     rays, whose = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
     count = 0
     for line in range(len(group)):
         g, origin = group[line], origins[line]
         way, at = minus(targets[line], origin), pose[g]
         over_square = 1 / max(dot(way, way), 1e-300)
-        for part in range(len(semi_axes)):
+        for part in range(len(longest)):
             # By the bounding ball first, which rules out most.
             gap, reach = minus(centres[at, part], origin), NEAR * longest[part]
             aside = minus(gap, scaled(way, dot(gap, way) * over_square))
@@ -202,7 +179,7 @@ def _write_rays(lines, axes, out):
 
 
 @compiled()
-def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
+def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, margin):
     """Return the rays that decide which part occludes which vertex, as `BodyTracer.occluders` asks.
 
     ``rays (8, ray)`` float32: start, direction and length in axes where the part that it may meet
@@ -211,7 +188,6 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     """
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start = np.empty((3, 3)), np.empty(3), np.empty(3)
-    longest = longest_axes(semi_axes)
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     nearest, near = np.empty(n_vertices), np.empty(n_vertices, dtype=np.int64)

@@ -308,23 +308,19 @@ def solve(begin, end, at, above, start, options, length, amplitude, point):
     tx, rx, centres, frames, semi_axes = at
     receivers, parts = rx.shape[1], centres.shape[1]
     one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
-    local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
+    local = np.empty((3, receivers))
     for chirp in range(begin, end):
         for part in range(parts):
             # Antennas, and their up, in the axes of the part.
             frame, centre = frames[chirp, part], centres[chirp, part]
+            source = turned_back(frame, minus(tx[chirp], centre))
+            up = turned_back(frame, above[chirp])
+            for receiver in range(receivers):
+                antenna = turned_back(frame, minus(rx[chirp, receiver], centre))
+                local[0, receiver], local[1, receiver], local[2, receiver] = antenna
             for i in range(3):
-                local_t[i] = 0.0
-                local_r[i] = 0.0
-                up[i] = 0.0
-                for j in range(3):
-                    local_t[i] += frame[j, i] * (tx[chirp, j] - centre[j])
-                    up[i] += frame[j, i] * above[chirp, j]
-                    for receiver in range(receivers):
-                        away = rx[chirp, receiver, j] - centre[j]
-                        local_r[i, receiver] += frame[j, i] * away
                 guess[i] = start[chirp, part, i]
-            search_all(local_t, local_r, semi_axes[part], up, options, guess, one, out)
+            search_all(source, local, semi_axes[part], up, options, guess, one, out)
             for receiver in range(receivers):
                 length[chirp, receiver, part] = out[0, receiver]
                 amplitude[chirp, receiver, part] = out[1, receiver]

@@ -22,6 +22,11 @@ def body_and_lines(poses: int, seed: int = 0) -> tuple[tuple[np.ndarray, ...], .
     return (centres, frames, rng.uniform(0.05, 0.3, (6, 3))), lines
 
 
+def unit_maps(frames: np.ndarray, semi_axes: np.ndarray) -> np.ndarray:
+    """Maps (..., part, 3, 3) to the axes where a part is the unit sphere."""
+    return np.ascontiguousarray(np.swapaxes(frames, -1, -2) / semi_axes[:, :, None])
+
+
 def near_lines_reference(origins, targets, own, centres, frames, semi_axes):
     """Pairs (line, part) bool of `near_rays` for one pose: the line enters the volume `NEAR`."""
     starts = np.einsum("pji,lpj->lpi", frames, origins[:, None] - centres) / semi_axes
@@ -42,7 +47,10 @@ def _near_rays(poses: int, seed: int) -> Pair:
         posed = centres[number], frames[number], axes
         near = near_lines_reference(origins[ours], targets[ours], own[group[ours]], *posed)
         expected[ours] = near.sum(axis=1)
-    found = np.bincount(near_rays(*lines, centres, frames, axes)[1][0], minlength=len(origins))
+    found = np.bincount(
+        near_rays(*lines, centres, unit_maps(frames, axes), axes.max(axis=1))[1][0],
+        minlength=len(origins),
+    )
     return found, expected
 
 
@@ -69,10 +77,10 @@ def _facet_rays() -> Pair:
     axes, centres = rng.uniform(0.05, 0.25, (6, 3)), rng.uniform(-0.4, 0.4, (6, 3))
     frames = np.linalg.qr(rng.normal(size=(6, 3, 3)))[0]
     places = np.array([-4.0, 0, 0]) + rng.normal(0, 0.3, (antennas, 3))
-    given = places, parts, centres, frames, axes, u * axes[:, :, None]
-    slots = facet_rays(*given, 0.0)[1][0]
+    posed, vertices = (places, parts, centres, frames, axes), u * axes[:, :, None]
+    slots = facet_rays(*posed, axes.max(axis=1), vertices, 0.0)[1][0]
     count = np.bincount(slots, minlength=antennas * 900).reshape(antennas, 3, 300)
-    return count, facet_rays_reference(*given)
+    return count, facet_rays_reference(*posed, vertices)
 
 
 def first_occluders_reference(met, fraction, whose, vertices):
