@@ -170,10 +170,8 @@ class Rings:
         )
 
 
-# -- azimuthal modes --
+# -- azimuthal modes -------------------------------------------------------------------------------
 
-
-Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 
 

@@ -306,11 +306,7 @@ class RoomIf:
         return lost
 
 
-# -- a radar that moves --
-
-
-_Array = NDArray[np.float64]
-_Samples = NDArray[np.complex64]
+# -- a radar that moves ----------------------------------------------------------------------------
 
 SPACING = 2.0
 """Way between keyframes in wavelengths."""

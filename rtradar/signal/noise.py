@@ -123,8 +123,7 @@ def _stream(seed: int, cycle: int) -> NDArray[np.uint64]:
     return np.asarray(np.random.SFC64(stream(seed, cycle)).state["state"]["state"])
 
 
-# -- phase noise --
-
+# -- phase noise -----------------------------------------------------------------------------------
 
 _Array = NDArray[np.float64]
 

@@ -192,8 +192,7 @@ def _works(kind: Kind) -> bool:
     return True
 
 
-# -- threads of Dr.Jit --
-
+# -- threads of Dr.Jit -----------------------------------------------------------------------------
 
 MANY_RAYS = 1 << 16
 """Least number of rays traced at once that all cores share."""

@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.trace.backend import grow_for
 
+Array = NDArray[np.float64]
+
 _LANES = 16
 """Numbers of float32 in the widest vectors."""
 
@@ -100,24 +102,21 @@ def triangle_scene(mi: Any, corners: NDArray[np.float64]) -> Any:
     return mi.load_dict({"type": "scene", "triangles": mesh})
 
 
-def ball_around(
-    places: NDArray[np.float64], radii: NDArray[np.float64] | float = 0.0
-) -> tuple[NDArray[np.float64], float]:
+def ball_around(places: Array, radii: Array | float = 0.0) -> tuple[Array, float]:
     """Centre and radius of a ball that holds balls about ``places (n, 3)``, with 1 % to spare."""
     centre = (places.max(axis=0) + places.min(axis=0)) / 2
     return centre, float((np.linalg.norm(places - centre, axis=1) + radii).max()) * 1.01
 
 
-def into_ball(
-    starts: NDArray[np.float64], directions: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where rays enter the ball about 0, (ray, 3), and how far that is (ray,)."""
+def ball_chord(starts: Array, directions: Array, radius: float) -> tuple[Array, Array]:
+    """How far along rays (ray, 3) the ball about 0 has its middle, and the square of half a chord.
+
+    The square is negative where a ray passes outside.
+    """
     along = -np.einsum("ij,ij->i", starts, directions)
     # From the nearest point, not from the start: squares of 1e6 m would swallow it.
     nearest = starts + along[:, None] * directions
-    half_chord = np.sqrt(np.maximum(radius**2 - np.einsum("ij,ij->i", nearest, nearest), 0.0))
-    ahead = np.maximum(along - half_chord, 0.0)
-    return starts + ahead[:, None] * directions, ahead
+    return along, radius**2 - np.einsum("ij,ij->i", nearest, nearest)
 
 
 def rays_of(mi: Any, rows: ArrayLike) -> Any:
@@ -149,9 +148,6 @@ def _aligned(rows: NDArray[Any]) -> NDArray[np.float32]:
     aligned = memory[first : first + count * width].reshape(count, width)[:, :columns]
     aligned[:] = rows
     return aligned
-
-
-Array = NDArray[np.float64]
 
 
 class Surfaces(Protocol):
