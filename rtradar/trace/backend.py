@@ -83,24 +83,22 @@ def select(variant: str = "auto") -> Backend:
                 f"the package {package} is not installed; install it: pip install mitsuba"
             )
     library, result, trouble = _first_good()
-    path, version = (library.path, result.version) if library and result else (None, None)
-    if variant == "cuda":
-        result = probe_backend(VARIANTS["cuda"], library)
-        if not result.good:
+    kind = next((name for name in VARIANTS if name == variant), "llvm" if library else "scalar")
+    if kind == "llvm" and library is None:
+        raise BackendError(trouble)
+    if kind == "cuda":
+        probed = probe_backend(VARIANTS["cuda"], library)
+        if not probed.good:
             raise BackendError(
-                f"no CUDA GPU that works was found ({result.finding}); it needs an NVIDIA driver "
+                f"no CUDA GPU that works was found ({probed.finding}); it needs an NVIDIA driver "
                 "with OptiX; use --variant auto to run on the CPU"
             )
-        return Backend("cuda", VARIANTS["cuda"], path, version)
-    if variant == "scalar":
-        return Backend("scalar", VARIANTS["scalar"], path, version)
-    if library is not None:
-        return Backend("llvm", VARIANTS["llvm"], path, version)
-    if variant == "llvm":
-        raise BackendError(trouble)
-    warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
-    warnings.warn(warning, BackendWarning, stacklevel=2)
-    return Backend("scalar", VARIANTS["scalar"], None, None, warning)
+    path, version = (library.path, result.version) if library and result else (None, None)
+    warning = None
+    if kind == "scalar" and variant != "scalar":
+        warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
+        warnings.warn(warning, BackendWarning, stacklevel=2)
+    return Backend(kind, VARIANTS[kind], path, version, warning)
 
 
 @warming_up()
@@ -108,9 +106,9 @@ def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
     Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
-    thread until many rays come (`rtradar.trace.backend`); where it was imported
-    before, it keeps the threads it has. A `BackendError` is raised if Dr.Jit was imported with
-    another libLLVM since the backend was selected, or the variant cannot be set.
+    thread until many rays come (`grow_for`); where it was imported before, it keeps the threads it
+    has. A `BackendError` is raised if Dr.Jit was imported with another libLLVM since the backend
+    was selected, or the variant cannot be set.
     """
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules

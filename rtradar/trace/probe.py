@@ -126,6 +126,13 @@ _STOPPED = {
 }
 """Signals by which somebody ended the probe, which says nothing about the library."""
 
+_FINDINGS = {
+    "is too old": "refused by Dr.Jit: too old",
+    "Unable to load": "cannot be loaded",
+    "the CUDA backend": "no CUDA driver or no GPU",
+}
+"""What it means that Dr.Jit says so."""
+
 
 @dataclass(frozen=True)
 class ProbeResult:
@@ -199,12 +206,9 @@ def _what_went_wrong(done: subprocess.CompletedProcess[str], said: dict[str, Any
     # A process that calls abort() ends by a signal, which Python tells by a negative status.
     if done.returncode < 0:
         return "aborts the process"
-    if "is too old" in done.stderr:
-        return "refused by Dr.Jit: too old"
-    if "Unable to load" in done.stderr:
-        return "cannot be loaded"
-    if "the CUDA backend" in done.stderr:
-        return "no CUDA driver or no GPU"
+    for text, finding in _FINDINGS.items():
+        if text in done.stderr:
+            return finding
     lines = done.stderr.strip().splitlines()
     last = lines[-1] if lines else f"exit status {done.returncode}"
     return f"fails: {last[:200]}"
