@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 
 import rtradar as rt
 from rtradar.system import figure_style, threads
-from rtradar.trace.backends.backend import Backend, available, select, use
+from rtradar.trace.backend import Backend, available, select, use
 from rtradar.validate import validation_folder
 
 # The same examples every time, and no limit of time, because kernels are compiled when first used.

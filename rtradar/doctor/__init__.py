@@ -14,9 +14,8 @@ from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
 from rtradar.system.templates import templates
-from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
-from rtradar.trace.backends.llvm import candidates
-from rtradar.trace.backends.probe import probe_backend
+from rtradar.trace.backend import VARIANTS, BackendWarning, Kind, select
+from rtradar.trace.probe import candidates, probe_backend
 
 PACKAGES = (
     *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh"),

@@ -29,8 +29,7 @@ from scipy.linalg import qr, solve_triangular
 
 from rtradar.errors import InputError
 from rtradar.full_wave.antennas import Dipole, Polarization, antenna_moments, wavenumber
-from rtradar.full_wave.revolution_curves import Rings, Spheroid
-from rtradar.full_wave.revolution_modes import Medium
+from rtradar.full_wave.revolution_rings import Medium, Rings, Spheroid
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]

@@ -34,7 +34,7 @@ from rtradar.scatter.validity import warn_of
 from rtradar.scene import Object, Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise, separate
-from rtradar.signal.phase_noise import mean_delays
+from rtradar.signal.noise import mean_delays
 from rtradar.signal.receiver import Expected, Mover, ReceiverStage
 from rtradar.system.threads import one_blas_thread
 

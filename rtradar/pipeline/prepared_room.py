@@ -17,9 +17,8 @@ from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scatter.validity import Limit, warn_of
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
+from rtradar.signal.clutter import MovingRoomIf, RoomIf
 from rtradar.signal.ghosts import GhostIf, ghosts_within
-from rtradar.signal.moving_clutter import MovingRoomIf
-from rtradar.signal.static_clutter import RoomIf
 
 _LEFT_OUT, _OF_GHOSTS = 0.04, 0.75
 """Budget of errors, as fractions of the tolerated power: 4 % for ghosts left out, 75 % for all

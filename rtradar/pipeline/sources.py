@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
+from rtradar.kernels.cells import EchoesAtInstants, fields_in_bins, follow_echoes
 from rtradar.pipeline.output.echo_table import EchoTable
 from rtradar.pipeline.processing import CellSources
 from rtradar.process import range_spectrum

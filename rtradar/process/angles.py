@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.angles import add_interpolated, beam_power, highest_maxima
+from rtradar.kernels.cells import add_interpolated, beam_power, highest_maxima
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.angles import Steering
+from rtradar.kernels.cells import Steering
 from rtradar.process.window_functions import taylor
 from rtradar.radar import Radar
 from rtradar.system.threads import one_blas_thread, thread_map

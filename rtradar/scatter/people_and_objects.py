@@ -24,7 +24,7 @@ from rtradar.scatter.rigid_echoes import DIRECT, RigidEchoes
 from rtradar.scatter.rigid_sheets import RigidSheet
 from rtradar.scatter.validity import Limit, objects_inside
 from rtradar.scene import Object, Scene
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 _INSTANTS = 8

@@ -42,11 +42,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
-from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
+from rtradar.kernels.scatter.triangles import Tubes, radiate_tubes
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.target import Grid
 from rtradar.system.threads import in_threads
-from rtradar.trace.surfaces import Surfaces
+from rtradar.trace.rays import Surfaces
 
 Array = NDArray[np.float64]
 

@@ -25,9 +25,9 @@ from rtradar.kernels.receiver import (
 )
 from rtradar.radar import Radar
 from rtradar.receiver import Interferer
+from rtradar.signal.clutter import RoomIf
 from rtradar.signal.multiplexing import chirps_together
-from rtradar.signal.phase_noise import PhaseNoise, mean_delays
-from rtradar.signal.static_clutter import RoomIf
+from rtradar.signal.noise import PhaseNoise, mean_delays
 from rtradar.signal.synthesis import synthesize
 from rtradar.system.seeds import stream
 from rtradar.system.threads import thread_map

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.facet_rays import facet_rays, first_occluders
-from rtradar.kernels.scatter.near_rays import near_rays
+from rtradar.kernels.scatter.rays import facet_rays, first_occluders, near_rays
 from rtradar.system.threads import thread_map
 from rtradar.trace.rays import any_met, ball_around
 
@@ -49,6 +48,7 @@ class BodyTracer:
 
     def __init__(self, mi: Any, semi_axes: Array) -> None:
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
+        self._longest = self._semi_axes.max(axis=1)
         self._sphere = UnitSphere(mi)
         self._posed: tuple[Array, Array]
 
@@ -87,7 +87,7 @@ class BodyTracer:
         self, points: Array, normals: Array, directions: Array, own: Indices
     ) -> tuple[Indices, Array]:
         """As `Surfaces.meets`: the part; no part is met from itself, since all are convex."""
-        centre, ball = ball_around(self._posed[0], self._semi_axes.max(axis=1))
+        centre, ball = ball_around(self._posed[0], self._longest)
         reach = np.linalg.norm(points - centre, axis=1) + ball
         ends = points + reach[:, None] * directions
         line, part = self._met(points, ends, *self._groups(own))
@@ -128,7 +128,7 @@ class BodyTracer:
         own axes [m].
         """
         found = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
-        floats = (antennas, centres, frames, self._semi_axes)
+        floats = (antennas, centres, frames, self._semi_axes, self._longest)
         places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
         asked = np.ascontiguousarray(parts, dtype=np.int64)
         rays, whose = facet_rays(places, asked, *body, vertices, float(margin))
@@ -155,7 +155,8 @@ class BodyTracer:
         poses: Poses,
     ) -> Indices:
         """Lines and the parts that they meet (2, hit), of lines and groups as of `clear`."""
-        floats = (origins, targets, poses.centres, poses.frames, self._semi_axes)
+        maps = np.swapaxes(poses.frames, -1, -2) / self._semi_axes[:, :, None]
+        floats = (origins, targets, poses.centres, maps, self._longest)
         starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
 
         def near(begin: int) -> tuple[NDArray[np.float32], Indices]:

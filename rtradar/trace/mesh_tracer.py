@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.trace.rays import any_met, ball_around, first_met, into_ball, triangle_scene
+from rtradar.trace.rays import any_met, ball_around, ball_chord, first_met, triangle_scene
 
 Array = NDArray[np.float64]
 
@@ -49,13 +49,11 @@ class MeshTracer:
         starts, ways = origins - self._centre, targets - origins
         size = np.linalg.norm(ways, axis=1)
         ways = ways / np.where(size > 0, size, 1.0)[:, None]
-        along = -np.einsum("ij,ij->i", starts, ways)
-        nearest = starts + along[:, None] * ways
-        chord = self._ball**2 - np.einsum("ij,ij->i", nearest, nearest)
-        half = np.sqrt(np.maximum(chord, 0.0))
+        along, square = ball_chord(starts, ways, self._ball)
+        half = np.sqrt(np.maximum(square, 0.0))
         first, last = np.maximum(along - half, CLEAR_M), np.minimum(along + half, size - CLEAR_M)
         # Only legs that enter the ball have to be followed.
-        asked = np.flatnonzero((chord > 0) & (last > first))
+        asked = np.flatnonzero((square > 0) & (last > first))
         met = np.zeros(len(starts), dtype=bool)
         entry = starts[asked] + first[asked, None] * ways[asked]
         rays = np.concatenate([entry.T, ways[asked].T, (last - first)[None, asked]])
@@ -104,6 +102,10 @@ class MeshTracer:
     def _first_hits(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
         """Face (ray,) met first, -1 for none, and distance (ray,) [m], infinite for none."""
         directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
+        starts = origins - self._centre
+        along, square = ball_chord(starts, directions, self._ball)
+        # Rays start where they enter the ball.
+        ahead = np.maximum(along - np.sqrt(np.maximum(square, 0.0)), 0.0)
+        starts += ahead[:, None] * directions
         face, distance = first_met(self._mi, self._scene, starts, directions)
         return face, distance + ahead

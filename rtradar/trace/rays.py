@@ -2,17 +2,21 @@
 
 Mitsuba works in float32. So scenes are centred, each ray starts where it enters the ball around its
 scene, and of the answer only what is met, and roughly how far, is used.
+
+What rays can meet, and bounce off, are `Surfaces`: a posed body or a mesh.
 """
 
 from __future__ import annotations
 
 import threading
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.trace.backends.jit_threads import grow_for
+from rtradar.trace.backend import grow_for
+
+Array = NDArray[np.float64]
 
 _LANES = 16
 """Numbers of float32 in the widest vectors."""
@@ -98,24 +102,21 @@ def triangle_scene(mi: Any, corners: NDArray[np.float64]) -> Any:
     return mi.load_dict({"type": "scene", "triangles": mesh})
 
 
-def ball_around(
-    places: NDArray[np.float64], radii: NDArray[np.float64] | float = 0.0
-) -> tuple[NDArray[np.float64], float]:
+def ball_around(places: Array, radii: Array | float = 0.0) -> tuple[Array, float]:
     """Centre and radius of a ball that holds balls about ``places (n, 3)``, with 1 % to spare."""
     centre = (places.max(axis=0) + places.min(axis=0)) / 2
     return centre, float((np.linalg.norm(places - centre, axis=1) + radii).max()) * 1.01
 
 
-def into_ball(
-    starts: NDArray[np.float64], directions: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where rays enter the ball about 0, (ray, 3), and how far that is (ray,)."""
+def ball_chord(starts: Array, directions: Array, radius: float) -> tuple[Array, Array]:
+    """How far along rays (ray, 3) the ball about 0 has its middle, and the square of half a chord.
+
+    The square is negative where a ray passes outside.
+    """
     along = -np.einsum("ij,ij->i", starts, directions)
     # From the nearest point, not from the start: squares of 1e6 m would swallow it.
     nearest = starts + along[:, None] * directions
-    half_chord = np.sqrt(np.maximum(radius**2 - np.einsum("ij,ij->i", nearest, nearest), 0.0))
-    ahead = np.maximum(along - half_chord, 0.0)
-    return starts + ahead[:, None] * directions, ahead
+    return along, radius**2 - np.einsum("ij,ij->i", nearest, nearest)
 
 
 def rays_of(mi: Any, rows: ArrayLike) -> Any:
@@ -147,3 +148,35 @@ def _aligned(rows: NDArray[Any]) -> NDArray[np.float32]:
     aligned = memory[first : first + count * width].reshape(count, width)[:, :columns]
     aligned[:] = rows
     return aligned
+
+
+class Surfaces(Protocol):
+    """Surfaces go by their numbers, parts of a body or faces of a mesh; -1 is none.
+
+    ``flat`` tells whether they are flat faces. Mitsuba, which works in float32, decides which of
+    them a ray meets; where it meets it follows in float64 from the ray and that surface.
+    """
+
+    flat: bool
+
+    def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether no surface but ``own (ray,)`` is between origins and targets (ray, 3) on it."""
+        ...
+
+    def meets(
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
+        """Surface (ray,) met first from points on surfaces ``own``, and how far it is [m].
+
+        Rays leave on the side of the normals, along unit vectors ``directions (ray, 3)``. The
+        distance is infinite where nothing is met.
+        """
+        ...
+
+    def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
+        """Distance to that surface along lines (..., 3), float64 [m]; NaN where they miss it."""
+        ...
+
+    def normal(self, surface: NDArray[np.int64], points: Array, directions: Array) -> Array:
+        """Unit normals at points on surfaces, on the side that rays along them come from."""
+        ...

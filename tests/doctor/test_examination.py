@@ -9,9 +9,8 @@ import pytest
 
 from rtradar import doctor
 from rtradar.errors import InputError
-from rtradar.trace.backends import backend as backends
-from rtradar.trace.backends.llvm import Library
-from rtradar.trace.backends.probe import ProbeResult
+from rtradar.trace import backend as backends
+from rtradar.trace.probe import Library, ProbeResult
 
 LIBRARIES = [
     Library("/lib/libLLVM-15.so.1", "environment"),

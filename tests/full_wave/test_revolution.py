@@ -62,25 +62,6 @@ def test_a_penetrable_sphere_scatters_as_the_series_of_mie_says(permittivity: co
         np.testing.assert_allclose(np.abs(length), expected, rtol=1e-5)
 
 
-@pytest.mark.slow
-def test_a_conductor_scatters_all_that_it_takes_from_the_wave() -> None:
-    pair = BodiesOfRevolution((Spheroid(0.003, 0.004), Spheroid(0.004, 0.004, 0.01)), FREQUENCY_HZ)
-    cosine, weight = np.polynomial.legendre.leggauss(12)
-    azimuth = 2 * np.pi * np.arange(20) / 20
-    up, around = (grid.ravel() for grid in np.meshgrid(cosine, azimuth, indexing="ij"))
-    level = np.sqrt(1 - up**2)
-    rx = 1e7 * np.stack([level * np.cos(around), level * np.sin(around), up], axis=1)
-    tx = 1e7 * np.array([0.8, 0.0, 0.6])
-    scattered = 0.0
-    for received in ("v", "h"):
-        length = pair.solve(np.tile(tx, (len(rx), 1)), rx, "v", received)[0]
-        scattered += float(np.mean(np.abs(length.reshape(12, 20)) ** 2, axis=1) @ weight) / 2
-    # The optical theorem; the forward field of exp(+j omega t), positive where it is opposed.
-    forward = pair.scattering_length(tx, -tx, "v")[0]
-    taken = np.sqrt(4 * np.pi) / WAVE_NUMBER * forward.imag
-    assert scattered == pytest.approx(taken, rel=1e-5)
-
-
 def test_tx_and_rx_may_be_swapped_for_a_pair_of_bodies_nearby() -> None:
     pair = bodies(-0.03, 0.03, turn=Rotation.from_euler("xyz", [20, 50, 10], degrees=True))
     tx, rx = [0.4, 0.1, 0.2], [-0.1, 0.5, -0.3]

@@ -55,20 +55,6 @@ def test_a_sphere_scatters_as_mie_has_it(ka: float, tolerance_db: float, polariz
 
 
 @solves
-def test_the_error_falls_with_the_square_of_the_edges() -> None:
-    frequency = frequency_of(2.5)
-    errors = [
-        abs(
-            ConductingSurface(closed(ball(level)), frequency).scattering_length(FAR, FAR, "v")[0]
-            / rt.rcs.sphere(RADIUS_M, frequency)
-            - 1
-        )
-        for level in (2, 3)
-    ]
-    assert 3 < errors[0] / errors[1] < 5
-
-
-@solves
 def test_mirror_planes_change_nothing_but_the_cost() -> None:
     """A turn about z leaves one of the three mirror planes of the mesh."""
     turned = ball(1)
@@ -86,16 +72,6 @@ def test_mirror_planes_change_nothing_but_the_cost() -> None:
     assert closed(turned).mirror_axes == (2,)
     # Triangles that touch begin at other corners, and their integrals are good to 1e-4.
     assert fields[0] == pytest.approx(fields[1], rel=1e-4)
-
-
-@solves
-def test_tx_and_rx_may_be_exchanged() -> None:
-    block = trimesh.creation.box((0.1, 0.07, 0.05)).subdivide().subdivide()
-    surface = ConductingSurface(closed(block), 1e9)
-    tx, rx = np.array([[1.0, 0.3, 0.2]]), np.array([[0.4, -0.8, 0.5]])
-    there = surface.scattering_length(tx, rx, "v")
-    # Equations of the magnetic field, tested so, keep reciprocity only up to the mesh.
-    assert there == pytest.approx(surface.scattering_length(rx, tx, "v"), rel=0.01)
 
 
 @solves

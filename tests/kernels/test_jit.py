@@ -6,8 +6,6 @@ import errno
 import math
 import os
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -175,21 +173,6 @@ def test_damaged_files_are_made_anew(cache: Path, damage: Callable[[bytes], byte
     assert (from_disk(again), from_disk(third)) == (False, True)
 
 
-@pytest.mark.slow
-def test_processes_at_once(tmp_path: Path) -> None:
-    words = "from rtradar.kernels.jit import try_cache; print(try_cache()[0])"
-    command = [sys.executable, "-c", words]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    at_once = [
-        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
-        for _ in range(3)
-    ]
-    said = {process.communicate()[0] for process in at_once}
-    assert len(said) == 1
-    assert said.pop().startswith(f"kept, in {tmp_path}")
-    assert len(files(tmp_path)) == 1
-
-
 def test_nothing_is_kept_by_numba_itself() -> None:
     """It would not see what other files bring in, and fails where no folder can be written."""
     modules = list(Path(rtradar.__file__).parent.rglob("*.py"))
@@ -218,29 +201,26 @@ def test_code_of_other_versions_goes_when_it_is_old(cache: Path) -> None:
     }
 
 
-def test_trouble_with_the_disk_is_told_once(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+# The disk is full, and another version of Numba keeps code otherwise.
+@pytest.mark.parametrize(
+    ("part", "error", "says"),
+    [
+        ("rtradar.system.files.os.replace", OSError(errno.ENOSPC, "No space left"), "No space"),
+        ("rtradar.kernels.jit.CompileResultCacheImpl", TypeError("missing"), "missing"),
+        ("rtradar.kernels.jit.dumps", TypeError("missing"), "missing"),
+    ],
+)
+def test_trouble_with_keeping_code_is_told_once(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, part: str, error: Exception, says: str
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise error
 
-    monkeypatch.setattr("rtradar.system.files.os.replace", full)
-    with pytest.warns(
-        CacheWarning,
-        match=r"compiled code is not kept \(.*No space left on device.* NUMBA_CACHE_DIR",
-    ) as warned:
+    monkeypatch.setattr(part, fails)
+    message = rf"compiled code is not kept \(.*{says}.* NUMBA_CACHE_DIR"
+    with pytest.warns(CacheWarning, match=message) as warned:
         assert [of_package()(2.0), of_package()(2)] == [4.0, 4]
     assert len(warned) == 1
-
-
-@pytest.mark.parametrize("part", ["CompileResultCacheImpl", "dumps"])
-def test_another_numba_may_keep_code_otherwise(
-    cache: Path, monkeypatch: pytest.MonkeyPatch, part: str
-) -> None:
-    def changed(*_: object, **__: object) -> None:
-        raise TypeError("an argument is missing")
-
-    monkeypatch.setattr(compiling, part, changed)
-    with pytest.warns(CacheWarning, match="an argument is missing"):
-        assert of_package()(2.0) == 4.0
 
 
 def test_the_cache_is_tried(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,44 +38,29 @@ def test_it_serves_numbers_of_cycles_with_two_small_coprime_factors_and_no_other
     n_range=st.sampled_from([1, 5, 64, 65, 130, 257, 600]),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    spectra = (
-        rng.standard_normal((n_cycles, channels, n_range, 2))
-        .astype(np.float32)
-        .view(np.complex64)[..., 0]
-    )
+def test_it_is_the_power_of_the_dft_and_picks_its_cells(
+    n_cycles: int, channels: int, n_range: int, seed: int
+) -> None:
+    rng, dft = np.random.default_rng(seed), prime_factor_dft(n_cycles)
+    assert dft is not None
+    parts = rng.standard_normal((n_cycles, channels + 1, n_range, 2)).astype(np.float32)
+    spectra, own = parts.view(np.complex64)[..., 0], range(1, channels + 1)
     weights = rng.uniform(0, 1, n_cycles).astype(np.float32)
     before = rng.uniform(0, 1, (n_cycles, n_range)).astype(np.float32)
-    power, dft = before.copy(), prime_factor_dft(n_cycles)
-    assert dft is not None
-    add_doppler_power(spectra, range(channels), weights, dft, power)
-    expected = doppler_power_reference(spectra, range(channels), weights)
+    power = before.copy()
+    add_doppler_power(spectra, own, weights, dft, power)
+    expected = doppler_power_reference(spectra, own, weights)
     # Rounding of float32 sums of some hundred terms, beside the largest.
     np.testing.assert_allclose(power - before, expected, rtol=0, atol=3e-6 * expected.max())
-
-
-@given(
-    n_cycles=st.sampled_from([n for n, pairs in PRODUCTS if pairs]),
-    n_range=st.sampled_from([1, 5, 130, 257, 600]),
-    seed=st.integers(0, 2**32 - 1),
-)
-def test_it_picks_cells_of_the_dft(n_cycles: int, n_range: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    parts = rng.standard_normal((n_cycles, 3, n_range, 2)).astype(np.float32)
-    spectra, weights = parts.view(np.complex64)[..., 0], rng.uniform(0, 1, n_cycles)
-    dft = prime_factor_dft(n_cycles)
-    assert dft is not None
     turns, listed = rng.integers(n_cycles, size=7), rng.permutation(n_range)[:300]
     at = rng.integers(len(listed), size=(7, 2))
-    values = np.full((7, 2, 3), np.nan, np.complex64)
-    pick_cells(spectra, range(1, 3), weights.astype(np.float32), dft, (turns, at, listed), values)
+    values = np.full((7, 2, channels + 1), np.nan, np.complex64)
+    pick_cells(spectra, own, weights, dft, (turns, at, listed), values)
     # The other channels are left as they are.
     assert np.isnan(values[..., 0]).all()
     whole = np.fft.fft(spectra * weights[:, None, None], axis=0)
-    expected = whole[turns[:, None], 1:, listed[at]]
-    # Rounding of float32 sums of some hundred terms, beside the largest of the whole.
-    np.testing.assert_allclose(values[..., 1:], expected, rtol=0, atol=3e-6 * np.abs(whole).max())
+    chosen = whole[turns[:, None], 1:, listed[at]]
+    np.testing.assert_allclose(values[..., 1:], chosen, rtol=0, atol=3e-6 * np.abs(whole).max())
 
 
 @pytest.mark.parametrize("factor", range(2, 41))

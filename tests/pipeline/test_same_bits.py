@@ -16,7 +16,7 @@ import pytest
 
 import rtradar
 from rtradar.system.threads import thread_environment
-from rtradar.trace.backends.backend import available
+from rtradar.trace.backend import available
 
 RADAR = """
 tx_y = 2

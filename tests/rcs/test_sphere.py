@@ -34,15 +34,6 @@ def test_a_small_sphere_scatters_as_rayleigh_has_it() -> None:
     )
 
 
-@pytest.mark.parametrize("method", ["go", "po"])
-def test_optics_tend_to_mie(method: str) -> None:
-    for ka, error in ((30.0, 0.05), (300.0, 0.005)):
-        # 1/(2ka) with a margin for the creeping wave.
-        assert (
-            abs(sphere(0.1, frequency_of(ka), method) / sphere(0.1, frequency_of(ka)) - 1) < error
-        )  # type: ignore[call-overload]
-
-
 @given(st.floats(0.5, 200.0))
 def test_physical_optics_is_its_integral(ka: float) -> None:
     # Over slices of equal depth z the lit half gives j k / sqrt(pi) * 2 pi a * Int_0^a (z/a)

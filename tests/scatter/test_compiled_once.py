@@ -12,7 +12,7 @@ from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 # Frames a quarter as long as those of the preset, each of which still spans a keyframe.
 RADAR = dataclasses.replace(

@@ -21,7 +21,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart, solve_doubles
 from rtradar.settings import RunSettings
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 V = Polarization("v")

@@ -14,7 +14,7 @@ from rtradar.scatter.specular_points import (
     SpecularVisibility,
     unobstructed,
 )
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

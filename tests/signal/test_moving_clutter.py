@@ -17,8 +17,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.people_and_objects import build_model_of_all
 from rtradar.scene import Furniture, Object, Scene, Wall, material
-from rtradar.signal.moving_clutter import MovingRoomIf, keyframe_times
-from rtradar.signal.static_clutter import RoomIf
+from rtradar.signal.clutter import MovingRoomIf, RoomIf, keyframe_times
 
 RADAR = Radar(
     name="moving",

@@ -42,18 +42,6 @@ def test_power(plenty: NDArray[np.complex64]) -> None:
         )
 
 
-def test_circular_and_gaussian(plenty: NDArray[np.complex64]) -> None:
-    spread = 5 / math.sqrt(plenty.size)
-    assert abs(plenty.mean()) < spread
-    assert abs(np.mean(plenty.astype(complex) ** 2)) < spread * math.sqrt(
-        2
-    )  # real and imaginary alike and unrelated
-    # Fourth moment of a complex Gaussian: 2, where |n|^4 has variance 24 - 4.
-    assert np.mean(np.abs(plenty.astype(complex)) ** 4) == pytest.approx(
-        2, abs=spread * math.sqrt(20)
-    )
-
-
 def test_both_parts_are_normal_and_the_phase_is_even(plenty: NDArray[np.complex64]) -> None:
     deviation = math.sqrt(0.5)
     for values in (plenty.real, plenty.imag):
@@ -116,14 +104,6 @@ def test_any_number_of_threads_makes_the_same(
     with ThreadPoolExecutor(threads) as pool:
         monkeypatch.setattr(rtradar.system.threads, "_pool", lambda: pool)
         np.testing.assert_array_equal(noise(1.0, SMALL, 300), usual)
-
-
-def test_it_is_the_transform_of_its_bits() -> None:
-    cycle = noise(1.0, SMALL, SMALL.n_tx, seed=3)
-    bits = np.random.SFC64([3, 0]).random_raw(cycle.size).reshape(cycle.shape)
-    u, turns = ((bits >> 33) + 0.5) / 2**31, bits.astype(np.uint32).view(np.int32) / 2.0**32
-    # float32 logarithm, sine and cosine: 1e-7 each, of radii up to 5.
-    np.testing.assert_allclose(cycle, np.sqrt(-np.log(u)) * np.exp(2j * np.pi * turns), atol=2e-6)
 
 
 def test_power_scales_the_same_noise() -> None:

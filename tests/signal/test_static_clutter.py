@@ -15,8 +15,9 @@ from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
-from rtradar.signal import static_clutter, synthesize
-from rtradar.signal.static_clutter import RoomIf
+from rtradar.signal import clutter as room_if
+from rtradar.signal import synthesize
+from rtradar.signal.clutter import RoomIf
 
 RADAR = Radar(tx_y=2, tx_z=2, rx_y=2, rx_z=2, samples_per_chirp=192)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
@@ -144,14 +145,14 @@ def test_what_was_begun_is_not_computed_again(
 def test_samples_at_rest_are_made_once_for_the_same_echoes_before_the_same_radar(
     clutter: Clutter, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made, real = list[int](), static_clutter.synthesize
+    made, real = list[int](), room_if.synthesize
 
     def counted(*given: Any, **options: Any) -> Any:
         made.append(1)
         return real(*given, **options)
 
-    static_clutter._at_rest.cache_clear()
-    monkeypatch.setattr(static_clutter, "synthesize", counted)
+    room_if._at_rest.cache_clear()
+    monkeypatch.setattr(room_if, "synthesize", counted)
     first, again = (RoomIf(RADAR, clutter.cycle()) for _ in range(2))
     once = len(made)
     assert once == len(first.cycle)

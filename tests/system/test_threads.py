@@ -30,7 +30,7 @@ from rtradar.system.threads import (
 
 COUNT = """
 import numba, rtradar.system.threads
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 use(select("llvm"))
 import drjit
 print(rtradar.system.threads._pool()._max_workers, numba.get_num_threads(), drjit.thread_count())

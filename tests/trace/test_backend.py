@@ -12,11 +12,10 @@ from pathlib import Path
 import pytest
 
 from rtradar.errors import BackendError, InputError
-from rtradar.trace.backends import backend as backends
-from rtradar.trace.backends import llvm, probe
-from rtradar.trace.backends.backend import Backend, BackendWarning, select, use
-from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
-from rtradar.trace.backends.probe import ProbeResult
+from rtradar.trace import backend as backends
+from rtradar.trace import probe
+from rtradar.trace.backend import Backend, BackendWarning, select, use
+from rtradar.trace.probe import ENVIRONMENT_VARIABLE, Library, ProbeResult
 
 BAD = Library("/lib/libLLVM-15.so.1", "environment")
 WHEEL = Library("/venv/lib/libLLVM.so.23.1", "wheel")
@@ -128,24 +127,17 @@ def test_use_refuses_llvm_when_another_library_was_loaded_since(
 def test_environment_then_wheel_then_system_newest_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    files = {}
-    for name in (
-        "libLLVM-9.so.1",
-        "libLLVM-19.so.1",
-        "libLLVM.so.18.1",
-        "libLLVM.so.23.1",
-        "libLLVMSPIRVLib.so.14",
-        "libLLVM-15.so.1",
-    ):
-        files[name] = tmp_path / name
-        files[name].touch()
+    names = "-9.so.1", "-19.so.1", ".so.18.1", ".so.23.1", "SPIRVLib.so.14", "-15.so.1"
+    files = {f"libLLVM{name}": tmp_path / f"libLLVM{name}" for name in names}
+    for file in files.values():
+        file.touch()
     (tmp_path / "libLLVM-19.0.so").symlink_to(files["libLLVM-19.so.1"])
-    monkeypatch.setattr(llvm, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
-    monkeypatch.setattr(llvm, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
+    monkeypatch.setattr(probe, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
+    monkeypatch.setattr(probe, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
     monkeypatch.setattr(sys, "prefix", str(tmp_path / "none"))
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path / "none"))
     monkeypatch.setenv(ENVIRONMENT_VARIABLE, str(files["libLLVM-15.so.1"]))
-    found = [(Path(library.path).name, library.origin) for library in llvm.candidates()]
+    found = [(Path(library.path).name, library.origin) for library in probe.candidates()]
     assert found == [
         ("libLLVM-15.so.1", "environment"),
         ("libLLVM.so.23.1", "wheel"),
@@ -175,56 +167,44 @@ def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> l
     return probes
 
 
-def test_a_result_is_kept_until_the_library_changes(
+def test_a_result_is_kept_until_the_library_or_the_question_changes(
     empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     probes = _counted(monkeypatch, "aborts the process")
-    file = tmp_path / "libLLVM-15.so.1"
+    file, script = tmp_path / "libLLVM-15.so.1", tmp_path / "probe.py"
     file.touch()
-    library = Library(str(file), "system")
-    assert (
-        probe.probe_backend("llvm_ad_rgb", library)
-        == probe.probe_backend("llvm_ad_rgb", library)
-        == ProbeResult("aborts the process")
-    )
-    assert len(probes) == 1
-    probe.probe_backend("llvm_ad_rgb", library, fresh=True)
-    assert len(probes) == 2
+
+    def asked(*, fresh: bool = False) -> int:
+        found = probe.probe_backend("llvm_ad_rgb", Library(str(file), "system"), fresh=fresh)
+        assert found == ProbeResult("aborts the process")
+        return len(probes)
+
+    assert (asked(), asked(), asked(fresh=True), asked()) == (1, 1, 2, 2)
     os.utime(file, (1, 1))
-    probe.probe_backend("llvm_ad_rgb", library)
-    assert len(probes) == 3
+    assert (asked(), asked()) == (3, 3)
+    script.write_text("another question")
+    monkeypatch.setattr(probe, "_PROBE", script)
+    assert (asked(), asked()) == (4, 4)
     assert [path.name for path in empty_cache.iterdir()] == ["probes.json"]
 
 
-def test_a_result_is_not_kept_when_another_question_is_asked(
-    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    probes = _counted(monkeypatch, "gives wrong results")
-    for text in ("one", "another", "another"):
-        (tmp_path / "probe.py").write_text(text)
-        monkeypatch.setattr(probe, "_PROBE", tmp_path / "probe.py")
-        probe.probe_backend("scalar_rgb", None)
-    assert len(probes) == 2
-
-
+# Who told it to end says nothing of the library, and GPUs come and go.
 @pytest.mark.parametrize(
-    ("ended", "probed"), [(-signal.SIGABRT, 1), (-signal.SIGKILL, 2), (-signal.SIGTERM, 2)]
+    ("variant", "ended", "probed"),
+    [
+        ("scalar_rgb", -signal.SIGABRT, 1),
+        ("scalar_rgb", -signal.SIGKILL, 2),
+        ("scalar_rgb", -signal.SIGTERM, 2),
+        ("cuda_ad_rgb", 0, 2),
+    ],
 )
-def test_a_probe_that_was_told_to_end_says_nothing_of_the_library(
-    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, ended: int, probed: int
+def test_not_every_result_is_kept(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, variant: str, ended: int, probed: int
 ) -> None:
     probes = _counted(monkeypatch, "aborts the process", ended)
     for _ in range(2):
-        probe.probe_backend("scalar_rgb", None)
+        probe.probe_backend(variant, None)
     assert len(probes) == probed
-
-
-def test_results_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    probes = _counted(monkeypatch, "good")
-    probe.probe_backend("cuda_ad_rgb", None)
-    probe.probe_backend("cuda_ad_rgb", None)
-    assert len(probes) == 2
-    assert not empty_cache.exists()
 
 
 @pytest.mark.parametrize("content", ["{", "[1]"])
@@ -268,7 +248,7 @@ def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: 
 @pytest.mark.slow
 def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
     """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
-    libraries = [library for library in llvm.candidates() if library.version]
+    libraries = [library for library in probe.candidates() if library.version]
     if not libraries:
         pytest.skip("this machine has no libLLVM of a known version")
     for library in libraries:
@@ -281,14 +261,14 @@ def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
 def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
     bad = [
         library.path
-        for library in llvm.candidates()
+        for library in probe.candidates()
         if not probe.probe_backend("llvm_ad_rgb", library).good
     ]
     if not bad:
         pytest.skip("this machine has no libLLVM that is bad")
     script = """
 import warnings
-from rtradar.trace.backends.backend import loaded_llvm_version, select, use
+from rtradar.trace.backend import loaded_llvm_version, select, use
 warnings.simplefilter("ignore")
 backend = select("cpu")
 mi = use(backend)

@@ -14,7 +14,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, thread_map
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import UnitSphere
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
@@ -81,9 +81,9 @@ def in_a_new_process(program: str, threads: int) -> list[str]:
 def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
     program = f"""
 import numpy as np
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.backends.jit_threads import MANY_RAYS
+from rtradar.trace.backend import MANY_RAYS
 mi = use(select("{backend.kind}"))
 import drjit as dr
 surfaces = MeshTracer(mi, np.array([[[1.0, -9.0, -9.0], [1.0, 9.0, -9.0], [1.0, 0.0, 9.0]]]))
@@ -98,8 +98,8 @@ for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS
 
 def test_threads_of_who_came_first_are_left_alone(backend: Backend) -> None:
     program = f"""
-from rtradar.trace.backends.backend import select, use
-from rtradar.trace.backends.jit_threads import MANY_RAYS, grow_for
+from rtradar.trace.backend import select, use
+from rtradar.trace.backend import MANY_RAYS, grow_for
 backend = select("{backend.kind}")
 import os
 os.environ["DRJIT_LIBLLVM_PATH"] = backend.llvm_path or ""
@@ -110,27 +110,6 @@ grow_for(mi, MANY_RAYS)
 print(drjit.thread_count())
 """
     assert in_a_new_process(program, threads=2) == ["4"]
-
-
-def test_no_model_takes_threads_of_dr_jit_away(
-    backend: Backend, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # It can wait for ever for one that falls asleep in the same moment.
-    use(backend)
-    import drjit as dr
-
-    dr.set_thread_count(max(2, dr.thread_count()))  # something to take away
-    given: list[int] = []
-    monkeypatch.setattr(dr, "set_thread_count", given.append)
-    body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
-    for fidelity, options in (
-        ("specular", {}),
-        ("specular", {"visibility": "gradual"}),
-        ("physical-optics", {}),
-        ("rays", {}),
-    ):
-        build_model(fidelity, SMALL, body, variant=backend.kind, **options).echoes(np.arange(2))
-    assert all(count >= dr.thread_count() for count in given)
 
 
 @pytest.mark.usefixtures("four_threads")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.body import Bodies, Body, HumanMesh
 from rtradar.scene import Furniture, Object, Scene, Turning, material
-from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.mesh_tracer import CLEAR_M
 from rtradar.trace.occluders import Occluders
 

@@ -26,7 +26,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.signal import separate
-from rtradar.signal.moving_clutter import MovingRoomIf
+from rtradar.signal.clutter import MovingRoomIf
 from rtradar.system.registries import BOARDS
 from rtradar.validate.rows import Row, judged, main
 

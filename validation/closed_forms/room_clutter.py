@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Surface, Wall, material, room_walls
-from rtradar.signal.static_clutter import RoomIf
+from rtradar.signal.clutter import RoomIf
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]

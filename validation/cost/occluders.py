@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.body import unit_sphere
 from rtradar.body.body import Poses
-from rtradar.trace.backends.backend import available, select, use
+from rtradar.trace.backend import available, select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.rays import rays_of
 from rtradar.validate.rows import Row, judged, main, reported

@@ -17,7 +17,7 @@ from typing import Any
 from unittest import mock
 
 import rtradar as rt
-from rtradar.signal import static_clutter
+from rtradar.signal import clutter
 from rtradar.system import threads
 from rtradar.validate.rows import Row, main, reported
 
@@ -30,7 +30,7 @@ def _without() -> dict[str, AbstractContextManager[Any]]:
             threads, "_libraries", mock.MagicMock()
         ),
         "echoes and shadow one after another": mock.patch.object(
-            static_clutter, "begun", lambda work: work
+            clutter, "begun", lambda work: work
         ),
     }
 

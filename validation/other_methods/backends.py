@@ -29,7 +29,7 @@ import rtradar as rt
 from rtradar.body.body import ellipsoid_meshes, unit_sphere
 from rtradar.kernels.jit import compiled
 from rtradar.system.threads import in_threads
-from rtradar.trace.backends.backend import available, select, use
+from rtradar.trace.backend import available, select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.validate.rows import Row, judged, main, reported

@@ -50,7 +50,7 @@ from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart
 from rtradar.scatter.models.rays import Rays
 from rtradar.settings import RunSettings
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main

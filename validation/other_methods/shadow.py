@@ -34,7 +34,7 @@ from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.echo_models import build_model
 from rtradar.scene import Scene, Surface, Wall, material
-from rtradar.signal.static_clutter import RoomIf
+from rtradar.signal.clutter import RoomIf
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rtradar.scatter.multipath.image_paths import corners, wall_paths
 from rtradar.scene import Surface, material, room_walls
-from rtradar.trace.backends.backend import select
+from rtradar.trace.backend import select
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 

@@ -9,30 +9,12 @@ over the facet. So a shadow moves over the body without jumps.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rtradar.kernels.elementary import dot, minus, plus, turned
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.triangles import positive_fraction
-
-
-class _Room(NamedTuple):
-    """Arrays that serve one part and antenna after the other.
-
-    ``balls (part, 5, 3)``: from the part's axes to those in which another one is the unit ball, and
-    the antenna in these. ``clear, of (vertex,)``: how far the ray to a vertex passes outside of
-    which occluder. ``hidden (vertex,)`` and ``counts (facet,)``: occluded vertices, and how many a
-    facet has.
-    """
-
-    balls: NDArray[np.float64]
-    clear: NDArray[np.float64]
-    of: NDArray[np.int64]
-    hidden: NDArray[np.int32]
-    counts: NDArray[np.int32]
 
 
 @inlined()
@@ -61,53 +43,26 @@ def _clearance(ball, vertex):
 
 
 @inlined()
-def _cut(occluder, antenna, part, pose, vertices, corner, room):
-    """Fraction of a facet, with these corners, that occluders of some of them leave."""
+def _cut(occluders, corner, antenna, part, pose, vertices, balls):
+    """Fraction of a facet, with these corners, that occluders of some of them leave.
+
+    ``balls (part, 5, 3)`` are from the part's axes to those in which another one is the unit ball,
+    and the antenna in these; NaN where they are not known yet.
+    """
     centres, frames, semi_axes = pose
-    c0, c1, c2 = corner
-    h0, h1, h2 = occluder[c0], occluder[c1], occluder[c2]
+    first, second, _ = occluders
     v0, v1, v2 = math.inf, math.inf, math.inf
     for n in range(3):
-        other = h0 if n == 0 else h1 if n == 1 else h2
-        if other < 0 or (n > 0 and other == h0) or (n > 1 and other == h1):
+        other = occluders[n]
+        if other < 0 or (n > 0 and other == first) or (n > 1 and other == second):
             continue
-        ball = room.balls[other]
+        ball = balls[other]
         if math.isnan(ball[3, 0]):
             into_ball(part, other, antenna, centres, frames, semi_axes, ball[:3], ball[3], ball[4])
-        # Facets that meet at a vertex ask for the same way one after the other.
-        for k in range(3):
-            vertex = c0 if k == 0 else c1 if k == 1 else c2
-            if room.of[vertex] != other:
-                room.clear[vertex], room.of[vertex] = _clearance(ball, vertices[vertex]), other
-        clear = room.clear
-        v0, v1, v2 = min(v0, clear[c0]), min(v1, clear[c1]), min(v2, clear[c2])
+        v0 = min(v0, _clearance(ball, vertices[corner[0]]))
+        v1 = min(v1, _clearance(ball, vertices[corner[1]]))
+        v2 = min(v2, _clearance(ball, vertices[corner[2]]))
     return positive_fraction(v0, v1, v2)
-
-
-@inlined()
-def _shade_part(occluder, antenna, part, pose, vertices, corners, room, out):
-    """Fractions of the facets of one part for one antenna; whether any of it is occluded."""
-    _, _, of, hidden, counts = room
-    any_hidden = 0
-    for vertex in range(len(occluder)):
-        hidden[vertex] = occluder[vertex] >= 0
-        any_hidden |= hidden[vertex]
-    if not any_hidden:
-        return False
-    for vertex in range(len(of)):
-        of[vertex] = -1
-    for other in range(len(room.balls)):
-        room.balls[other, 3, 0] = math.nan  # not known yet
-    first, second, third = corners[0], corners[1], corners[2]
-    for f in range(len(first)):
-        counts[f] = hidden[first[f]] + hidden[second[f]] + hidden[third[f]]
-    for f in range(len(first)):
-        out[f] = 1.0 if counts[f] == 0 else 0.0
-    for f in range(len(first)):
-        if counts[f] == 1 or counts[f] == 2:
-            corner = (first[f], second[f], third[f])
-            out[f] = _cut(occluder, antenna, part, pose, vertices, corner, room)
-    return True
 
 
 @compiled()
@@ -121,20 +76,22 @@ def shade(hidden_by, antennas, parts, pose, vertices, corners, row, out):
     n)``, which of them is whose.
     """
     out[0] = 1.0
-    count, n_vertices, n_facets = 1, vertices.shape[1], corners.shape[1]
-    room = _Room(
-        np.empty((len(pose[0]), 5, 3)),
-        np.empty(n_vertices),
-        np.empty(n_vertices, dtype=np.int64),
-        np.empty(n_vertices, dtype=np.int32),
-        np.empty(n_facets, dtype=np.int32),
-    )
+    count, (first, second, third) = 1, corners
+    balls = np.empty((len(pose[0]), 5, 3))
     for a in range(len(antennas)):
         for n in range(len(parts)):
-            part = parts[n]
-            row[a, n] = 0
-            given = (hidden_by[a, n], antennas[a], part, pose, vertices[part], corners, room)
-            if _shade_part(*given, out[count]):
-                row[a, n] = count
-                count += 1
+            row[a, n], occluder, part = 0, hidden_by[a, n], parts[n]
+            if not (occluder >= 0).any():
+                continue
+            balls[:] = math.nan
+            own = out[count]
+            for f in range(len(own)):
+                corner = first[f], second[f], third[f]
+                by = occluder[corner[0]], occluder[corner[1]], occluder[corner[2]]
+                hidden = (by[0] >= 0) + (by[1] >= 0) + (by[2] >= 0)
+                own[f] = 1.0 if hidden == 0 else 0.0
+                if hidden == 1 or hidden == 2:
+                    own[f] = _cut(by, corner, antennas[a], part, pose, vertices[part], balls)
+            row[a, n] = count
+            count += 1
     return count

@@ -168,8 +168,8 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
     _, receivers, echoes = length.shape
     searched = 0
     for chirp in range(start, stop):
-        room, one, guess, source = np.empty((6, receivers)), np.empty(5), np.empty(3), np.empty(3)
-        local_r, up = np.empty((3, receivers)), np.zeros(3)
+        room, one, guess = np.empty((6, receivers)), np.empty(5), np.empty(3)
+        local = np.empty((3, receivers))
         transmitter, which, line = tx_index[chirp], intervals[chirp], lines[chirp]
         fraction, ends = fractions[chirp], tx_weights[chirp]
         for echo in range(echoes):
@@ -201,13 +201,12 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
             if not good:
                 # Search for each receiver, from cold.
                 searched += 1
-                for k in range(3):
-                    source[k], guess[k] = tx[k], math.nan
+                guess[:] = math.nan
                 for i in range(receivers):
                     antenna = turned_back(frame, minus(rx[:, i], centre))
-                    local_r[0, i], local_r[1, i], local_r[2, i] = antenna
-                options = Options(False, True)
-                search_all(source, local_r, axes, up, options, guess, one, room)
+                    local[0, i], local[1, i], local[2, i] = antenna
+                options, up = Options(False, True), (0.0, 0.0, 0.0)
+                search_all(tx, local, axes, up, options, guess, one, room)
             for i in range(receivers):
                 length[chirp, i, echo], amplitude[chirp, i, echo] = room[0, i], room[1, i]
     return searched

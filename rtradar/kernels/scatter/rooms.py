@@ -1,4 +1,4 @@
-"""Kernels of rooms: amplitudes and lengths of echoes over walls; edges of solids beside legs."""
+"""Kernels of rooms: fields, amplitudes and lengths of echoes over walls; edges beside legs."""
 
 from __future__ import annotations
 
@@ -94,6 +94,33 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
                         for echo in range(echoes):
                             kept = weight * fade[echo]
                             target[echo] += complex(kept * re[echo], -kept * im[echo])
+
+
+@compiled()
+def received_from_conductors(start, stop, sent, received, to_tx, to_rx, out):
+    """Fill ``out (node, keyframe, line, tx_end, rx_end, echo)`` with what conductors send back.
+
+    Keyframes ``start`` to ``stop`` are filled. The field ``sent (node, keyframe, line, tx_end,
+    echo, 3)`` arrives, ``received (node, keyframe, line, rx_end, echo, 3)`` is what the receiver
+    would send; ``to_tx (keyframe, line, tx_end, echo, 3)`` and ``to_rx (keyframe, line, rx_end,
+    echo, 3)`` are unit vectors towards where they come from. A conductor across the bisector n of
+    both returns 2 (n.E) n - E; where they are opposite, n is 0.
+    """
+    nodes, _, lines, tx_ends, rx_ends, echoes = out.shape
+    for keyframe in range(start, stop):
+        for line in range(lines):
+            for one in range(tx_ends):
+                for other in range(rx_ends):
+                    for echo in range(echoes):
+                        a, b = to_tx[keyframe, line, one, echo], to_rx[keyframe, line, other, echo]
+                        normal = plus(a, b)
+                        square = dot(normal, normal)
+                        scale = 2 / square if square > 1e-24 else 0.0
+                        for node in range(nodes):
+                            e = sent[node, keyframe, line, one, echo]
+                            f = received[node, keyframe, line, other, echo]
+                            value = scale * dot(e, normal) * dot(f, normal) - dot(e, f)
+                            out[node, keyframe, line, one, other, echo] = value
 
 
 class LegAntennas(NamedTuple):

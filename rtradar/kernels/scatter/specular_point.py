@@ -13,6 +13,8 @@ is the one whose determinant gives the return by stationary phase:
 The matrix holds the curvature of both wavefronts, so that the near field is exact to this order of
 optics. Source: Born and Wolf, *Principles of Optics*, appendix III (stationary phase of double
 integrals). Everything is float64.
+
+In the far field the specular point is that of the bisector of both ways (`far_field`).
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.elementary import cross, dot, minus, scaled, turned
+from rtradar.kernels.elementary import cross, dot, minus, scaled, turned, turned_back
 from rtradar.kernels.jit import compiled, inlined
 
 Array = NDArray[np.float64]
@@ -306,23 +308,19 @@ def solve(begin, end, at, above, start, options, length, amplitude, point):
     tx, rx, centres, frames, semi_axes = at
     receivers, parts = rx.shape[1], centres.shape[1]
     one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
-    local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
+    local = np.empty((3, receivers))
     for chirp in range(begin, end):
         for part in range(parts):
             # Antennas, and their up, in the axes of the part.
             frame, centre = frames[chirp, part], centres[chirp, part]
+            source = turned_back(frame, minus(tx[chirp], centre))
+            up = turned_back(frame, above[chirp])
+            for receiver in range(receivers):
+                antenna = turned_back(frame, minus(rx[chirp, receiver], centre))
+                local[0, receiver], local[1, receiver], local[2, receiver] = antenna
             for i in range(3):
-                local_t[i] = 0.0
-                local_r[i] = 0.0
-                up[i] = 0.0
-                for j in range(3):
-                    local_t[i] += frame[j, i] * (tx[chirp, j] - centre[j])
-                    up[i] += frame[j, i] * above[chirp, j]
-                    for receiver in range(receivers):
-                        away = rx[chirp, receiver, j] - centre[j]
-                        local_r[i, receiver] += frame[j, i] * away
                 guess[i] = start[chirp, part, i]
-            search_all(local_t, local_r, semi_axes[part], up, options, guess, one, out)
+            search_all(source, local, semi_axes[part], up, options, guess, one, out)
             for receiver in range(receivers):
                 length[chirp, receiver, part] = out[0, receiver]
                 amplitude[chirp, receiver, part] = out[1, receiver]
@@ -330,3 +328,67 @@ def solve(begin, end, at, above, start, options, length, amplitude, point):
                     place = turned(frame, (out[2, receiver], out[3, receiver], out[4, receiver]))
                     for j in range(3):
                         point[chirp, receiver, part, j] = centre[j] + place[j]
+
+
+_NO_BISECTOR = 1e-24
+"""Square of the sum of two opposite unit vectors, as rounding leaves it."""
+
+
+@compiled(fastmath={"contract"})
+def far_field(start, stop, at, spreading, length, amplitude):
+    """Fill length and amplitude (chirp, rx, part) [m] for a `specular_point.Geometry`.
+
+    Chirps ``start`` to ``stop`` are filled.
+    """
+    tx, rx, centres, frames, semi_axes = at
+    _, receivers, parts = length.shape
+    for chirp in range(start, stop):
+        # Receivers side by side: to each of them in the axes of the part, then length and
+        # amplitude. In one array of a known size: of many the compiler would have to fear that they
+        # overlap.
+        lanes = np.empty((5, _LANES))
+        for part in range(parts):
+            # The transmitter in the axes of the part.
+            centre, frame = centres[chirp, part], frames[chirp, part]
+            a, b, c = semi_axes[part, 0], semi_axes[part, 1], semi_axes[part, 2]
+            t0, t1, t2 = turned_back(frame, minus(tx[chirp], centre))
+            norm_tx = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+            u0, u1, u2 = t0 / norm_tx, t1 / norm_tx, t2 / norm_tx
+            root_volume = math.sqrt(math.pi) * a * b * c
+            for first in range(0, receivers, _LANES):
+                # The receivers in the axes of the part.
+                count = min(_LANES, receivers - first)
+                for k in range(_LANES):
+                    receiver = first + min(k, count - 1)
+                    away = turned_back(frame, minus(rx[chirp, receiver], centre))
+                    for i in range(3):
+                        lanes[i, k] = away[i]
+                for k in range(_LANES):
+                    # |A n| for the unit normal n is the support function h; the surface point with
+                    # that normal is A^2 n / h.
+                    r0, r1, r2 = lanes[0, k], lanes[1, k], lanes[2, k]
+                    norm = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+                    inverse = 1 / norm
+                    n0, n1, n2 = u0 + r0 * inverse, u1 + r1 * inverse, u2 + r2 * inverse
+                    squared = n0 * n0 + n1 * n1 + n2 * n2
+                    support = a * a * n0 * n0 + b * b * n1 * n1 + c * c * n2 * n2
+                    scale = 1 / math.sqrt(support)
+                    s0, s1, s2 = a * a * n0 * scale, b * b * n1 * scale, c * c * n2 * scale
+                    range_tx = math.sqrt(
+                        (t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2)
+                    )
+                    range_rx = math.sqrt(
+                        (r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2)
+                    )
+                    # Square root of the cross-section, pi (abc)^2 / h^4: that of
+                    # `rtradar.rcs.ellipsoid` without its angles.
+                    root = root_volume * squared * (scale * scale)
+                    if spreading:
+                        root /= range_tx * range_rx
+                    # Straight through there is no bisector, and no reflection.
+                    there = squared >= _NO_BISECTOR
+                    lanes[3, k] = range_tx + range_rx if there else norm_tx + norm
+                    lanes[4, k] = root if there else 0.0
+                for k in range(count):
+                    length[chirp, first + k, part] = lanes[3, k]
+                    amplitude[chirp, first + k, part] = lanes[4, k]

@@ -73,7 +73,7 @@ from rtradar.scatter.multipath.slabs import (
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Scene
 from rtradar.system.seeds import stream
-from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
@@ -261,7 +261,7 @@ def _rough_face(
 MOST_ORDER = 3
 KEPT_ROOMS = 2
 """Rooms that stay in memory once they are traced; a furnished one may take 100 MB, to which
-`rtradar.signal.static_clutter` adds its echoes once more, in groups."""
+`rtradar.signal.clutter` adds its echoes once more, in groups."""
 
 
 @dataclass(frozen=True)

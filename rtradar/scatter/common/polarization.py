@@ -143,8 +143,8 @@ def apply_te_tm(
     # At normal incidence both coefficients do the same: any direction across the ray serves.
     spare = unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)]))
     across = np.where(sine > _NORMAL_INCIDENCE, across / np.where(sine > 0, sine, 1.0), spare)
-    in_te = (field * across).sum(axis=-1) * te
-    in_tm = (field * np.cross(across, arriving)).sum(axis=-1) * tm
+    in_te = np.einsum("...i,...i", field, across) * te
+    in_tm = np.einsum("...i,...i", field, np.cross(across, arriving)) * tm
     return np.asarray(in_te[..., None] * across + in_tm[..., None] * np.cross(across, leaving))
 
 
@@ -208,7 +208,7 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     """
     eta = np.asarray(eta, dtype=np.complex128)
     if np.isinf(eta).all():
-        turned = 2 * np.sum(field * normals, axis=-1, keepdims=True) * normals - field
+        turned = 2 * np.einsum("...i,...i", field, normals)[..., None] * normals - field
         return np.asarray(turned, dtype=np.complex128)
     cosine = np.clip(-np.sum(directions * normals, axis=-1), 0.0, 1.0)
     eta = eta.reshape(-1, *(1,) * cosine.ndim)

@@ -27,7 +27,7 @@ from rtradar.scatter.facets.radiation import (
     visible,
 )
 from rtradar.scatter.specular_points import solve_specular_points
-from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.envelope import fill_envelope
+from rtradar.kernels.scatter.facets import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
-from rtradar.kernels.scatter.far_field import far_field
-from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.kernels.scatter.specular_point import Geometry, far_field
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.common.polarization import unit

@@ -27,7 +27,7 @@ from rtradar.scatter.facets.envelope import ArrayEnvelope
 from rtradar.scatter.facets.skin import facets_of_people
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_points import solve_specular_points
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 if TYPE_CHECKING:

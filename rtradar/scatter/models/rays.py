@@ -32,10 +32,10 @@ from rtradar.scatter.ray_tubes import Shooter, exits, radiate
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scatter.target import EllipsoidGrid, Grid, MeshGrid, target_mesh
 from rtradar.scene.mesh_files import Triangles
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.surfaces import Surfaces
+from rtradar.trace.rays import Surfaces
 
 if TYPE_CHECKING:
     import trimesh

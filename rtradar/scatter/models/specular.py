@@ -29,7 +29,7 @@ from rtradar.scatter.specular_points import (
     with_second_term,
 )
 from rtradar.scatter.target import sum_of_echoes, target_geometry
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Visibility = Literal["sharp", "gradual"]

@@ -22,9 +22,8 @@ from numpy.typing import NDArray
 from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.kernels.scatter.nearby_points import Nearby
-from rtradar.kernels.scatter.rooms import Blend
+from rtradar.kernels.scatter.rooms import Blend, received_from_conductors
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (

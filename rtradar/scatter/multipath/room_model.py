@@ -52,7 +52,7 @@ from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
 from rtradar.system.threads import in_threads
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.occluders import Occluders
 

@@ -25,10 +25,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.scatter.mirrors import SlabPass, slab_fields
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.polarization import POLARIZATIONS, Polarization, sent_field, unit
+from rtradar.scatter.common.polarization import (
+    POLARIZATIONS,
+    Polarization,
+    apply_te_tm,
+    sent_field,
+    unit,
+)
 from rtradar.scatter.multipath.image_paths import Leg
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Material, Wall, slab
@@ -228,22 +233,15 @@ def after_slab(
     the side is left out, its phase is not.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    slab = SlabPass(
-        wall.normal,
-        wall.material.eta(frequency),
-        2 * np.pi * frequency / SPEED_OF_LIGHT_MPS,
-        float(wall.thickness_m),
-        float(wall.roughness_m),
-        float(term.index_squared),
-        term.passes,
-        term.rest and not term.solid,
-    )
-    ways = np.ascontiguousarray(directions, dtype=np.float64)
-    comes = np.broadcast_to(field, (len(frequency), *ways.shape)).astype(np.complex128, order="C")
-    out = np.empty(comes.shape, dtype=np.complex128)
-    each = len(frequency), -1, 3
-    slab_fields(comes.reshape(each), ways.reshape(-1, 3), slab, out.reshape(each))
-    return out
+    ways, reflects = np.asarray(directions, dtype=np.float64), term.passes % 2 == 0
+    along = ways @ wall.normal
+    leaving = ways - 2 * along[..., None] * wall.normal if reflects else ways
+    cosine, each = np.minimum(np.abs(along), 1.0), frequency.reshape(-1, *[1] * along.ndim)
+    te, tm = (term.coefficient(wall, cosine, each, kind) for kind in POLARIZATIONS)
+    if reflects:
+        rough = 2 * np.pi / SPEED_OF_LIGHT_MPS * each * wall.roughness_m * cosine
+        te, tm = (np.exp(-2 * rough**2) * own for own in (te, tm))
+    return apply_te_tm(field, ways, leaving, wall.normal, te, tm)
 
 
 class Passage(NamedTuple):

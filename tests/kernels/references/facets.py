@@ -17,7 +17,7 @@ from rtradar.kernels.scatter.facets_by_length import (
     RigidViews,
     facets_by_length,
 )
-from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes
+from rtradar.kernels.scatter.triangles import Tubes, radiate_tubes
 from rtradar.scatter.facets.radiation import ellipsoid_facets
 
 _WAVENUMBER = 300.0

@@ -6,8 +6,15 @@ import numpy as np
 import scipy.fft
 
 from references.cases import Pair, filled, kernel_case, samples
-from rtradar.kernels.angles import Steering, add_interpolated, beam_power, highest_maxima
-from rtradar.kernels.expected_echoes import EchoesAtInstants, fields_in_bins, follow_echoes
+from rtradar.kernels.cells import (
+    EchoesAtInstants,
+    Steering,
+    add_interpolated,
+    beam_power,
+    fields_in_bins,
+    follow_echoes,
+    highest_maxima,
+)
 
 # -- expected echoes -------------------------------------------------------------------------------
 

@@ -6,8 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from references.cases import Pair, kernel_case
-from rtradar.kernels.scatter.facet_rays import facet_rays, first_occluders
-from rtradar.kernels.scatter.near_rays import NEAR, near_rays
+from rtradar.kernels.scatter.rays import NEAR, facet_rays, first_occluders, near_rays
 
 
 def body_and_lines(poses: int, seed: int = 0) -> tuple[tuple[np.ndarray, ...], ...]:
@@ -21,6 +20,11 @@ def body_and_lines(poses: int, seed: int = 0) -> tuple[tuple[np.ndarray, ...], .
     group = rng.integers(0, len(own), 300)
     lines = origins, rng.uniform(-0.6, 0.6, (300, 3)), group, own, pose
     return (centres, frames, rng.uniform(0.05, 0.3, (6, 3))), lines
+
+
+def unit_maps(frames: np.ndarray, semi_axes: np.ndarray) -> np.ndarray:
+    """Maps (..., part, 3, 3) to the axes where a part is the unit sphere."""
+    return np.ascontiguousarray(np.swapaxes(frames, -1, -2) / semi_axes[:, :, None])
 
 
 def near_lines_reference(origins, targets, own, centres, frames, semi_axes):
@@ -43,7 +47,10 @@ def _near_rays(poses: int, seed: int) -> Pair:
         posed = centres[number], frames[number], axes
         near = near_lines_reference(origins[ours], targets[ours], own[group[ours]], *posed)
         expected[ours] = near.sum(axis=1)
-    found = np.bincount(near_rays(*lines, centres, frames, axes)[1][0], minlength=len(origins))
+    found = np.bincount(
+        near_rays(*lines, centres, unit_maps(frames, axes), axes.max(axis=1))[1][0],
+        minlength=len(origins),
+    )
     return found, expected
 
 
@@ -70,10 +77,10 @@ def _facet_rays() -> Pair:
     axes, centres = rng.uniform(0.05, 0.25, (6, 3)), rng.uniform(-0.4, 0.4, (6, 3))
     frames = np.linalg.qr(rng.normal(size=(6, 3, 3)))[0]
     places = np.array([-4.0, 0, 0]) + rng.normal(0, 0.3, (antennas, 3))
-    given = places, parts, centres, frames, axes, u * axes[:, :, None]
-    slots = facet_rays(*given, 0.0)[1][0]
+    posed, vertices = (places, parts, centres, frames, axes), u * axes[:, :, None]
+    slots = facet_rays(*posed, axes.max(axis=1), vertices, 0.0)[1][0]
     count = np.bincount(slots, minlength=antennas * 900).reshape(antennas, 3, 300)
-    return count, facet_rays_reference(*given)
+    return count, facet_rays_reference(*posed, vertices)
 
 
 def first_occluders_reference(met, fraction, whose, vertices):

@@ -7,8 +7,7 @@ import numpy as np
 from references.cases import Pair, filled, kernel_case
 from references.specular_point import geometry
 from rtradar.kernels.elementary import add_blended, cubic_weights, hermite_weights, smoothstep
-from rtradar.kernels.scatter.envelope import fill_envelope
-from rtradar.kernels.scatter.mirrors import SlabPass, received_from_conductors, slab_fields
+from rtradar.kernels.scatter.facets import fill_envelope
 from rtradar.kernels.scatter.nearby_points import Ellipsoids
 from rtradar.kernels.scatter.rooms import (
     Blend,
@@ -20,9 +19,9 @@ from rtradar.kernels.scatter.rooms import (
     delayed_lengths,
     outline_near,
     path_amplitudes,
+    received_from_conductors,
 )
 
-_WAVENUMBER = 300.0
 PLACES = 8
 
 
@@ -177,42 +176,6 @@ def _unit_vectors(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 def _fields(rng: np.random.Generator, *shape: int) -> np.ndarray:
     return rng.normal(size=(*shape, 3, 2)).view(np.complex128)[..., 0]
-
-
-def slab_fields_reference(field, ways, slab):
-    """Fields (node, wave, 3) of `slab_fields`, in plain NumPy, for slabs that let waves in."""
-    against, odd, k = ways @ slab.normal, slab.passes % 2, slab.wavenumber[:, None]
-    cosine, eta = np.abs(against), slab.eta[:, None]
-    inner = np.sqrt(eta - 1 + cosine**2)
-    within = slab.passes * np.sqrt(np.maximum(slab.index_squared - 1 + cosine**2, 0))
-    extra = slab.thickness * (within if slab.index_squared else odd * cosine)
-    once = np.exp(-1j * k * slab.thickness * inner)
-    out, leaving = 0, ways - 2 * (1 - odd) * against[:, None] * slab.normal
-    across = np.cross(ways, slab.normal)
-    across /= np.linalg.norm(across, axis=-1, keepdims=True)
-    pairs = ((1, across, across), (eta, np.cross(across, ways), np.cross(across, leaving)))
-    for ratio, before, after in pairs:
-        face, number = (ratio * cosine - inner) / (ratio * cosine + inner), slab.passes or 2
-        term = (1 - face**2) * (-face) ** (number - 1) * once**number
-        term = term / (1 - (face * once) ** 2) if slab.rest else (slab.passes > 0) * term
-        term = (term + (slab.passes == 0) * face) * np.exp(1j * k * extra)
-        term *= np.exp(-2 * (1 - odd) * (k * slab.roughness * cosine) ** 2)
-        out = out + (term * (field * before).sum(axis=-1))[..., None] * after
-    return out
-
-
-# Reflected at the face, and by all terms; passed at once, after one way more and after all others.
-@kernel_case(
-    slab_fields,
-    kind=((0.0, 0, True), (0.0, 1, True), (5.1, 0, False), (5.1, 3, False), (5.1, 4, True)),
-)
-def _slab_fields(kind: tuple[float, int, bool]) -> Pair:
-    rng = np.random.default_rng(0)
-    normal, wavenumber = np.array([0.48, 0.6, 0.64]), _WAVENUMBER * np.array([0.9, 1.0, 1.1])
-    eta = np.array([5.2 - 0.3j, 5.1 - 0.3j, 5.0 - 0.2j])
-    given = _fields(rng, 3, 501), _unit_vectors(rng, 501)
-    slab, out = SlabPass(normal, eta, wavenumber, 0.1, 1e-3, *kind), np.empty((3, 501, 3), complex)
-    return filled(slab_fields, *given, slab, out=(out,)), slab_fields_reference(*given, slab)
 
 
 def received_from_conductors_reference(sent, received, to_tx, to_rx):

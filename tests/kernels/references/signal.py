@@ -10,7 +10,6 @@ from numpy.polynomial.polynomial import polyvander
 
 from references.cases import Pair, filled, kernel_case, samples
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.gaussian_noise import add_noise
 from rtradar.kernels.nufft import (
     ANCHORS,
     Anchors,
@@ -19,6 +18,7 @@ from rtradar.kernels.nufft import (
     fill_anchors,
     sum_by_nufft,
 )
+from rtradar.kernels.receiver import add_noise
 from rtradar.kernels.tone_sum import Tones, add_tones, tone_tables
 
 

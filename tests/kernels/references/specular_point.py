@@ -8,9 +8,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from references.cases import OfEach, Pair, filled, kernel_case
-from rtradar.kernels.scatter.far_field import _NO_BISECTOR, far_field
 from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
-from rtradar.kernels.scatter.specular_point import ROOT_PI, Geometry, Options, solve
+from rtradar.kernels.scatter.specular_point import (
+    _NO_BISECTOR,
+    ROOT_PI,
+    Geometry,
+    Options,
+    far_field,
+    solve,
+)
 from rtradar.scatter.common.polarization import Polarization, copolar
 
 

@@ -13,7 +13,7 @@ from rtradar.scatter.clutter import furniture as clutter_furniture
 from rtradar.scatter.clutter.furniture import furniture_returns
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scene import Furniture, Scene, material, reflection
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 
 AWAY = 60.0
 WIDE = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-AWAY, 0, 1), samples_per_chirp=4096)

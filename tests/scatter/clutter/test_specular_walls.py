@@ -13,7 +13,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import specular_returns
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 SIZE, CORNER = (6.0, 4.5, 2.6), (-4.8, -2.0)

@@ -15,7 +15,7 @@ from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter, rough_returns
 from rtradar.scatter.multipath.slabs import WHOLE, after_slab
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 RADAR = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2)

@@ -20,7 +20,7 @@ from rtradar.scatter.facets.radiation import (
     subdivisions_for,
 )
 from rtradar.scatter.facets.target import facet_scattering
-from rtradar.trace.backends.backend import use
+from rtradar.trace.backend import use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.facets.target import visible_fractions
 from rtradar.scatter.models.specular import Specular
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 Array = NDArray[np.float64]
 C = 299_792_458.0

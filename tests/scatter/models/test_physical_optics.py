@@ -16,7 +16,7 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.elementary import hermite_weights
-from rtradar.kernels.scatter.envelope import stretch
+from rtradar.kernels.scatter.facets import stretch
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.common.polarization import Polarization

@@ -12,7 +12,7 @@ from rtradar.errors import InputError
 from rtradar.scatter import build_model
 from rtradar.scatter.models.rays import Rays, rays_scattering
 from rtradar.scatter.target import EllipsoidGrid, MeshGrid
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 Array = NDArray[np.float64]
 FAR = 1e6

@@ -11,7 +11,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.echo_models import build_model
 from rtradar.scatter.multipath.image_paths import faces_of, reflecting_faces
 from rtradar.scene import Furniture, Scene, Wall, material, reflection
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
 PLACE = np.array(RADAR.position_m)

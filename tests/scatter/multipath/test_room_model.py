@@ -17,7 +17,7 @@ from rtradar.scatter.multipath.keyframes import KEYFRAMES_S
 from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Furniture, Scene, material
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backend import Backend
 
 Array = NDArray[np.float64]
 

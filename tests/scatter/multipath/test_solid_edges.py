@@ -15,7 +15,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter import build_model
 from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scene import Furniture, material
-from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backend import select, use
 from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]

@@ -1,8 +1,9 @@
-"""Rays along lines of sight to the vertices of facets, past parts that they come near.
+"""Rays along lines of sight past the parts of a body that they come near.
 
-Each line of sight is in the axes where the part that it may meet is the unit sphere, and each ray
-starts two radii before what it may meet. Lines that pass outside a volume a tenth larger than the
-part have no ray traced. Whether a ray meets the part itself is for Mitsuba to say.
+Each ray is in the axes where that part is the unit sphere, and starts two radii before what it may
+meet. A part is ruled out only where a line passes outside a ball or an ellipsoid that is a tenth
+larger than the part. Whether a ray meets the part itself is for Mitsuba to say. `near_rays` are
+those of any lines, `facet_rays` those to the vertices of facets.
 """
 
 from __future__ import annotations
@@ -11,10 +12,72 @@ import math
 
 import numpy as np
 
-from rtradar.kernels.elementary import dot, minus, turned_back
+from rtradar.kernels.elementary import dot, minus, scaled, turned, turned_back
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.facet_shadows import into_ball
-from rtradar.kernels.scatter.near_rays import NEAR, longest_axes
+
+NEAR = 1.1
+"""Size of the bounding volumes over that of the parts: lines outside of them have no ray traced."""
+
+
+@inlined()
+def _grown(rays):
+    """Twice the room; number by number, as to assign slices takes seconds to compile."""
+    rows, columns = rays.shape
+    out = np.empty((rows, 2 * columns), dtype=rays.dtype)
+    for row in range(rows):
+        for column in range(columns):
+            out[row, column] = rays[row, column]
+    return out
+
+
+@compiled()
+def near_rays(origins, targets, group, own, pose, centres, maps, longest):
+    """Return one ray for each line of sight and each part that this line comes near.
+
+    Lines (line, 3) go from ``origins`` to ``targets`` [m]. Those of one ``group (line,)`` end on
+    the part ``own (group,)``, -1 for none, which cannot occlude them, of the body in one of its
+    poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``maps (pose, part, 3, 3)`` to the axes
+    where a part is the unit sphere, and its ``longest (part,)`` semi-axis [m].
+
+    Returned are rays (7, ray) float32, and of each its line and that part (2, ray): the start, at
+    most two radii before the point nearest to the centre of the unit sphere; the unit direction;
+    the length.
+    """
+    rays, whose = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
+    count = 0
+    for line in range(len(group)):
+        g, origin = group[line], origins[line]
+        way, at = minus(targets[line], origin), pose[g]
+        over_square = 1 / max(dot(way, way), 1e-300)
+        for part in range(len(longest)):
+            # By the bounding ball first, which rules out most.
+            gap, reach = minus(centres[at, part], origin), NEAR * longest[part]
+            aside = minus(gap, scaled(way, dot(gap, way) * over_square))
+            if part == own[g] or dot(aside, aside) > reach * reach:
+                continue
+            m = maps[at, part]
+            start, along = turned(m, minus(origin, centres[at, part])), turned(m, way)
+            span, back = dot(along, along), -dot(start, along)
+            # The least square of the distance along the line, times its span: no division.
+            square = dot(start, start)
+            least = (
+                square * span - back * back if back < span else (square - 2 * back + span) * span
+            )
+            if (least if back > 0 else square * span) > NEAR * NEAR * span:
+                continue
+            if count == rays.shape[1]:
+                rays, whose = _grown(rays), _grown(whose)
+            # float32 is too coarse for a far antenna: the ray starts two radii before that point.
+            scale = 1 / math.sqrt(span)
+            ahead = max(min(1.0, max(0.0, back * scale * scale)) - 2 * scale, 0.0)
+            for i in range(3):
+                rays[i, count] = start[i] + ahead * along[i]
+                rays[3 + i, count] = along[i] * scale
+            rays[6, count] = (1 - ahead) * span * scale
+            whose[0, count], whose[1, count] = line, part
+            count += 1
+    return rays[:, :count].copy(), whose[:, :count].copy()
 
 
 @inlined(fastmath=True)
@@ -68,17 +131,6 @@ def _facing(local, x, y, z, axes, margin, faces, begin):
 
 
 @inlined()
-def _grown(rays):
-    """Twice the room; number by number, as to assign slices takes seconds to compile."""
-    rows, columns = rays.shape
-    out = np.empty((rows, 2 * columns), dtype=rays.dtype)
-    for row in range(rows):
-        for column in range(columns):
-            out[row, column] = rays[row, column]
-    return out
-
-
-@inlined()
 def _may_stand_before(antenna, part, other, centres, longest):
     """Whether one bounding ball may occlude another: it begins nearer, and their cones overlap."""
     a, b = minus(centres[part], antenna), minus(centres[other], antenna)
@@ -127,7 +179,7 @@ def _write_rays(lines, axes, out):
 
 
 @compiled()
-def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
+def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, margin):
     """Return the rays that decide which part occludes which vertex, as `BodyTracer.occluders` asks.
 
     ``rays (8, ray)`` float32: start, direction and length in axes where the part that it may meet
@@ -136,7 +188,6 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     """
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start = np.empty((3, 3)), np.empty(3), np.empty(3)
-    longest = longest_axes(semi_axes)
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     nearest, near = np.empty(n_vertices), np.empty(n_vertices, dtype=np.int64)

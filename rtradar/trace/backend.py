@@ -3,23 +3,36 @@
 Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for the life of the
 process. Versions 15 and 16 are loaded and then abort the process, so a library is tried in another
 process before it is loaded here.
+
+Dr.Jit has one thread in this process until many rays come at once, and none is taken away. Its
+threads wait for work awake, 20 ms each time, on cores on which ours have other work: for few rays
+that costs more than it saves. To take them away again is not possible. Dr.Jit 1.5.0 tells a thread
+to stop and then looks whether it sleeps, without a fence in between. One that falls asleep in that
+moment gets no message, and `set_thread_count` waits for it for ever.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import threading
 import warnings
 from dataclasses import dataclass
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Literal
+from typing import Any, Literal
 
 from rtradar.errors import BackendError, InputError
 from rtradar.system.clock import warming_up
-from rtradar.trace.backends.jit_threads import begin_with_one
-from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
-from rtradar.trace.backends.probe import ProbeResult, probe_backend
+from rtradar.system.threads import thread_count
+from rtradar.trace.probe import (
+    ENVIRONMENT_VARIABLE,
+    WHEEL,
+    Library,
+    ProbeResult,
+    candidates,
+    probe_backend,
+)
 
 Kind = Literal["llvm", "scalar", "cuda"]
 
@@ -70,24 +83,22 @@ def select(variant: str = "auto") -> Backend:
                 f"the package {package} is not installed; install it: pip install mitsuba"
             )
     library, result, trouble = _first_good()
-    path, version = (library.path, result.version) if library and result else (None, None)
-    if variant == "cuda":
-        result = probe_backend(VARIANTS["cuda"], library)
-        if not result.good:
+    kind = next((name for name in VARIANTS if name == variant), "llvm" if library else "scalar")
+    if kind == "llvm" and library is None:
+        raise BackendError(trouble)
+    if kind == "cuda":
+        probed = probe_backend(VARIANTS["cuda"], library)
+        if not probed.good:
             raise BackendError(
-                f"no CUDA GPU that works was found ({result.finding}); it needs an NVIDIA driver "
+                f"no CUDA GPU that works was found ({probed.finding}); it needs an NVIDIA driver "
                 "with OptiX; use --variant auto to run on the CPU"
             )
-        return Backend("cuda", VARIANTS["cuda"], path, version)
-    if variant == "scalar":
-        return Backend("scalar", VARIANTS["scalar"], path, version)
-    if library is not None:
-        return Backend("llvm", VARIANTS["llvm"], path, version)
-    if variant == "llvm":
-        raise BackendError(trouble)
-    warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
-    warnings.warn(warning, BackendWarning, stacklevel=2)
-    return Backend("scalar", VARIANTS["scalar"], None, None, warning)
+    path, version = (library.path, result.version) if library and result else (None, None)
+    warning = None
+    if kind == "scalar" and variant != "scalar":
+        warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
+        warnings.warn(warning, BackendWarning, stacklevel=2)
+    return Backend(kind, VARIANTS[kind], path, version, warning)
 
 
 @warming_up()
@@ -95,9 +106,9 @@ def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
     Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
-    thread until many rays come (`rtradar.trace.backends.jit_threads`); where it was imported
-    before, it keeps the threads it has. A `BackendError` is raised if Dr.Jit was imported with
-    another libLLVM since the backend was selected, or the variant cannot be set.
+    thread until many rays come (`grow_for`); where it was imported before, it keeps the threads it
+    has. A `BackendError` is raised if Dr.Jit was imported with another libLLVM since the backend
+    was selected, or the variant cannot be set.
     """
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules
@@ -177,3 +188,29 @@ def _works(kind: Kind) -> bool:
     except BackendError:
         return False
     return True
+
+
+# -- threads of Dr.Jit -----------------------------------------------------------------------------
+
+MANY_RAYS = 1 << 16
+"""Least number of rays traced at once that all cores share."""
+
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def begin_with_one() -> None:
+    """Give Dr.Jit one thread; call it before Dr.Jit computes anything and has others."""
+    import drjit as dr
+
+    dr.set_thread_count(1)
+
+
+def grow_for(mi: Any, rays: int) -> None:
+    """Give Dr.Jit all threads that this process may use, if so many rays are to be traced."""
+    if rays < MANY_RAYS or not mi.variant().startswith("llvm"):
+        return
+    import drjit as dr
+
+    with _ONE_AT_A_TIME:
+        if dr.thread_count() < thread_count():
+            dr.set_thread_count(thread_count())

@@ -1,4 +1,8 @@
-"""Whether a Mitsuba variant works with a libLLVM: tried in another process, and kept on disk."""
+"""Where a libLLVM may be, and whether a Mitsuba variant works with it.
+
+It is the one of the environment variable, of the wheel or of the system. Each is tried in another
+process, and the answer is kept on disk.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +11,109 @@ import importlib.metadata
 import json
 import os
 import platform
+import re
 import signal
 import subprocess
 import sys
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, temporary_folder
-from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
+
+ENVIRONMENT_VARIABLE = "DRJIT_LIBLLVM_PATH"
+"""Dr.Jit reads it, once, when it is imported."""
+
+WHEEL = "karellen-llvm-core"
+
+_NAME = re.compile(
+    r"libLLVM(?:-(?P<dashed>\d[\d.]*)(?:git|rc\d*)?)?\.(?:so(?:\.(?P<dotted>\d[\d.]*))?|dylib)"
+)
+
+_SYSTEM_PATTERNS = {
+    "linux": (
+        "/usr/lib/*-linux-gnu/libLLVM*.so*",
+        "/usr/lib/llvm*/lib/libLLVM*.so*",
+        "/usr/lib/libLLVM*.so*",
+        "/usr/lib64/libLLVM*.so*",
+        "/usr/lib64/llvm*/lib*/libLLVM*.so*",
+        "/usr/local/lib/libLLVM*.so*",
+    ),
+    "darwin": (
+        "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
+        "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
+        "/opt/local/libexec/llvm-*/lib/libLLVM*.dylib",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Library:
+    """A libLLVM that may or may not work, and who brought it.
+
+    The path, for the dynamic loader, exists unless the environment variable names one that does
+    not.
+    """
+
+    path: str
+    origin: Literal["environment", "wheel", "system"]
+
+    @property
+    def version(self) -> str | None:
+        """As far as the file's name tells; None where it tells nothing."""
+        name = _NAME.fullmatch(Path(self.path).name)
+        return (name["dashed"] or name["dotted"]) if name else None
+
+
+def candidates() -> list[Library]:
+    """Every libLLVM on this machine in the order in which they are tried, each file once.
+
+    The environment variable goes first, then the wheel, then what the system has, newest first.
+    """
+    found: dict[str, Library] = {}
+    named = os.environ.get(ENVIRONMENT_VARIABLE)
+    if named:
+        found[os.path.realpath(named)] = Library(named, "environment")
+    for path in _of_wheel():
+        found.setdefault(path, Library(path, "wheel"))
+    system = (Library(path, "system") for path in _of_system())
+    for library in sorted(system, key=_by_age):
+        found.setdefault(library.path, library)
+    return list(found.values())
+
+
+def _by_age(library: Library) -> tuple[float, ...]:
+    # A file without a number is what the package manager calls its current one.
+    return (
+        tuple(-float(number) for number in library.version.split("."))
+        if library.version
+        else (-float("inf"),)
+    )
+
+
+def _of_wheel() -> Iterator[str]:
+    try:
+        distribution = importlib.metadata.distribution(WHEEL)
+    except importlib.metadata.PackageNotFoundError:
+        return
+    for file in distribution.files or ():
+        path = Path(str(distribution.locate_file(file)))
+        if _NAME.fullmatch(path.name) and path.is_file():
+            yield os.path.realpath(path)
+
+
+def _of_system() -> Iterator[str]:
+    patterns = _SYSTEM_PATTERNS.get(sys.platform, ())
+    # A Python of conda's has its libraries beside it.
+    own = tuple(f"{prefix}/lib/libLLVM*" for prefix in {sys.prefix, sys.base_prefix})
+    for pattern in (*own, *patterns):
+        for path in Path("/").glob(pattern.lstrip("/")):
+            if _NAME.fullmatch(path.name) and path.is_file():
+                yield os.path.realpath(path)
+
 
 TIMEOUT_S = 120.0
 """Longest time for a probe. It takes half a second, but longer from a cold disk or on a new GPU."""
@@ -29,6 +125,13 @@ _STOPPED = {
     for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))
 }
 """Signals by which somebody ended the probe, which says nothing about the library."""
+
+_FINDINGS = {
+    "is too old": "refused by Dr.Jit: too old",
+    "Unable to load": "cannot be loaded",
+    "the CUDA backend": "no CUDA driver or no GPU",
+}
+"""What it means that Dr.Jit says so."""
 
 
 @dataclass(frozen=True)
@@ -103,12 +206,9 @@ def _what_went_wrong(done: subprocess.CompletedProcess[str], said: dict[str, Any
     # A process that calls abort() ends by a signal, which Python tells by a negative status.
     if done.returncode < 0:
         return "aborts the process"
-    if "is too old" in done.stderr:
-        return "refused by Dr.Jit: too old"
-    if "Unable to load" in done.stderr:
-        return "cannot be loaded"
-    if "the CUDA backend" in done.stderr:
-        return "no CUDA driver or no GPU"
+    for text, finding in _FINDINGS.items():
+        if text in done.stderr:
+            return finding
     lines = done.stderr.strip().splitlines()
     last = lines[-1] if lines else f"exit status {done.returncode}"
     return f"fails: {last[:200]}"

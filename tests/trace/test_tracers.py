@@ -1,4 +1,4 @@
-"""Lines of sight past ellipsoids: Mitsuba's answers against a closed form in float64."""
+"""Bodies of ellipsoids and meshes: Mitsuba's answers against closed forms in float64."""
 
 from __future__ import annotations
 
@@ -13,18 +13,24 @@ import rtradar as rt
 from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.scatter import build_model
-from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer, UnitSphere
+from rtradar.trace.mesh_tracer import MeshTracer
 
 Array = NDArray[np.float64]
 
 
-def random_body(seed: int, parts: int = 6) -> tuple[Array, Array, Array]:
-    rng = np.random.default_rng(seed)
-    return (
-        rng.uniform(-0.6, 0.6, (parts, 3)),
-        Rotation.random(parts, rng=rng).as_matrix(),
-        rng.uniform(0.05, 0.3, (parts, 3)),
+CHEST = np.array([0.0, 0.0, 1.0])
+# Nearer to an outline than this fraction of the radius, float32 decides.
+EDGE = 1e-6
+
+
+@pytest.fixture
+def crowd() -> Ellipsoids:
+    rng = np.random.default_rng(0)
+    centres = rng.uniform(-0.8, 0.8, (15, 3)) + CHEST
+    return Ellipsoids(
+        centres, Rotation.random(15, random_state=0).as_matrix(), rng.uniform(0.04, 0.25, (15, 3))
     )
 
 
@@ -37,35 +43,21 @@ def distances(origins: Array, targets: Array, centres: Array, frames: Array, axe
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_mitsuba_says_what_the_closed_form_says(seed: int, backend: Backend) -> None:
-    centres, frames, axes = random_body(seed, parts=12)
-    tracer = BodyTracer(use(backend), axes)
-    tracer.pose(centres, frames)
+def test_mitsuba_says_what_the_closed_form_says(
+    seed: int, crowd: Ellipsoids, backend: Backend
+) -> None:
+    tracer = BodyTracer(use(backend), crowd.semi_axes)
+    tracer.pose(crowd.centres, crowd.frames)
     rng = np.random.default_rng(seed)
-    origins = np.array([-4.0, 0.5, 0.3]) + rng.uniform(-0.3, 0.3, (600, 3))
-    targets, own = rng.uniform(-0.9, 0.9, (600, 3)), rng.integers(-1, 12, 600)
-    least = distances(origins, targets, centres, frames, axes)
+    origins = np.array([-4.0, 0.5, 1.3]) + rng.uniform(-0.3, 0.3, (600, 3))
+    targets, own = rng.uniform(-0.9, 0.9, (600, 3)) + CHEST, rng.integers(-1, 15, 600)
+    least = distances(origins, targets, crowd.centres, crowd.frames, crowd.semi_axes)
     lines = np.flatnonzero(own >= 0)
     least[lines, own[lines]] = np.inf
     clear = np.abs(least.min(axis=1) - 1) > 1e-6  # float32 decides nearer to the surface
     seen = tracer.sees(origins, targets, own)
     assert 0.2 < seen.mean() < 0.9
     np.testing.assert_array_equal(seen[clear], (least.min(axis=1) > 1)[clear])
-
-
-def test_a_target_on_no_part_is_occluded_by_any(backend: Backend) -> None:
-    """Points before, inside and behind a ball of 0.1 m, and a line that passes 1 mm beside it."""
-    tracer = BodyTracer(use(backend), np.full((2, 3), 0.1))
-    tracer.pose(np.array([[1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]), np.tile(np.eye(3), (2, 1, 1)))
-    origins = np.zeros((5, 3))
-    targets = np.array(
-        [[0.89, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [2.0, 2 * 0.1016, 0], [2.0, 2 * 0.0994, 0]]
-    )
-    own = np.full(5, -1)
-    np.testing.assert_array_equal(
-        tracer.sees(origins, targets, own), [True, False, False, True, False]
-    )
-    np.testing.assert_array_equal(tracer.sees(origins, targets, np.zeros(5, dtype=np.int64)), True)
 
 
 class BesideADisc:
@@ -133,11 +125,6 @@ def test_the_tracer_decides(
 # -- what rays meet first -------------------------------------------------------------------------
 
 
-CHEST = np.array([0.0, 0.0, 1.0])
-# Nearer to an outline than this fraction of the radius, float32 decides.
-EDGE = 1e-6
-
-
 class Hits(NamedTuple):
     """Part (ray,) met first, -1 for none, and distance (ray,) [m]."""
 
@@ -170,15 +157,6 @@ def clearances(body: Ellipsoids, origins: Array, targets: Array) -> tuple[Array,
     return np.where(nearest < 1, (-half - np.sqrt(root)) / square, np.inf), nearest - 1
 
 
-@pytest.fixture
-def crowd() -> Ellipsoids:
-    rng = np.random.default_rng(0)
-    centres = rng.uniform(-0.8, 0.8, (15, 3)) + CHEST
-    return Ellipsoids(
-        centres, Rotation.random(15, random_state=0).as_matrix(), rng.uniform(0.04, 0.25, (15, 3))
-    )
-
-
 def test_the_first_part_is_that_of_the_smooth_ellipsoids(
     backend: Backend, crowd: Ellipsoids
 ) -> None:
@@ -192,6 +170,7 @@ def test_the_first_part_is_that_of_the_smooth_ellipsoids(
     assert sure.mean() > 0.99
     np.testing.assert_array_equal(hits.part[sure], expected[sure])
     assert 0.2 < (expected >= 0).mean() < 0.9
+    np.testing.assert_array_equal(np.isinf(hits.distance), hits.part < 0)
 
 
 def test_the_distance_is_that_to_the_ellipsoid(backend: Backend, crowd: Ellipsoids) -> None:
@@ -203,16 +182,6 @@ def test_the_distance_is_that_to_the_ellipsoid(backend: Backend, crowd: Ellipsoi
     distance, _ = clearances(crowd, origins, targets)
     exact = distance[np.arange(500), hits.part]
     np.testing.assert_allclose(hits.distance, exact, rtol=1e-13)
-
-
-def test_nothing_met_is_told(backend: Backend, crowd: Ellipsoids) -> None:
-    origins = np.array([[-4.0, 1.0, 1.0], [-4.0, 1.0, 1.0], [5.0, 0.0, 1.0]])
-    # Past the body, away from it, and from behind it outward.
-    hits = first_hits(
-        backend, crowd, origins, np.array([[0.0, 9.0, 1.0], [-9.0, 1.0, 1.0], [9.0, 0.0, 1.0]])
-    )
-    np.testing.assert_array_equal(hits.part, -1)
-    assert np.isinf(hits.distance).all()
 
 
 def test_posed_again_it_is_as_posed_first(backend: Backend, crowd: Ellipsoids) -> None:
@@ -239,3 +208,104 @@ def test_far_away_rays_lose_nothing(backend: Backend, distance: float) -> None:
         targets = np.column_stack([np.ones(99), spread * np.cos(angle), spread * np.sin(angle)])
         hits = first_hits(backend, body, np.zeros((99, 3)), targets)
         np.testing.assert_array_equal(hits.part, expected)
+
+
+# -- bounces --------------------------------------------------------------------------------------
+
+# Face 0 in the plane x = 0, face 1 in y = 0, face 2 parallel to face 0, half a metre behind it.
+VERTICES = np.array(
+    [[0, 0, -1], [0, 2, 0], [0, 0, 1], [2, 0, 0], [-0.5, 0, -1], [-0.5, 2, 0], [-0.5, 0, 1.0]]
+)
+FACES = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+
+
+def body(backend: Backend) -> BodyTracer:
+    surfaces = BodyTracer(use(backend), np.array([[0.1, 0.1, 0.3], [0.2, 0.1, 0.1]]))
+    frames = np.stack([np.eye(3), Rotation.from_euler("z", 30, degrees=True).as_matrix()])
+    surfaces.pose(np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), frames)
+    return surfaces
+
+
+def mesh(backend: Backend) -> MeshTracer:
+    return MeshTracer(use(backend), VERTICES[FACES])
+
+
+def rows(*vectors: object) -> Array:
+    return np.array(vectors, dtype=float)
+
+
+def test_a_ray_that_leaves_a_part_meets_the_other_and_not_its_own(backend: Backend) -> None:
+    surfaces = body(backend)
+    # Along the tangent too.
+    points, normals = (
+        rows([0, 0.1, 0], [0, 0.1, 0], [0.1, 0, 0]),
+        rows([0, 1, 0], [0, 1, 0], [1, 0, 0]),
+    )
+    directions = rows([0, 1, 0], [1, 0, 0], [1, 0, 0])
+    met, distance = surfaces.meets(points, normals, directions, np.zeros(3, dtype=np.int64))
+    np.testing.assert_array_equal(met, [1, -1, -1])
+    exact = surfaces.distance(np.array([1]), points[:1], directions[:1])
+    # In its own axes the ray is (sin 30, cos 30): 1 m less the radius of the ellipse in that
+    # direction, less 0.1 m.
+    radius = 1 / np.hypot(np.sin(np.pi / 6) / 0.2, np.cos(np.pi / 6) / 0.1)
+    np.testing.assert_allclose(exact, 0.9 - radius, rtol=1e-13)
+    np.testing.assert_array_equal(distance[:1], exact)
+
+
+def test_places_on_a_part_are_exact_and_normals_point_outward(backend: Backend) -> None:
+    surfaces = body(backend)
+    rng = np.random.default_rng(0)
+    origins = rng.normal(size=(20, 4, 3))
+    origins *= 3 / np.linalg.norm(origins, axis=-1, keepdims=True)
+    directions = -origins / 3 + rng.normal(0, 0.01, origins.shape)
+    part = np.zeros((20, 4), dtype=np.int64)
+    distance = surfaces.distance(part, origins, directions)
+    places = origins + distance[..., None] * directions
+    np.testing.assert_allclose(((places / [0.1, 0.1, 0.3]) ** 2).sum(-1), 1, rtol=1e-12)
+    normals = surfaces.normal(part, places, directions)
+    gradient = places / np.array([0.1, 0.1, 0.3]) ** 2
+    np.testing.assert_allclose(
+        normals, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True), atol=1e-12
+    )
+    assert np.isnan(surfaces.distance(np.array([0]), rows([1, 0, 0]), rows([0, 1, 0])))
+
+
+def test_faces_keep_their_numbers_and_their_planes_have_no_border(backend: Backend) -> None:
+    surfaces = mesh(backend)
+    points, normals = (
+        rows([1, 0, 0.1], [1, 0, 0.1], [1, 0, 0.1]),
+        rows([0, 1, 0], [0, 1, 0], [0, -1, 0]),
+    )
+    directions = rows([-1, 1, 0], [-1, 5, 0], [-1, -1, 0]) / np.sqrt([[2], [26], [2]])
+    met, distance = surfaces.meets(points, normals, directions, np.ones(3, dtype=np.int64))
+    np.testing.assert_array_equal(met, [0, -1, -1])
+    assert distance[0] == pytest.approx(np.sqrt(2), abs=1e-4)
+    assert np.isinf(distance[1:]).all()
+    exact = surfaces.distance(np.array([0, 0, 0]), points, directions)
+    np.testing.assert_allclose(exact, np.sqrt([2, 26, 2]), rtol=1e-14)
+
+
+def test_normals_of_a_sheet_face_the_ray(backend: Backend) -> None:
+    surfaces = mesh(backend)
+    normals = surfaces.normal(np.array([0, 0]), np.zeros((2, 3)), rows([1, 0, 0], [-1, 0, 0]))
+    np.testing.assert_array_equal(normals, rows([-1, 0, 0], [1, 0, 0]))
+
+
+@pytest.mark.parametrize("far", [4.0, 1000.0, 1e6])
+def test_a_face_hides_what_is_behind_it_however_far_the_antenna(
+    backend: Backend, far: float
+) -> None:
+    surfaces = mesh(backend)
+    points = rows([0, 1, 0], [-0.5, 1, 0], [-0.5, 1, 0])
+    antennas = rows([far, 1, 0], [far, 1, 0], [-far, 1, 0])
+    np.testing.assert_array_equal(
+        surfaces.sees(antennas, points, np.array([0, 2, 2])), [True, False, True]
+    )
+
+
+def test_no_rays_meet_nothing(backend: Backend) -> None:
+    none, nowhere = np.empty((0, 3)), np.empty(0, dtype=np.int64)
+    for surfaces in (body(backend), mesh(backend)):
+        assert surfaces.sees(none, none, nowhere).shape == (0,)
+        met, distance = surfaces.meets(none, none, none, nowhere)
+        assert met.shape == distance.shape == (0,)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from references.rays import body_and_lines
-from rtradar.kernels.scatter.near_rays import NEAR, near_rays
+from references.rays import body_and_lines, unit_maps
+from rtradar.kernels.scatter.rays import NEAR, near_rays
 
 
 def test_rays_start_two_radii_before_a_part_and_end_at_the_target() -> None:
     (centres, frames, axes), (origins, targets, group, own, pose) = body_and_lines(poses=1, seed=7)
-    rays, (line, met) = near_rays(origins, targets, group, own, pose, centres, frames, axes)
+    rays, (line, met) = near_rays(
+        origins, targets, group, own, pose, centres, unit_maps(frames, axes), axes.max(axis=1)
+    )
     assert rays.dtype == np.float32
     assert len(line) > 25
     np.testing.assert_allclose(np.linalg.norm(rays[3:6], axis=0), 1, atol=1e-6)

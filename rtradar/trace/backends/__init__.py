@@ -1,1 +1,0 @@
-"""Mitsuba's backends: which there are, whether they work, and their libLLVM."""
