@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 import rtradar as rt
-from rtradar.antenna import Antenna
+from rtradar.front_end import Antenna
 from rtradar.scatter import build_model, chirp_poses
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.poses import ChirpPoses

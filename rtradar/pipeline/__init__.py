@@ -2,13 +2,11 @@
 
 from rtradar.pipeline.compare import compare, compare_recordings
 from rtradar.pipeline.compared import Comparison
-from rtradar.pipeline.experiment import Experiment
+from rtradar.pipeline.experiment import Experiment, Sweep, sweep
 from rtradar.pipeline.processing import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.run import run
-from rtradar.pipeline.simulation import Simulation, simulate
-from rtradar.pipeline.sweep import Sweep, sweep
+from rtradar.pipeline.run import Simulation, run, simulate
 
 __all__ = [
     "MEMORY_LIMIT_BYTES",

@@ -29,10 +29,9 @@ from rtradar.pipeline.compared import (
     finite,
     write_figures,
 )
-from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.view import load_run_view
-from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
+from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs, read_maps
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.cards import text_table
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.truth import compared_echoes
+from rtradar.pipeline.output.writer import read_maps
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, thinned
 from rtradar.report.figures.fitting import above_floor

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.pictures import draw_found
 from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
-from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
+from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, open_maps, write_clouds
 from rtradar.pipeline.prepare import with_background
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps, refuse_large_maps
 from rtradar.pipeline.result import Result

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.echo_table import EchoTable
-from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
+from rtradar.pipeline.output.truth import EchoTable
+from rtradar.pipeline.output.writer import open_maps, read_truth
 from rtradar.radar import Radar
 from rtradar.report.figures.fitting import central_limits
 from rtradar.report.pages.html import InlinePage
@@ -28,6 +27,7 @@ from rtradar.scatter.link_budget import LinkBudget
 if TYPE_CHECKING:
     import xarray as xr
 
+    from rtradar.pipeline.experiment import Experiment
     from rtradar.report.figures.plots import Plots
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rtradar.antenna import Antenna
 from rtradar.cards import quantity
+from rtradar.front_end import Antenna
 
 if TYPE_CHECKING:
     from rtradar.radar.radar import Radar

@@ -14,8 +14,8 @@ import pytest
 import zarr
 
 import rtradar as rt
-from rtradar.antenna import Antenna
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.front_end import Antenna
 from rtradar.scatter import MODELS
 from rtradar.settings import RunOptions
 

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.map_store import read_maps
+from rtradar.pipeline.capture import Capture, PreparedRoom
 from rtradar.pipeline.output.truth import truth_of
-from rtradar.pipeline.prepared_room import PreparedRoom
+from rtradar.pipeline.output.writer import read_maps
 from rtradar.pipeline.processing import Clouds
 from rtradar.radar import Radar
 from rtradar.report.figures import rooms

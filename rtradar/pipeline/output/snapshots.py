@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.pipeline.output.echo_table import EchoTable, Look
-from rtradar.pipeline.output.truth import truth_of
+from rtradar.pipeline.output.truth import EchoTable, Look, truth_of
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses

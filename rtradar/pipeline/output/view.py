@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.output.map_store import read_maps
+from rtradar.pipeline.output.writer import read_maps
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar

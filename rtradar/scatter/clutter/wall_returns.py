@@ -34,8 +34,8 @@ from math import ceil, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import (
     ENOUGH,

@@ -12,8 +12,8 @@ from typing import Any, Literal, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.errors import InputError
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scene import Material, material, reflection

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.body.body import Poses
+from rtradar.front_end import Antenna
 from rtradar.kernels.scatter.mirrors import received_from_conductors
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.front_end import Antenna
 from rtradar.kernels.scatter.mirrors import SlabPass, slab_fields
 from rtradar.scatter.common.polarization import Polarization, sent_field, unit
 from rtradar.scatter.multipath.image_paths import Leg

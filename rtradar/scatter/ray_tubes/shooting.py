@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
+from rtradar.front_end import Antenna
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.ray_tubes.footprints import Footprints
 from rtradar.scatter.ray_tubes.tubes import Grid

@@ -15,10 +15,10 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.body.people import body_of_people
 from rtradar.motion import place
-from rtradar.pipeline.output import echo_table
 from rtradar.pipeline.output import snapshots as module
-from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output import truth as echo_table
 from rtradar.pipeline.output.snapshots import snapshots
+from rtradar.pipeline.output.truth import EchoTable
 from rtradar.scatter import build_model
 from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scene import Furniture, Scene, Wall, material

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from rtradar.pipeline.output.map_store import MapStore, read_maps
+from rtradar.pipeline.output.writer import MapStore, read_maps
 from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb
 
 FIXED = {"range": np.arange(256.0), "velocity": np.arange(128.0)}

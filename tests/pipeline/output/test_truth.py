@@ -7,8 +7,8 @@ import numpy as np
 
 import rtradar as rt
 from rtradar.body.people import body_of_people
-from rtradar.pipeline.output.map_store import open_maps
 from rtradar.pipeline.output.truth import truth_of
+from rtradar.pipeline.output.writer import open_maps
 from rtradar.settings import RunSettings
 
 RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=1, tx_z=0, rx_y=2, rx_z=0)
