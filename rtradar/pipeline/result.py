@@ -139,22 +139,13 @@ class Result:
             If the results are those of IF samples, where there is no body to show, or if files of
             the folder are missing or damaged.
         """
-        from rtradar.pipeline.output.view import assembled, load_run_view
+        from rtradar.pipeline.output.view import load_run_view, run_view_of
         from rtradar.report.view.run_view import write_view
 
         if self._table is not None:
-            capture = self._table.capture
             maps = {str(name): values.values for name, values in self.maps.variables.items()}
-            found = (
-                maps,
-                snapshots(self._table),
-                self.points,
-                self.spatial,
-                self.radar,
-                self.summary,
-            )
-            run_view = assembled(*found, capture.processing.window_functions)
-        elif self.out is not None and self.link_budget is not None:
+            run_view = run_view_of(self, maps, snapshots(self._table))
+        elif self.out is not None:
             run_view = load_run_view(self.out)
         else:
             raise InputError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.cards import text_card
 from rtradar.description import (
     Movers,
     Moving,
@@ -23,7 +24,7 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.pictures import draw_pictures
+from rtradar.pipeline.output.pictures import draw_pictures, write_page
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
 from rtradar.pipeline.output.truth import EchoTable, chirps_between, labelled_echoes
@@ -42,7 +43,6 @@ from rtradar.pipeline.processing import Clouds, block_chirps, refuse_large
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
-from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
@@ -136,16 +136,14 @@ def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSett
     capture = prepare(motion, radar, scene, settings, in_memory=True)
     file = BytesIO()
     clouds, table = _stream(capture, file)
-    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
+    result = _result(capture, clouds, started, rays_before)
     with capture.stages.time("write"), open_maps(file) as maps:
         maps.load()
-        _add_room(summary, capture, maps)
+        result.summary.update(room_findings(capture, maps))
         truth = read_truth(file)
-    described = capture.described()
-    summary["run"] = in_words(described)
-    summary = finished(summary | cost(capture.processing, capture.n_chirps, started))
-    kept = {"_in_memory": maps, "_truth": truth, "_table": table}
-    return _result(capture, clouds, summary, described, **kept)
+    result.summary["run"] = in_words(capture.described())
+    summary = finished(result.summary | cost(capture.processing, capture.n_chirps, started))
+    return replace(result, summary=summary, _in_memory=maps, _truth=truth, _table=table)
 
 
 def run_into(
@@ -167,7 +165,6 @@ def run_into(
         refuse_another(out, [person.motion for person in people_in(scene, motion)[1]])
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
-    described = capture.described()
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
@@ -178,56 +175,37 @@ def run_into(
         if pictures:
             with capture.stages.time("pictures"):
                 drawn = draw_pictures(folder, capture, clouds)
-        summary = summary_of(capture, clouds, started)
-        summary["rays_traced"] = rays_traced() - rays_before
-        summary["run"] = write_run_file(folder, place or out, described)
-        with capture.stages.time("view"):
-            save_snapshots(folder / "view.npz", snapshots(table))
-            with read_maps(folder / "maps.h5") as maps:
-                _add_room(summary, capture, maps)
+        result = _result(capture, clouds, started, rays_before)
+        summary = result.summary
+        summary["run"] = write_run_file(folder, place or out, capture.described())
+        with capture.stages.time("view"), read_maps(folder / "maps.h5") as maps:
+            shown = snapshots(table)
+            save_snapshots(folder / "view.npz", shown)
+            summary |= room_findings(capture, maps)
+            run_view = run_view_of(result, maps, shown.every(shown.stride(*_MOMENTS)))
         with capture.stages.time("report"):
-            write_report(
-                folder / "report.html",
-                radar=capture.radar,
-                summary=summary,
-                pictures=drawn,
-                rdt_points=clouds.rdt.points,
-                spatial=clouds.spatial,
-                run_view=run_view_of(
-                    folder,
-                    summary,
-                    capture.radar,
-                    capture.processing.window_functions,
-                    at_most=_MOMENTS,
-                ),
-            )
+            write_page(folder, result, drawn, run_view)
         summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
-        summary = finished(summary, folder)
-    return _result(capture, clouds, summary, described, out=out.absolute())
+        return replace(result, summary=finished(summary, folder), out=out.absolute())
 
 
-def _result(
-    capture: Capture,
-    clouds: Clouds,
-    summary: dict[str, Any],
-    described: dict[str, Any],
-    **where: Any,
-) -> Result:
-    """Return the result of a capture, whose maps are ``where`` it says."""
-    found = clouds.rdt.points, clouds.spatial, summary, capture.radar, capture.link_budget
-    return Result(*found, experiment=Experiment(described), **where)
+def _result(capture: Capture, clouds: Clouds, started: Moment, rays_before: int) -> Result:
+    """Return what a capture found, whose summary begins with what is known so far."""
+    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
+    return Result(
+        clouds.rdt.points,
+        clouds.spatial,
+        summary,
+        capture.radar,
+        capture.link_budget,
+        experiment=Experiment(capture.described()),
+    )
 
 
 def _start() -> tuple[Moment, int]:
     """Return the moment at which a run starts, and the number of rays traced before."""
     forget_peak_memory()
     return Moment.now(), rays_traced()
-
-
-def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
-    """Add what the open maps tell about the room, where there is one."""
-    if "room" in summary:
-        summary["room"] = summary["room"] | room_findings(capture, maps)
 
 
 def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> tuple[Clouds, EchoTable]:
@@ -401,13 +379,12 @@ class Simulation:
 
     def __repr__(self) -> str:
         chirps, rx, samples = self.shape
-        lines = (
-            f"Simulation of {self._capture.title}",
-            f"  samples: chirp {chirps}, rx {rx}, sample {samples}; complex64 [m]",
-            f"  {self.duration_s:.3f} s, {chirps * rx * samples * 8 / 1e6:.0f} MB",
-            f"  noise {self.noise_power_m2:.3g} m2 per sample",
-        )
-        return "\n".join(lines)
+        rows = {
+            "samples": f"chirp {chirps}, rx {rx}, sample {samples}; complex64 [m]",
+            "size": f"{self.duration_s:.3f} s, {chirps * rx * samples * 8 / 1e6:.0f} MB",
+            "noise": f"{self.noise_power_m2:.3g} m2 per sample",
+        }
+        return text_card("Simulation", self._capture.title, rows)
 
 
 def if_samples(values: NDArray[np.complex64], radar: Radar, first: int = 0) -> xr.DataArray:

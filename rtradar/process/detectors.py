@@ -248,20 +248,15 @@ def ti_oob(
             f"detector ti-oob: radar '{radar.name}' has multiplexing = '{radar.multiplexing}'; the "
             "chain is that of tdm and bpm"
         )
-    if not 0 < threshold_db < np.inf:
-        raise InputError(f"detector ti-oob: threshold_db = {threshold_db}; it must be above 0 dB")
-    if not 1 <= max_points < np.inf or max_points != int(max_points):
-        raise InputError(
-            f"detector ti-oob: max_points = {max_points}; it must be a whole number, at least 1"
-        )
-    for option, value, allowed in (
-        ("cfar_axes", cfar_axes, ("both", "range")),
-        ("grouping", grouping, tuple(_GROUPED)),
+    whole = 1 <= max_points < np.inf and max_points == int(max_points)
+    for option, value, good, wanted in (
+        ("threshold_db", threshold_db, 0 < threshold_db < np.inf, "it must be above 0 dB"),
+        ("max_points", max_points, whole, "it must be a whole number, at least 1"),
+        ("cfar_axes", cfar_axes, cfar_axes in ("both", "range"), "allowed: both, range"),
+        ("grouping", grouping, grouping in _GROUPED, f"allowed: {', '.join(_GROUPED)}"),
     ):
-        if value not in allowed:
-            raise InputError(
-                f"detector ti-oob: {option} = {brief(value)}; allowed: {', '.join(allowed)}"
-            )
+        if not good:
+            raise InputError(f"detector ti-oob: {option} = {brief(value)}; {wanted}")
     n_cycles = len(cube)
     window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)

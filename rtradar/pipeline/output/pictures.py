@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,12 @@ from rtradar.pipeline.capture import Capture, PreparedRoom
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.output.writer import read_maps
 from rtradar.pipeline.processing import Clouds
+from rtradar.pipeline.result import Result
 from rtradar.radar import Radar
+from rtradar.report import write_report
 from rtradar.report.figures import rooms
 from rtradar.report.figures.plots import Plots
+from rtradar.report.view.run_view import RunView
 from rtradar.scatter.multipath.path_summary import Ghost, ghosts
 from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure
@@ -66,6 +69,21 @@ def draw_found(
             drawn[name] = folder / file
             save_figure(draw().get_figure(root=True), drawn[name])
         return drawn, plots.frame()[0]
+
+
+def write_page(
+    folder: Path, result: Result, pictures: Mapping[str, Path], run_view: RunView | None = None
+) -> None:
+    """Write the report of what was found into a folder."""
+    write_report(
+        folder / "report.html",
+        radar=result.radar,
+        summary=result.summary,
+        pictures=pictures,
+        rdt_points=result.points,
+        spatial=result.spatial,
+        run_view=run_view,
+    )
 
 
 def _draw_room(

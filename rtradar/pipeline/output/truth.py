@@ -72,11 +72,6 @@ def truth_of_parts(table: EchoTable, start_cycle: int, time_s: float) -> dict[st
     return {"range_m": range_m, "range_rate_mps": rate, "power_m2": total, "visible": total > 0}
 
 
-def truth_axes(body: Body) -> dict[str, tuple[str, ...]]:
-    """Return the names along the axes of `truth_of` that are no numbers."""
-    return {"person": body.names, "joint": NODES, "coordinate": ("x", "y", "z")}
-
-
 def truth_of(body: Body, times: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
     """Return the arrays of the table ``people`` at times (time,) [s].
 

@@ -20,12 +20,12 @@ from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.clouds.arrays import TABLES, Array
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange.recording import new_store
+from rtradar.motion.skeleton import NODES
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.truth import (
     EchoTable,
     Parts,
     parts_of,
-    truth_axes,
     truth_of,
     truth_of_parts,
 )
@@ -46,7 +46,6 @@ from rtradar.process import (
     range_azimuth,
     range_elevation,
 )
-from rtradar.radar import Radar
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.hdf5 import LastingFile, netcdf_array
 from rtradar.system.output_folder import OutputFiles, one_of
@@ -121,9 +120,10 @@ class RunWriter:
             "slow_time": removal.description(self._range_time.window_cycles),
             "spectrogram_time": removal.description(processing.window_cycles),
         }
-        self._received = None
+        self._received: list[NDArray[np.complexfloating]] = []
+        self._kept_cycle = None
         if len(frame_starts) and removed["time"] != "none":
-            self._received = ReceivedFrame(radar, int(frame_starts[len(frame_starts) // 2]))
+            self._kept_cycle = int(frame_starts[len(frame_starts) // 2])
         left_out = ("source",) if table is None else ()
         said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
         parts = None if table is None else parts_of(table.capture)
@@ -143,8 +143,8 @@ class RunWriter:
         A block that is cut after a multiple of ``max_chirps`` chirps gives the same as the whole.
         """
         stages, store = self._processing.stages, self._store
-        if self._received is not None and (cube := self._received.push(spectra, first)) is not None:
-            self._keep_received(cube, self._received.start_cycle)
+        if self._kept_cycle is not None:
+            self._keep_received(spectra, first, self._kept_cycle)
         spectra = self._clouds.without_clutter(spectra, first)
         with stages.time("range"):
             power, times = self._range_time.push(spectra, first)
@@ -167,15 +167,28 @@ class RunWriter:
             if self._table is not None:
                 with stages.time("sources"):
                     of_parts = truth_of_parts(self._table, frame.start_cycle, frame.middle_s)
-                store.extend_truth(frame.middle_s, of_parts)
+                truth = {f"{_TRUTH}/{name}": values[None] for name, values in of_parts.items()}
+                store.extend(f"{_TRUTH}/time", [frame.middle_s], **truth)
 
     def _angle_maps(self, angles: Any) -> dict[str, NDArray[Any]]:
         makers = {"azimuth": range_azimuth, "elevation": range_elevation}
         radar = self._processing.radar
         return {f"range_{name}": makers[name](angles, radar) for name in self._angle_names}
 
-    def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
+    def _keep_received(
+        self, spectra: NDArray[np.complexfloating], first: int, start_cycle: int
+    ) -> None:
+        """Collect the range spectra of the frame that is kept, and once it is whole, its maps."""
         radar, windows = self._processing.radar, self._processing.window_functions
+        begin = max(start_cycle * radar.n_tx - first, 0)
+        end = start_cycle * radar.n_tx + radar.chirps_per_frame - first
+        if begin >= min(end, len(spectra)):
+            return
+        self._received.append(spectra[begin:end].copy())
+        if end > len(spectra):
+            return
+        shape = radar.cycles_per_frame, radar.n_tx, *spectra.shape[1:]
+        cube, self._received = np.concatenate(self._received).reshape(shape), []
         with self._processing.stages.time("received"):
             power = power_map(cube, radar, window_functions=windows)
             mask, _ = self._processing.detect(power, cube)
@@ -207,30 +220,6 @@ def write_clouds(folder: Path, clouds: Clouds) -> None:
     save_cloud_npz(folder / "cloud_rdt.npz", clouds.rdt.points)
     save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
     save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
-
-
-class ReceivedFrame:
-    """Collects the range spectra of one frame, from cycle ``start_cycle`` on, from a stream."""
-
-    def __init__(self, radar: Radar, start_cycle: int) -> None:
-        self.start_cycle = start_cycle
-        self._first, self._radar = start_cycle * radar.n_tx, radar
-        self._blocks: list[NDArray[np.complexfloating]] = []
-
-    def push(
-        self, spectra: NDArray[np.complexfloating], first: int
-    ) -> NDArray[np.complexfloating] | None:
-        """Take the next chirps; return the cube (cycle, tx, rx, range) once it is whole."""
-        last = self._first + self._radar.chirps_per_frame
-        begin, end = max(self._first, first), min(last, first + len(spectra))
-        if begin >= end:
-            return None
-        self._blocks.append(spectra[begin - first : end - first].copy())
-        if end < last:
-            return None
-        cube = np.concatenate(self._blocks)
-        self._blocks = []
-        return cube.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *cube.shape[1:])
 
 
 def if_array(path: Path, capture: Capture) -> Any:
@@ -330,11 +319,6 @@ class MapStore:
         if self._waiting_bytes >= _MOST_WAITING:
             self._write()
 
-    def extend_truth(self, time_s: float, of_parts: Mapping[str, NDArray[Any]]) -> None:
-        """Append the arrays (part,) of `truth_of_parts` at a time to the group ``truth``."""
-        added = {f"{_TRUTH}/{name}": values[None] for name, values in of_parts.items()}
-        self.extend(f"{_TRUTH}/time", [time_s], **added)
-
     def _write(self) -> None:
         for name, added in self._waiting.items():
             steps, data = np.concatenate(added), self._file[name]
@@ -352,7 +336,8 @@ class MapStore:
     def put_truth(self, body: Body) -> None:
         """Write what is true of each person of a body at the times of the frames."""
         self._write()
-        for name, names in truth_axes(body).items():
+        axes = {"person": body.names, "joint": NODES, "coordinate": ("x", "y", "z")}
+        for name, names in axes.items():
             self._make(name, TABLES["names"][name], data=list(names))
         for name, values in truth_of(body, self._file["time"][:]).items():
             self._make(name, TABLES["people"][name], data=values)
