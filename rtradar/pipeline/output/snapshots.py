@@ -99,14 +99,15 @@ def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], _Observed]:
     cell, shape = step[own] * keys.shape[1] + column.ravel(), (len(looks), keys.shape[1])
 
     def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.bincount(cell, values, math.prod(shape)).reshape(shape)
+        # Of nothing NumPy counts in whole numbers.
+        return np.bincount(cell, values, math.prod(shape)).reshape(shape).astype(np.float64)
 
     total = summed(power[own])
     fraction = np.where(total.ravel()[cell] > 0, power[own], 1.0)
     weight = summed(fraction)
     known = np.where(weight > 0, weight, 1.0)
-    means = (summed(fraction * values[own]) / known for values in (range_m, rate))
-    return [tuple(key) for key in keys.T.tolist()], _Observed(*means, total)
+    ranges, rates = (summed(fraction * values[own]) / known for values in (range_m, rate))
+    return [tuple(key) for key in keys.T.tolist()], _Observed(ranges, rates, total)
 
 
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
