@@ -112,10 +112,9 @@ def test_the_middle_frame_is_kept_as_it_was_received(tmp_path: Path) -> None:
     spectra = random.standard_normal((800, 4, 128)).astype(np.float32).view(np.complex64)
     starts = RADAR.window_starts(800)
     processing = Processing.of(RADAR, RunSettings(clutter_removal="mti"))
-    made = RunWriter(tmp_path / "maps.h5", processing, "", starts)
-    for first in range(0, 800, 62):
-        made.push(spectra[first : first + 62], first)
-    made.finish()
+    with RunWriter(tmp_path / "maps.h5", processing, "", starts) as made:
+        for first in range(0, 800, 62):
+            made.push(spectra[first : first + 62], first)
     first = starts[len(starts) // 2] * RADAR.n_tx
     cube = spectra[first : first + RADAR.chirps_per_frame].reshape(-1, 2, 4, 64)
     with read_maps(tmp_path / "maps.h5") as maps:
