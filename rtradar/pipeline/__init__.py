@@ -1,6 +1,6 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.compare import compare, compare_recordings
+from rtradar.pipeline.compare import compare, compare_folders, compare_recordings
 from rtradar.pipeline.compared import Comparison
 from rtradar.pipeline.experiment import Experiment, Sweep, sweep
 from rtradar.pipeline.processing import MEMORY_LIMIT_BYTES
@@ -16,6 +16,7 @@ __all__ = [
     "Simulation",
     "Sweep",
     "compare",
+    "compare_folders",
     "compare_recordings",
     "process_samples",
     "run",

@@ -18,7 +18,6 @@ from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.compared import (
     CONFIDENCE,
-    FOLDER_MEASURES,
     MAP_PICTURES,
     Comparison,
     best_frame,
@@ -409,10 +408,10 @@ def compare_folders(
     summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
     with atomic_folder(Path(out), _OF_FOLDERS, overwrite=overwrite) as place:
         pictures = _draw_folders(place, read)
-        rows = comparison_rows(summary, FOLDER_MEASURES)
+        rows = comparison_rows(summary)
         comparison.write_folders(place / "compare.html", summary, rows, pictures)
-        write_figures(place, summary, _OF_FOLDERS, FOLDER_MEASURES)
-    return Comparison(summary, Path(out), FOLDER_MEASURES)
+        write_figures(place, summary, _OF_FOLDERS)
+    return Comparison(summary, Path(out))
 
 
 def _check_axes(folder: Path, reference: Path) -> None:

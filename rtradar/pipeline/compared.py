@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 MEASURES = (
     # key, heading, digits
+    ("windows", "Frames", 0),
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
     ("field_error", "Field of the echoes, rms difference over rms", 3),
@@ -45,24 +46,13 @@ MEASURES = (
     ("spectrogram_correlation", "Spectrogram correlation [dB maps]", 3),
     ("spectrogram_rms_db", "Spectrogram, rms difference [dB]", 2),
     ("rdt_chamfer_bins", "RDT clouds, Chamfer distance [bins]", 2),
+    ("xyz_points", "Points in space", 0),
     ("scatter_s", "Scattering [s]", 2),
     ("wall_s", "Whole run [s]", 2),
     ("real_time_factor", "Seconds a second of radar", 2),
     ("peak_memory_mb", "Peak memory [MB]", 0),
 )
-"""Figures of each model, in the order of the chain; differences are to the last model named."""
-
-_OF_MAPS = (
-    "range_doppler_correlation", "range_doppler_mean_db", "range_doppler_rms_db", "detections",
-    "detection_overlap", "spectrogram_correlation", "spectrogram_rms_db", "rdt_chamfer_bins",
-)  # fmt: skip
-
-FOLDER_MEASURES = (
-    ("windows", "Frames", 0),
-    *(measure for measure in MEASURES if measure[0] in _OF_MAPS),
-    ("xyz_points", "Points in space", 0),
-)
-"""Figures of each folder."""
+"""Figures that are shown where they are known; differences are to the last model or folder."""
 
 MAP_PICTURES = {
     "Range-Doppler": "compare_range_doppler.png",
@@ -86,13 +76,10 @@ class Comparison:
         Contents of ``compare.json``.
     out : path
         Folder of the files; the run of each model is in a folder of its name.
-    measures : tuple
-        Key, heading and digits of each figure that is shown.
     """
 
     summary: dict[str, Any]
     out: Path
-    measures: tuple[tuple[str, str, int], ...] = MEASURES
     _captures: Callable[[], Mapping[str, Capture]] | None = None
 
     @cached_property
@@ -114,7 +101,7 @@ class Comparison:
 
     def table(self) -> str:
         """Return the figures as aligned text, one column for each model."""
-        return text_table(comparison_rows(self.summary, self.measures))
+        return text_table(comparison_rows(self.summary))
 
 
 def open_run_maps(result: Result) -> h5py.File:
@@ -143,12 +130,7 @@ def figures_of(ours: Result, reference: Result) -> dict[str, Any]:
     }
 
 
-def write_figures(
-    folder: Path,
-    summary: dict[str, Any],
-    kind: OutputFiles,
-    measures: Sequence[tuple[str, str, int]] = MEASURES,
-) -> None:
+def write_figures(folder: Path, summary: dict[str, Any], kind: OutputFiles) -> None:
     """Write what a comparison found as ``compare.json``, and its table as ``compare.csv``.
 
     The table has a row for each measure and column; over several recordings that is the mean, with
@@ -158,7 +140,7 @@ def write_figures(
     rows = [
         (key, name, *((value or {}).values() if several else (value,)))
         for name, figures in _columns(summary)
-        for key, value in ((key, figures[key]) for key, *_ in measures)
+        for key, value in ((key, figures[key]) for key, *_ in MEASURES if key in figures)
     ]
     head = ("measure", "of", *(("mean", "low", "high") if several else ("value",)))
     write_tables(folder, summary, kind, head, rows)
@@ -189,16 +171,15 @@ def _columns(summary: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any
         yield f"{summary['reference']}, other seed", summary["other_seed"]
 
 
-def comparison_rows(
-    summary: Mapping[str, Any], measures: Sequence[tuple[str, str, int]] = MEASURES
-) -> list[list[str]]:
+def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Return a comparison as text: a heading row, then a row a measure with a column a model."""
     headings, columns = zip(*_columns(summary), strict=True)
     reference = summary["reference"]
     told = (f"{name} (reference)" if name == reference else name for name in headings)
     rows = [["", *told]]
-    for key, heading, digits in measures:
-        rows.append([heading, *(_shown(figures[key], digits) for figures in columns)])
+    for key, heading, digits in MEASURES:
+        if key in columns[0]:
+            rows.append([heading, *(_shown(figures[key], digits) for figures in columns)])
     return rows
 
 
@@ -215,7 +196,7 @@ def _shown(value: float | Mapping[str, float] | None, digits: int) -> str:
 def means_of(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the mean of each figure over recordings, and its interval; None where one has none."""
     means: dict[str, Any] = {}
-    for key, *_ in MEASURES:
+    for key in [key for key, *_ in MEASURES if key in found[0]]:
         values = [one[key] for one in found]
         means[key] = None
         if None not in values:

@@ -124,9 +124,9 @@ def process_samples(
         clouds = _stream(blocks, processing, folder / "maps.h5")
         with processing.stages.time("write"):
             write_clouds(folder, clouds)
-        with processing.stages.time("pictures"):
-            pictures, _ = draw_found(folder, clouds, radar, settings)
         result = _result(blocks, processing, clouds, started)
+        with processing.stages.time("pictures"):
+            pictures, _ = draw_found(folder, result)
         with processing.stages.time("report"):
             write_page(folder, result, pictures)
         summary = finished(result.summary | cost(processing, blocks.n_chirps, started), folder)

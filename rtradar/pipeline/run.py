@@ -171,11 +171,11 @@ def run_into(
         clouds, table = _stream(capture, folder / "maps.h5", kept)
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
+        result = _result(capture, clouds, started, rays_before)
         drawn: dict[str, Path] = {}
         if pictures:
             with capture.stages.time("pictures"):
-                drawn = draw_pictures(folder, capture, clouds)
-        result = _result(capture, clouds, started, rays_before)
+                drawn = draw_pictures(folder, capture, result)
         summary = result.summary
         summary["run"] = write_run_file(folder, place or out, capture.described())
         with capture.stages.time("view"), read_maps(folder / "maps.h5") as maps:

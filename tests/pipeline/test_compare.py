@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.pipeline.compare import compare_folders
+from rtradar.pipeline import compare_folders
 from rtradar.pipeline.compared import above_noise, chamfer, chamfer_bins, level_agreement
 from rtradar.report.pages.comparison import _spread
 
