@@ -15,15 +15,14 @@ from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 
-from rtradar.antenna import Antenna
 from rtradar.body import Person
 from rtradar.campaign.intervals import INTERVAL_KEYS, Augmented, Intervals
 from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS
 from rtradar.campaign.spec_file import RUN_LIMITS
 from rtradar.clouds.sample_files import TABLES as ARRAY_TABLES
+from rtradar.front_end import Antenna, Interferer, Receiver
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
-from rtradar.receiver import Interferer, Receiver
 from rtradar.scene import (
     MATERIALS,
     Furniture,

@@ -17,7 +17,7 @@ from code_tables import described, pipe_table
 from docutils import nodes
 from docutils.parsers.rst.states import Inliner
 
-from rtradar.receiver import Receiver
+from rtradar.front_end import Receiver
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import models_that
 

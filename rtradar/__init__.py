@@ -16,7 +16,6 @@ if TYPE_CHECKING:
         rcs as rcs,
         signal as signal,
     )
-    from rtradar.antenna import Antenna as Antenna
     from rtradar.body import (
         Body as Body,
         Ellipsoids as Ellipsoids,
@@ -30,6 +29,11 @@ if TYPE_CHECKING:
         ExtensionError as ExtensionError,
         InputError as InputError,
         ValidityWarning as ValidityWarning,
+    )
+    from rtradar.front_end import (
+        Antenna as Antenna,
+        Interferer as Interferer,
+        Receiver as Receiver,
     )
     from rtradar.motion import (
         Motion as Motion,
@@ -52,7 +56,6 @@ if TYPE_CHECKING:
     )
     from rtradar.process import register_detector as register_detector
     from rtradar.radar import Radar as Radar, register_radar as register_radar
-    from rtradar.receiver import Interferer as Interferer, Receiver as Receiver
     from rtradar.scatter import (
         register_model as register_model,
         scattering_length as scattering_length,
@@ -69,17 +72,16 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 
 _NAMES = {
-    "antenna": "Antenna",
     "body": "Body Ellipsoids HumanMesh Person",
     "clouds": "Collection",
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
+    "front_end": "Antenna Interferer Receiver",
     "motion": "Motion load_motion register_reader synthetic_motion",
     "pipeline": "Comparison Experiment Result Simulation Sweep compare "
     "compare_recordings process_samples run simulate sweep",
     "process": "register_detector",
     "radar": "Radar register_radar",
-    "receiver": "Interferer Receiver",
     "scatter": "register_model scattering_length",
     "scene": "FollowingPath Object Scene Swinging Turning",
     "settings": "Breathing RunSettings",

@@ -15,11 +15,11 @@ import pytest
 import trimesh
 
 import rtradar as rt
-from rtradar.antenna import Antenna
 from rtradar.cli import main
 from rtradar.clouds.sample_files import Sample, is_whole, sample_path, write_sample
 from rtradar.errors import InputError
 from rtradar.exchange import open_samples
+from rtradar.front_end import Antenna
 from rtradar.motion.skeleton import NODES
 from rtradar.radar import Radar
 from rtradar.recognition import _of_scene

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.antenna import Antenna
+from rtradar.front_end import Antenna
 from rtradar.process import range_spectrum
 from rtradar.signal import Noise, synthesize
 

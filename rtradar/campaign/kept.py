@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_files import ARRAYS, KINDS
 from rtradar.description import Movers
-from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output.truth import EchoTable
 from rtradar.pipeline.output.writer import axes_of
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds, Processing, SourceOfCells

@@ -121,7 +121,7 @@ def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 def _compare_folders(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     if others := [name for name in options.motion if not os.path.isdir(name)]:
         raise InputError(f"'{others[0]}' is no folder, and others are; give folders, or recordings")
-    from rtradar.pipeline.compare_folders import compare_folders
+    from rtradar.pipeline import compare_folders
 
     found = compare_folders(options.motion, out=options.out, overwrite=options.overwrite)
     yield found.summary

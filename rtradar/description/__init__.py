@@ -1,7 +1,15 @@
 """What is simulated, as tables of people, radar, scene and settings, and the run file of it."""
 
-from rtradar.description.given import Movers, Moving, given_parts, load_mover
-from rtradar.description.read import Parts, parts_of, settings_of_table, with_value
+from rtradar.description.read import (
+    Movers,
+    Moving,
+    Parts,
+    given_parts,
+    load_mover,
+    parts_of,
+    settings_of_table,
+    with_value,
+)
 from rtradar.description.run_file import (
     MOST_FILES,
     check_files,
@@ -10,10 +18,10 @@ from rtradar.description.run_file import (
     path_from,
     read_run_file,
     refuse_another,
+    table_of,
     versions,
     write_run_file,
 )
-from rtradar.description.tables import table_of
 
 __all__ = [
     "MOST_FILES",

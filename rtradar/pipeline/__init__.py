@@ -1,14 +1,12 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.compare import compare, compare_recordings
+from rtradar.pipeline.compare import compare, compare_folders, compare_recordings
 from rtradar.pipeline.compared import Comparison
-from rtradar.pipeline.experiment import Experiment
+from rtradar.pipeline.experiment import Experiment, Sweep, sweep
 from rtradar.pipeline.processing import MEMORY_LIMIT_BYTES
 from rtradar.pipeline.recorded import process_samples
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.run import run
-from rtradar.pipeline.simulation import Simulation, simulate
-from rtradar.pipeline.sweep import Sweep, sweep
+from rtradar.pipeline.run import Simulation, run, simulate
 
 __all__ = [
     "MEMORY_LIMIT_BYTES",
@@ -18,6 +16,7 @@ __all__ = [
     "Simulation",
     "Sweep",
     "compare",
+    "compare_folders",
     "compare_recordings",
     "process_samples",
     "run",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,19 @@ from tqdm import tqdm
 from rtradar.body import Body, Person
 from rtradar.description import table_of
 from rtradar.echoes import Echoes
-from rtradar.pipeline.prepared_room import PreparedRoom
 from rtradar.pipeline.processing import Processing, block_chirps
 from rtradar.pipeline.timing import Stages
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
+from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.people_and_objects import PeopleAndObjects
+from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.signal import Noise, receive, synthesize
-from rtradar.signal.ghosts import AHEAD
+from rtradar.signal.clutter import RoomIf
+from rtradar.signal.ghosts import AHEAD, GhostIf
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.receiver import ReceiverStage
 from rtradar.system.files import uninterruptible
@@ -41,6 +43,22 @@ class SpectraSink(Protocol):
 
         The next call gets its spectra in the same array.
         """
+
+
+class PreparedRoom(NamedTuple):
+    """People and objects in a room: what is summed chirp by chirp, and the IF of the room itself.
+
+    ``model`` is that of the people, None of nobody, and ``summed`` the echoes of all that is
+    summed: all but ghosts whose IF samples are approximated, ``ghosts``. ``clutter`` is the room
+    itself. ``summary`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
+    """
+
+    model: RoomModel | None
+    summed: PeopleAndObjects
+    clutter: RoomIf
+    ghosts: GhostIf | None
+    summary: dict[str, Any]
+    limits: tuple[Limit, ...]
 
 
 @dataclass(frozen=True)

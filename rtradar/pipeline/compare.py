@@ -1,8 +1,7 @@
-"""`compare`: one recording by several echo models, with the same noise, and how far they differ."""
+"""`compare`: one recording by several echo models with the same noise, or folders of results."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -12,26 +11,28 @@ from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from rtradar.body import Person
 from rtradar.description import Movers, Moving, given_parts
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.compared import (
+    CONFIDENCE,
     MAP_PICTURES,
-    MEASURES,
-    Compared,
     Comparison,
+    best_frame,
     comparison_rows,
+    differing,
     draw_maps_and_clouds,
     figures_of,
     finite,
+    means_of,
+    open_run_maps,
+    unit_of,
     write_figures,
 )
-from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.pictures import removed
-from rtradar.pipeline.output.view import load_run_view
+from rtradar.pipeline.output.view import load_run_view, read_result, run_maps
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
@@ -50,8 +51,8 @@ from rtradar.settings import (
     settings_of,
     takes_settings,
 )
-from rtradar.system.checks import check_path
-from rtradar.system.output_folder import OutputFiles, atomic_folder
+from rtradar.system.checks import check_path, printable
+from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole
 
 _PICTURES = {
     "Echo power over time": "compare_power.png",
@@ -59,9 +60,13 @@ _PICTURES = {
     **MAP_PICTURES,
 }
 _COSTS = ("wall_s", "real_time_factor", "peak_memory_mb", "stages", "variant")
-_FILES = ("compare.html", "compare.json", "compare.csv", *files_of_pictures(_PICTURES.values()))
+_NAMED = ("compare.html", "compare.json", "compare.csv")
+_FILES = [*_NAMED, *files_of_pictures(_PICTURES.values())]
 _SEVERAL = OutputFiles("compare.json", r"compare\.(json|csv)")
-_CONFIDENCE = 0.95
+
+_OF_FOLDERS = files_of_runs(
+    "compare.json", [*_NAMED, *files_of_pictures(MAP_PICTURES.values())], ()
+)
 
 
 @takes_settings
@@ -142,12 +147,10 @@ def compare(
         )
         write_figures(folder, summary, kind)
 
-    def captures() -> dict[str, Capture]:
-        return {
-            name: prepare(moving, before, there, replace(asked, fidelity=name)) for name in names
-        }
+    def capture(name: str) -> Capture:
+        return prepare(moving, before, there, replace(asked, fidelity=name))
 
-    return Comparison(summary, Path(out), _captures=captures)
+    return Comparison(summary, Path(out), _captures=lambda: {name: capture(name) for name in names})
 
 
 @takes_settings
@@ -209,11 +212,12 @@ def compare_recordings(
         found.append(one.summary)
     first = found[0]
     summary: dict[str, Any] = {name: first[name] for name in ("reference", "versions")}
-    summary |= {"recordings": names, "confidence": _CONFIDENCE}
+    summary |= {"recordings": names, "confidence": CONFIDENCE}
     summary["fidelities"] = {
-        model: _means([one["fidelities"][model] for one in found]) for model in first["fidelities"]
+        model: means_of([one["fidelities"][model] for one in found])
+        for model in first["fidelities"]
     }
-    summary["other_seed"] = _means([one["other_seed"] for one in found])
+    summary["other_seed"] = means_of([one["other_seed"] for one in found])
     with atomic_folder(place, _SEVERAL, overwrite=overwrite) as folder:
         write_figures(folder, summary, _SEVERAL)
     return Comparison(summary, place)
@@ -228,20 +232,6 @@ def _file_name(motion: Moving) -> str:
         for one in everyone
     ]
     return re.sub(r"[^\w.-]+", "-", "-".join(names))[:40]
-
-
-def _means(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the mean of each figure over recordings, and its interval; None where one has none."""
-    means: dict[str, Any] = {}
-    for key, *_ in MEASURES:
-        values = [one[key] for one in found]
-        means[key] = None
-        if None not in values:
-            mean, count = float(np.mean(values)), len(values)
-            half = float(stdtrit(count - 1, (1 + _CONFIDENCE) / 2) * np.std(values, ddof=1))
-            half /= math.sqrt(count)
-            means[key] = {"mean": mean, "low": mean - half, "high": mean + half}
-    return means
 
 
 class _Occluded(NamedTuple):
@@ -299,7 +289,7 @@ def _figures(result: Result, occluded: _Occluded, reference: Result) -> dict[str
         "power_rms_db": finite(float(np.sqrt((power**2).mean()))),
         "field_error": finite(float(error)),
         "occluded_share": occluded.share,
-        **figures_of(_compared(result), _compared(reference)),
+        **figures_of(result, reference),
         "scatter_s": stages["scatter"] + stages["survey"],
         **{name: summary[name] for name in _COSTS},
         **{name: summary[name] for name in ("limits", "part_power_m2")},
@@ -312,11 +302,6 @@ def _budget(result: Result) -> LinkBudget:
     return result.link_budget
 
 
-def _compared(result: Result) -> Compared:
-    assert result.out is not None
-    return Compared(result.out, result.summary, result.radar, result.points)
-
-
 def _draw(
     results: Mapping[str, Result],
     occluded: Mapping[str, _Occluded],
@@ -324,7 +309,6 @@ def _draw(
     reference: str,
 ) -> tuple[dict[str, Path], FieldUnit]:
     """Draw the pictures of a comparison; return them and the unit of the power of parts."""
-    compared = {name: _compared(result) for name, result in results.items()}
     parameters, radar = results[reference].summary["parameters"], results[reference].radar
     spreading, title = parameters["spreading"], f"{parameters['motion']}, {radar.name}"
 
@@ -357,14 +341,108 @@ def _draw(
         return levels, unit.label("one channel")
 
     # The same frame of all, for they have the same times.
-    frame = compared[reference].best_frame()
-    with read_maps(compared[reference].maps) as maps:
+    frame = best_frame(results[reference])
+    with open_run_maps(results[reference]) as maps:
         at = f"window at {maps['time'][frame]:.2f} s"
         titles = (
             f"{title}{removed(maps['range_doppler'])}, {at}",
             title + removed(maps["spectrogram"]),
             title,
         )
-    frames, levels = [frame] * len(compared), (map_levels, column_levels)
-    drawn = draw_maps_and_clouds(folder, compared, frames, levels, titles)
+    frames, levels = [frame] * len(results), (map_levels, column_levels)
+    drawn = draw_maps_and_clouds(folder, results, frames, levels, titles)
     return dict(zip(_PICTURES, (power, parts), strict=False)) | drawn, part_unit
+
+
+# -- folders ---------------------------------------------------------------------------------------
+
+
+def compare_folders(
+    folders: Sequence[str | Path], *, out: str | Path, overwrite: bool = False
+) -> Comparison:
+    """Compare folders that `run` or `process_samples` made, such as measured and simulated ones.
+
+    The last folder is the reference. Frames are compared one by one from the start, as far as the
+    shorter of two captures goes. Where the unit of the samples differs, the mean difference of the
+    maps is the factor between both, and root mean squares are about it.
+
+    Parameters
+    ----------
+    folders : sequence of path
+        Two folders or more of different names, whose maps have the same axes.
+    out : path
+        Folder for ``compare.json``, ``compare.html`` and pictures.
+    overwrite : bool
+        Whether files that ``out`` holds under names of the new ones are replaced even where no
+        ``compare.json`` lists them.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two folders, two have one name, one is damaged or holds no maps, or
+        their axes differ; nothing is written then.
+    """
+    names = [printable(Path(folder).resolve().name) for folder in folders]
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise InputError(
+            f"folders {', '.join(names) or '(none)'}; give two or more, each of another name"
+        )
+    read = {}
+    for name, folder in zip(names, map(Path, folders), strict=True):
+        check_whole(folder)
+        read[name] = read_result(folder)
+    for path in folders:
+        _check_axes(Path(path), Path(folders[-1]))
+    found = {
+        name: figures_of(own, read[names[-1]])
+        | {"windows": own.summary.get("windows"), "xyz_points": own.summary.get("xyz_points")}
+        | {"unit": unit_of(own), "parameters": own.summary["parameters"]}
+        for name, own in read.items()
+    }
+    # What was measured has no run file.
+    runs = {name: own for name, folder in read.items() if (own := folder.summary.get("run"))}
+    summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
+    with atomic_folder(Path(out), _OF_FOLDERS, overwrite=overwrite) as place:
+        pictures = _draw_folders(place, read)
+        rows = comparison_rows(summary)
+        comparison.write_folders(place / "compare.html", summary, rows, pictures)
+        write_figures(place, summary, _OF_FOLDERS)
+    return Comparison(summary, Path(out))
+
+
+def _check_axes(folder: Path, reference: Path) -> None:
+    """Raise InputError where maps cannot be laid on those of the reference."""
+    with run_maps(folder) as ours, run_maps(reference) as other:
+        for axis in ("range", "velocity", "spectrogram_velocity"):
+            if axis not in ours or axis not in other:
+                raise InputError(f"'{folder}' or the reference has no maps over {axis}")
+            one, two = ours[axis][:], other[axis][:]
+            if one.shape != two.shape or not np.allclose(one, two, rtol=1e-6):
+                says = (f"{len(one)} steps to {one[-1]:.6g}", f"{len(two)} to {two[-1]:.6g}")
+                raise InputError(
+                    f"'{folder}' has a {axis} axis of {says[0]}, '{reference}' of "
+                    f"{says[1]}; make both with one radar"
+                )
+        if not len(ours["time"]) or not len(ours["spectrogram_time"]):
+            raise InputError(f"'{folder}' holds no frame; give a longer capture")
+
+
+def _draw_folders(place: Path, folders: Mapping[str, Result]) -> dict[str, Path]:
+    """Draw the pictures, each map in decibels below its own maximum."""
+
+    def levels(powers: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], str]:
+        units = {
+            name: field_unit(folders[name].radar, strongest_m2=float(power.max()), relative=True)
+            for name, power in powers.items()
+        }
+        found = {name: units[name].level(power) for name, power in powers.items()}
+        return found, next(iter(units.values())).label("all channels")
+
+    names = " and ".join(folders)
+    titles = f"{names}, frame of most detections of each", names, names
+    frames = [best_frame(folder) for folder in folders.values()]
+    return draw_maps_and_clouds(place, folders, frames, (levels, levels), titles)

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
 from rtradar.cards import text_table
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.map_store import read_maps
 from rtradar.pipeline.output.truth import compared_echoes
+from rtradar.pipeline.output.writer import read_maps
+from rtradar.pipeline.result import Result
 from rtradar.radar import Radar
 from rtradar.report import comparison
 from rtradar.report.canvas import VELOCITY_LABEL, above_floor, thinned
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 
 MEASURES = (
     # key, heading, digits
+    ("windows", "Frames", 0),
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
     ("field_error", "Field of the echoes, rms difference over rms", 3),
@@ -41,12 +45,13 @@ MEASURES = (
     ("spectrogram_correlation", "Spectrogram correlation [dB maps]", 3),
     ("spectrogram_rms_db", "Spectrogram, rms difference [dB]", 2),
     ("rdt_chamfer_bins", "RDT clouds, Chamfer distance [bins]", 2),
+    ("xyz_points", "Points in space", 0),
     ("scatter_s", "Scattering [s]", 2),
     ("wall_s", "Whole run [s]", 2),
     ("real_time_factor", "Seconds a second of radar", 2),
     ("peak_memory_mb", "Peak memory [MB]", 0),
 )
-"""Figures of each model, in the order of the chain; differences are to the last model named."""
+"""Figures that are shown where they are known; differences are to the last model or folder."""
 
 MAP_PICTURES = {
     "Range-Doppler": "compare_range_doppler.png",
@@ -54,6 +59,10 @@ MAP_PICTURES = {
     "Range-Doppler-time clouds": "compare_cloud.png",
 }
 """Files of the pictures that `draw_maps_and_clouds` draws, by their titles."""
+
+
+CONFIDENCE = 0.95
+"""Confidence of the intervals of means over recordings."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +75,10 @@ class Comparison:
         Contents of ``compare.json``.
     out : path
         Folder of the files; the run of each model is in a folder of its name.
-    measures : tuple
-        Key, heading and digits of each figure that is shown.
     """
 
     summary: dict[str, Any]
     out: Path
-    measures: tuple[tuple[str, str, int], ...] = MEASURES
     _captures: Callable[[], Mapping[str, Capture]] | None = None
 
     @cached_property
@@ -94,34 +100,27 @@ class Comparison:
 
     def table(self) -> str:
         """Return the figures as aligned text, one column for each model."""
-        return text_table(comparison_rows(self.summary, self.measures))
+        return text_table(comparison_rows(self.summary))
 
 
-class Compared(NamedTuple):
-    """One of the results that are compared: its files and summary, its radar and RDT cloud."""
-
-    out: Path
-    summary: Mapping[str, Any]
-    radar: Radar
-    points: NDArray[np.float64]
-
-    @property
-    def maps(self) -> Path:
-        """File of the maps."""
-        return self.out / "maps.h5"
-
-    @property
-    def unit(self) -> str:
-        """Unit of the samples."""
-        return str(self.summary["parameters"].get("unit", "m"))
-
-    def best_frame(self) -> int:
-        """Return the number of the frame with most detections."""
-        with read_maps(self.maps) as maps:
-            return int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
+def open_run_maps(result: Result) -> h5py.File:
+    """Open the maps of a result that is in a folder."""
+    assert result.out is not None
+    return read_maps(result.out / "maps.h5")
 
 
-def figures_of(ours: Compared, reference: Compared) -> dict[str, Any]:
+def unit_of(result: Result) -> str:
+    """Return the unit of the samples."""
+    return str(result.summary["parameters"].get("unit", "m"))
+
+
+def best_frame(result: Result) -> int:
+    """Return the number of the frame with most detections."""
+    with open_run_maps(result) as maps:
+        return int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
+
+
+def figures_of(ours: Result, reference: Result) -> dict[str, Any]:
     """Return how far maps and clouds differ; differences of the reference from itself are zero."""
     return {
         **_map_figures(ours, reference),
@@ -130,12 +129,7 @@ def figures_of(ours: Compared, reference: Compared) -> dict[str, Any]:
     }
 
 
-def write_figures(
-    folder: Path,
-    summary: dict[str, Any],
-    kind: OutputFiles,
-    measures: Sequence[tuple[str, str, int]] = MEASURES,
-) -> None:
+def write_figures(folder: Path, summary: dict[str, Any], kind: OutputFiles) -> None:
     """Write what a comparison found as ``compare.json``, and its table as ``compare.csv``.
 
     The table has a row for each measure and column; over several recordings that is the mean, with
@@ -145,7 +139,7 @@ def write_figures(
     rows = [
         (key, name, *((value or {}).values() if several else (value,)))
         for name, figures in _columns(summary)
-        for key, value in ((key, figures[key]) for key, *_ in measures)
+        for key, value in ((key, figures[key]) for key, *_ in MEASURES if key in figures)
     ]
     head = ("measure", "of", *(("mean", "low", "high") if several else ("value",)))
     write_tables(folder, summary, kind, head, rows)
@@ -176,16 +170,15 @@ def _columns(summary: Mapping[str, Any]) -> Iterable[tuple[str, Mapping[str, Any
         yield f"{summary['reference']}, other seed", summary["other_seed"]
 
 
-def comparison_rows(
-    summary: Mapping[str, Any], measures: Sequence[tuple[str, str, int]] = MEASURES
-) -> list[list[str]]:
+def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """Return a comparison as text: a heading row, then a row a measure with a column a model."""
     headings, columns = zip(*_columns(summary), strict=True)
     reference = summary["reference"]
     told = (f"{name} (reference)" if name == reference else name for name in headings)
     rows = [["", *told]]
-    for key, heading, digits in measures:
-        rows.append([heading, *(_shown(figures[key], digits) for figures in columns)])
+    for key, heading, digits in MEASURES:
+        if key in columns[0]:
+            rows.append([heading, *(_shown(figures[key], digits) for figures in columns)])
     return rows
 
 
@@ -197,6 +190,42 @@ def _shown(value: float | Mapping[str, float] | None, digits: int) -> str:
         half = value["high"] - value["mean"]
         return f"{value['mean']:.{digits}f} ± {half:.{digits}f}"
     return f"{value:.{digits}f}"
+
+
+def means_of(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the mean of each figure over recordings, and its interval; None where one has none."""
+    means: dict[str, Any] = {}
+    for key in [key for key, *_ in MEASURES if key in found[0]]:
+        values = [one[key] for one in found]
+        means[key] = None
+        if None not in values:
+            mean, count = float(np.mean(values)), len(values)
+            half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
+            half /= math.sqrt(count)
+            means[key] = {"mean": mean, "low": mean - half, "high": mean + half}
+    return means
+
+
+def differing(runs: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the keys of run files whose values are not the same in all, with these by name."""
+    flat = {name: dict(_flat(run)) for name, run in runs.items()}
+    keys = dict.fromkeys(key for own in flat.values() for key in own)
+    found = {key: {name: own.get(key) for name, own in flat.items()} for key in keys}
+    return {
+        key: values
+        for key, values in found.items()
+        if any(value != next(iter(values.values())) for value in values.values())
+    }
+
+
+def _flat(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield each value of tables in tables with its dotted key; versions are no settings."""
+    entries = value.items() if isinstance(value, Mapping) else enumerate(value)
+    for name, own in entries:
+        if key or name not in ("versions", "files"):
+            where = f"{key}.{name}" if key else str(name)
+            tables = isinstance(own, list) and own and isinstance(own[0], dict)
+            yield from _flat(own, where) if isinstance(own, dict) or tables else [(where, own)]
 
 
 # -- agreement of maps and clouds ------------------------------------------------------------------
@@ -266,13 +295,13 @@ def chamfer_bins(
     return finite(chamfer(points, reference, bins))
 
 
-def _map_figures(ours: Compared, reference: Compared) -> dict[str, float | None]:
+def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
     """Compare range-Doppler maps over cells that either detects, detections, and spectrograms.
 
     Of captures of other lengths the frames at the start count. Where units differ there is a gain
     between both, and root mean squares are about the mean difference.
     """
-    with read_maps(ours.maps) as first, read_maps(reference.maps) as second:
+    with open_run_maps(ours) as first, open_run_maps(reference) as second:
         cells, both, either = [], 0, 0
         for frame in range(min(len(maps["time"]) for maps in (first, second))):
             mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))
@@ -287,7 +316,7 @@ def _map_figures(ours: Compared, reference: Compared) -> dict[str, float | None]
             for maps in (first, second)
         )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
-    if ours.unit != reference.unit:
+    if unit_of(ours) != unit_of(reference):
         levels, alike = (
             one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
             for one in (levels, alike)
@@ -315,7 +344,7 @@ Levels = Callable[[Mapping[str, NDArray[Any]]], tuple[dict[str, NDArray[np.float
 
 def draw_maps_and_clouds(
     place: Path,
-    compared: Mapping[str, Compared],
+    compared: Mapping[str, Result],
     frames: Sequence[int],
     levels: tuple[Levels, Levels],
     titles: tuple[str, str, str],
@@ -330,11 +359,11 @@ def draw_maps_and_clouds(
     powers, thin = {}, {}
     times = []
     for one in compared.values():
-        with read_maps(one.maps) as maps:
+        with open_run_maps(one) as maps:
             times.append(maps["spectrogram_time"][:])
     shortest = min(times, key=len)
     for (name, one), frame in zip(compared.items(), frames, strict=True):
-        with read_maps(one.maps) as maps:
+        with open_run_maps(one) as maps:
             powers[name] = maps["range_doppler"][frame]
             if len(shortest):
                 # A spectrogram is read in parts: that of an hour is large.

@@ -1,19 +1,28 @@
-"""`Experiment`: what is simulated, to be changed by keys, run, and run again."""
+"""`Experiment`: what is simulated, to be changed by keys, run, and run again for several values."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rtradar.cards import text_table
 from rtradar.description import Parts, parts_of, read_run_file, with_value
+from rtradar.errors import InputError
+from rtradar.pipeline.compared import chamfer_bins, write_tables
+from rtradar.pipeline.result import Result
 from rtradar.settings import SimulationOptions
+from rtradar.system.checks import check_path
+from rtradar.system.output_folder import OutputFiles, atomic_folder, one_of
 
 if TYPE_CHECKING:
-    from rtradar.pipeline.result import Result
-    from rtradar.pipeline.simulation import Simulation
+    from rtradar.pipeline.run import Simulation
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +138,163 @@ class Experiment:
         InputError, BackendError, ExtensionError
             As of `rtradar.simulate`.
         """
-        from rtradar.pipeline.simulation import simulate
+        from rtradar.pipeline.run import simulate
 
         people, radar, scene, settings = self.parts
         taken = SimulationOptions.__annotations__
         options: Any = {name: value for name, value in vars(settings).items() if name in taken}
         return simulate(people, radar, scene, **options)
+
+
+# -- several values of some keys ------------------------------------------------------------------
+
+FIGURES = {
+    "snr_db": "SNR of people [dB]",
+    "signal_to_clutter_db": "signal to clutter [dB]",
+    "detections": "detections",
+    "of_room": "points in space of nobody, fraction",
+    "cloud_bins": "distance of the RDT cloud from the first [bins]",
+}
+"""What is listed of each run, and drawn."""
+
+_MOST_RUNS = 1000
+_FILES = OutputFiles("sweep.json", one_of(("sweep.json", "sweep.csv", "sweep.png")))
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Results of a sweep.
+
+    Parameters
+    ----------
+    summary : dict
+        Contents of ``sweep.json``: the ``keys``, and of each run its ``folder``, its ``values`` in
+        the order of the keys, and its ``figures``.
+    out : path
+        Folder of the files, with the run of each in a folder of its own.
+    """
+
+    summary: dict[str, Any]
+    out: Path
+
+    def table(self) -> str:
+        """Return the figures as aligned text, one line for each run."""
+        head = [*self.summary["keys"], *FIGURES]
+        rows = [
+            [*map(str, run["values"]), *(_short(run["figures"][name]) for name in FIGURES)]
+            for run in self.summary["runs"]
+        ]
+        return text_table([head, *rows])
+
+
+def sweep(
+    experiment: Experiment,
+    values: Mapping[str, Sequence[object]],
+    *,
+    out: str | Path,
+    overwrite: bool = False,
+    pictures: bool = True,
+) -> Sweep:
+    """Run an experiment with every combination of the values of some keys.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        What is the same in all runs.
+    values : mapping of str to sequence
+        Values of each dotted key, such as ``{"radar.pitch_deg": [-15, 0]}``.
+    out : path
+        Folder for the run of each, and for ``sweep.json``, ``sweep.csv`` and ``sweep.png``.
+    overwrite : bool
+        Whether files of other origin are replaced.
+    pictures : bool
+        Whether pictures of the runs are drawn.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    InputError
+        Where a key leads nowhere, there are too many runs, or as of `rtradar.run`.
+    BackendError
+        As of `rtradar.run`.
+
+    Notes
+    -----
+    Signal to clutter is that of people to the static clutter of their range cells, before its
+    removal; the distance of clouds that of Chamfer, with steps of time, range and velocity as the
+    units.
+    """
+    place, keys = check_path("out", out), list(values)
+    combinations = list(itertools.product(*values.values()))
+    if not keys or not 1 <= len(combinations) <= _MOST_RUNS:
+        raise InputError(f"sweep: {len(combinations)} runs; allowed are 1 to {_MOST_RUNS}")
+    variants = []
+    for combination in combinations:
+        own = experiment
+        for key, value in zip(keys, combination, strict=True):
+            own = own.replace(key, value)
+        _ = own.parts  # all are refused before the first is run
+        variants.append(own)
+    runs: list[dict[str, Any]] = []
+    first: Result | None = None
+    for number, (own, combination) in enumerate(zip(variants, combinations, strict=True), start=1):
+        # Of a path the name of its file.
+        short = (Path(one).stem if isinstance(one, str) else one for one in combination)
+        named = zip((key.rpartition(".")[2] for key in keys), short, strict=True)
+        told = re.sub(r"[^\w.=-]+", "-", "-".join(f"{key}={value}" for key, value in named))
+        folder = f"{number:03d}-{told[:60]}"
+        result = own.run(place / folder, overwrite=overwrite, pictures=pictures)
+        first = first or result
+        figures = _figures(result, first)
+        runs.append({"folder": folder, "values": list(combination), "figures": figures})
+    summary: dict[str, Any] = {"keys": keys, "runs": runs}
+    with atomic_folder(place, _FILES, overwrite=overwrite) as written:
+        rows = [
+            (run["folder"], *run["values"], *(run["figures"][name] for name in FIGURES))
+            for run in runs
+        ]
+        _draw(written / "sweep.png", summary)
+        write_tables(written, summary, _FILES, ("folder", *keys, *FIGURES), rows)
+    return Sweep(summary, place)
+
+
+def _figures(result: Result, first: Result) -> dict[str, float | None]:
+    summary, source = result.summary, result.spatial.source
+    echo, noise = summary["echo_power_m2"], summary["noise_power_m2"]
+    room = summary.get("room", {}).get("clutter", {})
+    return {
+        "snr_db": float(10 * np.log10(echo / noise)) if echo > 0 and noise > 0 else None,
+        "signal_to_clutter_db": room.get("signal_to_clutter_db"),
+        "detections": summary["detections"],
+        "of_room": None if source is None or not len(source) else float((source == -1).mean()),
+        "cloud_bins": chamfer_bins(result.points, first.points, result.radar),
+    }
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+def _draw(path: Path, summary: Mapping[str, Any]) -> None:
+    """Draw each figure over the runs: over the value, where one key has numbers."""
+    from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure
+
+    runs, keys = summary["runs"], summary["keys"]
+    shown = [name for name in FIGURES if any(run["figures"][name] is not None for run in runs)]
+    numbers = len(keys) == 1 and all(isinstance(run["values"][0], int | float) for run in runs)
+    places = [run["values"][0] if numbers else n for n, run in enumerate(runs)]
+    figure = new_figure(0.6 + 1.5 * len(shown))
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, name in zip(panels, shown, strict=True):
+        found = [run["figures"][name] for run in runs]
+        drawn = [np.nan if value is None else value for value in found]
+        axes.plot(places, drawn, "o-" if numbers else "o", color=LIGHT.cycle[0])
+        dress(axes, title=FIGURES[name])
+    panels[-1].set_xlabel(keys[0] if numbers else ", ".join(keys))
+    if not numbers:
+        labels = ["\n".join(map(str, run["values"])) for run in runs]
+        panels[-1].set_xticks(places, labels)
+    save_figure(figure, path)

@@ -31,9 +31,8 @@ from rtradar.process import (
     takes_channels,
     window_cycles,
 )
-from rtradar.process.side_lobes import RangeSideLobes, SeenRanges
 from rtradar.process.spectrogram import SlidingSpectrogram
-from rtradar.process.window_functions import DEFAULT_WINDOWS
+from rtradar.process.window_functions import DEFAULT_WINDOWS, RangeSideLobes, SeenRanges
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
 from rtradar.signal import separate

@@ -13,17 +13,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.output.map_store import open_maps
-from rtradar.pipeline.output.pictures import draw_found
+from rtradar.pipeline.output.pictures import draw_found, write_page
 from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
-from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, write_clouds
+from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, open_maps, write_clouds
 from rtradar.pipeline.prepare import with_background
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps, refuse_large_maps
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
-from rtradar.report import write_report
-from rtradar.settings import ProcessingOptions, RunSettings, settings_of
+from rtradar.settings import ProcessingOptions, settings_of
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import brief
 from rtradar.system.clock import Moment
@@ -115,49 +113,29 @@ def process_samples(
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
     processing = with_background(replace(Processing.of(radar, settings), unit=unit))
-    maps, file = None, BytesIO()
     if out is None:
+        file = BytesIO()
         clouds = _stream(blocks, processing, file)
         with processing.stages.time("write"), open_maps(file) as maps:
             maps.load()
-        summary = finished(
-            summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-        )
-    else:
-        with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
-            clouds, summary = _write(folder, blocks, processing, settings, started)
-    return Result(
-        points=clouds.rdt.points,
-        spatial=clouds.spatial,
-        summary=summary,
-        radar=radar,
-        out=None if out is None else Path(out).absolute(),
-        _in_memory=maps,
-    )
+        result = _result(blocks, processing, clouds, started)
+        return replace(result, summary=finished(result.summary), _in_memory=maps)
+    with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
+        clouds = _stream(blocks, processing, folder / "maps.h5")
+        with processing.stages.time("write"):
+            write_clouds(folder, clouds)
+        result = _result(blocks, processing, clouds, started)
+        with processing.stages.time("pictures"):
+            pictures, _ = draw_found(folder, result)
+        with processing.stages.time("report"):
+            write_page(folder, result, pictures)
+        summary = finished(result.summary | cost(processing, blocks.n_chirps, started), folder)
+        return replace(result, summary=summary, out=Path(out).absolute())
 
 
-def _write(
-    folder: Path, blocks: _Blocks, processing: Processing, settings: RunSettings, started: Moment
-) -> tuple[Clouds, dict[str, Any]]:
-    """Write maps, clouds, pictures, report and summary; return the clouds and the summary."""
-    radar = processing.radar
-    clouds = _stream(blocks, processing, folder / "maps.h5")
-    with processing.stages.time("write"):
-        write_clouds(folder, clouds)
-    with processing.stages.time("pictures"):
-        pictures, _ = draw_found(folder, clouds, radar, settings)
-    summary = summary_of_samples(processing, settings, blocks.n_chirps, clouds, started)
-    with processing.stages.time("report"):
-        write_report(
-            folder / "report.html",
-            radar=radar,
-            summary=summary,
-            pictures=pictures,
-            rdt_points=clouds.rdt.points,
-            spatial=clouds.spatial,
-        )
-    summary |= cost(processing, blocks.n_chirps, started)
-    return clouds, finished(summary, folder)
+def _result(blocks: _Blocks, processing: Processing, clouds: Clouds, started: Moment) -> Result:
+    summary = summary_of_samples(processing, blocks.n_chirps, clouds, started)
+    return Result(clouds.rdt.points, clouds.spatial, summary, processing.radar)
 
 
 def _stream(blocks: _Blocks, processing: Processing, file: Path | BinaryIO) -> Clouds:

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from rtradar.cards import html_card, text_card
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.echo_table import EchoTable
-from rtradar.pipeline.output.map_store import open_maps, read_truth
 from rtradar.pipeline.output.snapshots import snapshots
+from rtradar.pipeline.output.truth import EchoTable
+from rtradar.pipeline.output.writer import open_maps, read_truth
 from rtradar.radar import Radar
 from rtradar.report.canvas import central_limits
 from rtradar.report.html import InlinePage, signal_to_noise
@@ -27,6 +26,7 @@ from rtradar.scatter.link_budget import LinkBudget
 if TYPE_CHECKING:
     import xarray as xr
 
+    from rtradar.pipeline.experiment import Experiment
     from rtradar.report.plots import Plots
 
 
@@ -138,22 +138,13 @@ class Result:
             If the results are those of IF samples, where there is no body to show, or if files of
             the folder are missing or damaged.
         """
-        from rtradar.pipeline.output.view import assembled, load_run_view
+        from rtradar.pipeline.output.view import load_run_view, run_view_of
         from rtradar.report.run_view import write_view
 
         if self._table is not None:
-            capture = self._table.capture
             maps = {str(name): values.values for name, values in self.maps.variables.items()}
-            found = (
-                maps,
-                snapshots(self._table),
-                self.points,
-                self.spatial,
-                self.radar,
-                self.summary,
-            )
-            run_view = assembled(*found, capture.processing.window_functions)
-        elif self.out is not None and self.link_budget is not None:
+            run_view = run_view_of(self, maps, snapshots(self._table))
+        elif self.out is not None:
             run_view = load_run_view(self.out)
         else:
             raise InputError(

@@ -1,11 +1,18 @@
-"""`run`: one recording, one radar, one scene, one model, streamed from motion to point cloud."""
+"""`run` and `simulate`: a recording before a radar in a scene, to point clouds or IF samples."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO, Unpack
+from typing import TYPE_CHECKING, Any, BinaryIO, Unpack
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.cards import text_card
 from rtradar.description import (
     Movers,
     Moving,
@@ -17,26 +24,37 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.echo_table import EchoTable
-from rtradar.pipeline.output.map_store import open_maps, read_maps, read_truth
-from rtradar.pipeline.output.pictures import draw_pictures
+from rtradar.pipeline.output.pictures import draw_pictures, write_page
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
+from rtradar.pipeline.output.truth import EchoTable, chirps_between, labelled_echoes
 from rtradar.pipeline.output.view import run_view_of
-from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, if_array, write_clouds
+from rtradar.pipeline.output.writer import (
+    RUN_FILES,
+    RunWriter,
+    if_array,
+    open_maps,
+    read_maps,
+    read_truth,
+    write_clouds,
+)
 from rtradar.pipeline.prepare import people_in, prepare
-from rtradar.pipeline.processing import Clouds
+from rtradar.pipeline.processing import Clouds, block_chirps, refuse_large
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
-from rtradar.report import write_report
 from rtradar.report.snapshots import save_snapshots
+from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
-from rtradar.settings import RunOptions, RunSettings, settings_of, takes_settings
+from rtradar.settings import RunOptions, RunSettings, SimulationOptions, settings_of, takes_settings
+from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import check_path
 from rtradar.system.clock import Moment
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _MOMENTS = 100, 20.0  # of the moving body on the page, and as many a second at most
 
@@ -118,16 +136,14 @@ def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSett
     capture = prepare(motion, radar, scene, settings, in_memory=True)
     file = BytesIO()
     clouds, table = _stream(capture, file)
-    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
+    result = _result(capture, clouds, started, rays_before)
     with capture.stages.time("write"), open_maps(file) as maps:
         maps.load()
-        _add_room(summary, capture, maps)
+        result.summary.update(room_findings(capture, maps))
         truth = read_truth(file)
-    described = capture.described()
-    summary["run"] = in_words(described)
-    summary = finished(summary | cost(capture.processing, capture.n_chirps, started))
-    kept = {"_in_memory": maps, "_truth": truth, "_table": table}
-    return _result(capture, clouds, summary, described, **kept)
+    result.summary["run"] = in_words(capture.described())
+    summary = finished(result.summary | cost(capture.processing, capture.n_chirps, started))
+    return replace(result, summary=summary, _in_memory=maps, _truth=truth, _table=table)
 
 
 def run_into(
@@ -149,67 +165,47 @@ def run_into(
         refuse_another(out, [person.motion for person in people_in(scene, motion)[1]])
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
-    described = capture.described()
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
         clouds, table = _stream(capture, folder / "maps.h5", kept)
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
+        result = _result(capture, clouds, started, rays_before)
         drawn: dict[str, Path] = {}
         if pictures:
             with capture.stages.time("pictures"):
-                drawn = draw_pictures(folder, capture, clouds)
-        summary = summary_of(capture, clouds, started)
-        summary["rays_traced"] = rays_traced() - rays_before
-        summary["run"] = write_run_file(folder, place or out, described)
-        with capture.stages.time("view"):
-            save_snapshots(folder / "view.npz", snapshots(table))
-            with read_maps(folder / "maps.h5") as maps:
-                _add_room(summary, capture, maps)
+                drawn = draw_pictures(folder, capture, result)
+        summary = result.summary
+        summary["run"] = write_run_file(folder, place or out, capture.described())
+        with capture.stages.time("view"), read_maps(folder / "maps.h5") as maps:
+            shown = snapshots(table)
+            save_snapshots(folder / "view.npz", shown)
+            summary |= room_findings(capture, maps)
+            run_view = run_view_of(result, maps, shown.every(shown.stride(*_MOMENTS)))
         with capture.stages.time("report"):
-            write_report(
-                folder / "report.html",
-                radar=capture.radar,
-                summary=summary,
-                pictures=drawn,
-                rdt_points=clouds.rdt.points,
-                spatial=clouds.spatial,
-                run_view=run_view_of(
-                    folder,
-                    summary,
-                    capture.radar,
-                    capture.processing.window_functions,
-                    at_most=_MOMENTS,
-                ),
-            )
+            write_page(folder, result, drawn, run_view)
         summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
-        summary = finished(summary, folder)
-    return _result(capture, clouds, summary, described, out=out.absolute())
+        return replace(result, summary=finished(summary, folder), out=out.absolute())
 
 
-def _result(
-    capture: Capture,
-    clouds: Clouds,
-    summary: dict[str, Any],
-    described: dict[str, Any],
-    **where: Any,
-) -> Result:
-    """Return the result of a capture, whose maps are ``where`` it says."""
-    found = clouds.rdt.points, clouds.spatial, summary, capture.radar, capture.link_budget
-    return Result(*found, experiment=Experiment(described), **where)
+def _result(capture: Capture, clouds: Clouds, started: Moment, rays_before: int) -> Result:
+    """Return what a capture found, whose summary begins with what is known so far."""
+    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
+    return Result(
+        clouds.rdt.points,
+        clouds.spatial,
+        summary,
+        capture.radar,
+        capture.link_budget,
+        experiment=Experiment(capture.described()),
+    )
 
 
 def _start() -> tuple[Moment, int]:
     """Return the moment at which a run starts, and the number of rays traced before."""
     forget_peak_memory()
     return Moment.now(), rays_traced()
-
-
-def _add_room(summary: dict[str, Any], capture: Capture, maps: Any) -> None:
-    """Add what the open maps tell about the room, where there is one."""
-    if "room" in summary:
-        summary["room"] = summary["room"] | room_findings(capture, maps)
 
 
 def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> tuple[Clouds, EchoTable]:
@@ -221,3 +217,200 @@ def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> tuple[
     with RunWriter(maps, capture.processing, capture.title, starts, table) as writer:
         capture.stream(writer, kept)
         return writer.finish(capture.body), table
+
+
+# -- IF samples, whole or block by block ----------------------------------------------------------
+
+
+@takes_settings
+def simulate(
+    motion: Moving,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
+    **options: Unpack[SimulationOptions],
+) -> Simulation:
+    """Prepare the simulation of a recording, which gives IF samples when it is asked for them.
+
+    Parameters
+    ----------
+    motion, radar, scene
+        The same as for `run`.
+    **options
+        Settings of the simulation, such as ``fidelity``, ``snr_db`` or ``duration_s``: fields of
+        `rtradar.RunSettings`.
+
+    Returns
+    -------
+    Simulation
+        Its samples are those that `run` processes with the same settings.
+
+    Raises
+    ------
+    InputError, BackendError, ExtensionError
+        As in `run`.
+
+    Examples
+    --------
+    >>> import rtradar as rt
+    >>> motion = rt.synthetic_motion("kick", duration_s=0.5)
+    >>> radar = rt.Radar.preset("paper-12ghz")
+    >>> capture = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.15, snr_db=10)
+    >>> capture.samples.dims, capture.samples.shape
+    (('chirp', 'rx', 'sample'), (2400, 8, 256))
+    >>> sum(len(block) for block in capture.blocks())
+    2400
+    """
+    settings = settings_of("simulate", SimulationOptions, options)
+    return Simulation(prepare(*given_parts(motion, radar, scene, settings), settings))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation:
+    """Capture of a moving person by a radar, whose IF samples are computed when they are asked for.
+
+    `simulate` makes it. IF samples are complex amplitudes [m], as `rtradar.signal.synthesize`
+    defines them, with noise and with the echoes of the room.
+    """
+
+    _capture: Capture
+
+    @property
+    def radar(self) -> Radar:
+        """Radar at its position in the scene."""
+        return self._capture.radar
+
+    @property
+    def link_budget(self) -> LinkBudget:
+        """Echo power of each part over time, and its occluded fraction."""
+        return self._capture.link_budget
+
+    @property
+    def noise_power_m2(self) -> float:
+        """Noise power of one complex sample [m^2]."""
+        return self._capture.noise.power
+
+    @property
+    def duration_s(self) -> float:
+        """Duration of the capture, whole cycles [s]."""
+        return self.radar.duration_of(self._capture.n_chirps)
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Shape (chirp, rx, sample) of the samples.
+
+        Under Doppler division all transmitters transmit at once, and each cycle is one chirp.
+        """
+        chirps = self._capture.n_chirps // chirps_together(self.radar)
+        return chirps, self.radar.n_rx, self.radar.samples_per_chirp
+
+    @cached_property
+    def samples(self) -> xr.DataArray:
+        """IF samples (chirp, rx, sample) complex64, computed at the first access and kept.
+
+        Coordinates are the time of each chirp, its transmitter, and the time within the chirp. An
+        `InputError` is raised if they are larger than `rtradar.pipeline.MEMORY_LIMIT_BYTES`;
+        `blocks` gives them in little memory.
+        """
+        n_bytes = float(np.prod(self.shape, dtype=np.float64)) * np.dtype(np.complex64).itemsize
+        refuse_large(
+            f"IF samples of {self.duration_s:.3g} s of radar '{self.radar.name}'",
+            n_bytes,
+            "take them block by block, blocks(), or keep them in a folder: "
+            "rt.run(..., save_if=True, out=...)",
+        )
+        whole = np.empty(self.shape, np.complex64)
+        for begin, values in self._blocks():
+            whole[begin : begin + len(values)] = values
+        return if_samples(whole, self.radar)
+
+    def echoes(self, start_s: float = 0.0, duration_s: float | None = None) -> xr.Dataset:
+        """Compute the echoes of each chirp by the level of the simulation: what was traced.
+
+        Parameters
+        ----------
+        start_s : float
+            Time from which on chirps are taken, since the start of the capture [s].
+        duration_s : float, optional
+            Time over which they are taken [s]; to the end of the capture if left out.
+
+        Returns
+        -------
+        xarray.Dataset
+            By ``chirp``, ``rx`` and ``echo``: ``length_m``, the length of the whole path from Tx to
+            Rx at the centre of the chirp [m], float64; ``amplitude``, as `rtradar.Echoes` defines
+            it, at the centre of the sweep [m], complex128; and ``visible``, whether it is not 0.
+            Coordinates are the ``time`` [s] and the number ``tx`` of each chirp, and of each echo
+            the names of its ``part`` and ``path``, the number of the ``person``, -1 of an object,
+            and the number of its ``bounces``.
+
+        Raises
+        ------
+        InputError
+            If no chirp is in that time, or the echoes take more memory than results may.
+
+        Examples
+        --------
+        >>> import rtradar as rt
+        >>> motion = rt.synthetic_motion("kick", duration_s=0.5)
+        >>> radar = rt.Radar.preset("paper-12ghz")
+        >>> capture = rt.simulate(motion, radar, fidelity="analytic", duration_s=0.15)
+        >>> echoes = capture.echoes(duration_s=0.01)
+        >>> dict(echoes.sizes)
+        {'chirp': 160, 'rx': 8, 'echo': 21}
+        """
+        return labelled_echoes(self._capture, chirps_between(self._capture, start_s, duration_s))
+
+    def blocks(self) -> Iterator[xr.DataArray]:
+        """Compute the samples in blocks of chirps, in constant memory.
+
+        Yields
+        ------
+        (chirp, rx, sample) complex64
+            Samples of whole cycles, with the same coordinates as `samples`. Together they are equal
+            to these to the bit.
+        """
+        for begin, values in self._blocks():
+            yield if_samples(values.copy(), self.radar, begin)
+
+    def _blocks(self) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+        together = chirps_together(self.radar)
+        for first, values in self._capture.received(block_chirps(self.radar)):
+            yield first // together, values
+
+    def __repr__(self) -> str:
+        chirps, rx, samples = self.shape
+        rows = {
+            "samples": f"chirp {chirps}, rx {rx}, sample {samples}; complex64 [m]",
+            "size": f"{self.duration_s:.3f} s, {chirps * rx * samples * 8 / 1e6:.0f} MB",
+            "noise": f"{self.noise_power_m2:.3g} m2 per sample",
+        }
+        return text_card("Simulation", self._capture.title, rows)
+
+
+def if_samples(values: NDArray[np.complex64], radar: Radar, first: int = 0) -> xr.DataArray:
+    """Give IF samples (chirp, rx, sample) their coordinates, from chirp ``first`` on."""
+    import xarray as xr  # slow to import
+
+    n, n_rx, n_samples = values.shape
+    together, rows = chirps_together(radar), np.arange(first, first + n)
+    # Under Doppler division the chirps of a cycle are transmitted together.
+    times = radar.centres_of(rows * together)
+    coordinates = {
+        "chirp": ("chirp", rows, {"long_name": "number of the chirp in the capture"}),
+        "time": (
+            "chirp",
+            times,
+            {"units": "s", "long_name": "centre of the chirp since the start of the capture"},
+        ),
+        "rx": ("rx", np.arange(n_rx), {"long_name": "receiver of the line that is in use"}),
+        "fast_time": (
+            "sample",
+            np.arange(n_samples) / radar.sample_rate_hz,
+            {"units": "s", "long_name": "time since the start of the chirp"},
+        ),
+    }
+    if not radar.receives_sums:
+        text = {"long_name": "transmitter of the chirp"}
+        coordinates["tx"] = ("chirp", rows % radar.n_tx, text)
+    described = {"units": "m", "long_name": "IF samples", "multiplexing": radar.multiplexing}
+    return xr.DataArray(values, coordinates, ("chirp", "rx", "sample"), "if_samples", described)

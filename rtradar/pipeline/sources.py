@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.cells import EchoesAtInstants, fields_in_bins, follow_echoes
-from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output.truth import EchoTable
 from rtradar.pipeline.processing import CellSources
 from rtradar.process import range_spectrum
 from rtradar.process.power_maps import doppler_power

@@ -17,13 +17,12 @@ from rtradar.process.detectors import (
     build_point_detector,
     register_detector,
     takes_channels,
+    ti_oob,
 )
-from rtradar.process.frames import SlidingWindows
+from rtradar.process.frames import SlidingRangeTime, SlidingWindows, range_time
 from rtradar.process.power_maps import power_map
-from rtradar.process.range_time import SlidingRangeTime, range_time
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
-from rtradar.process.ti_oob import ti_oob
 from rtradar.process.window_functions import WindowFunctions
 from rtradar.radar.display import measured_angles
 from rtradar.system.registries import DETECTORS

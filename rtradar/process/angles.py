@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.cells import add_interpolated, beam_power, highest_maxima
-from rtradar.process.spectra import cell_spectra, range_spectrum
+from rtradar.process.spectra import cell_spectra, range_spectrum, whole_cycles
 from rtradar.process.steering import (
     Taper,
     cuts_through_highest,
@@ -233,14 +233,7 @@ def angle(
     """
     virtual_lines(radar)
     spectra = range_spectrum(np.asarray(x), radar, window_functions=window_functions)
-    if not np.isfinite(spectra).all():
-        raise InputError("angle: x holds NaN or infinity; every IF sample must be finite")
-    n_cycles = len(spectra) // radar.n_tx
-    if n_cycles < 1:
-        raise InputError(
-            f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, "
-            "one for each Tx"
-        )
+    n_cycles = whole_cycles("angle", spectra, radar)
     last = radar.samples_per_chirp - 1
     row = _nearest("range_m", range_m, radar.range_bin_m, 0, last)
     step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)

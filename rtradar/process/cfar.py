@@ -75,7 +75,7 @@ def os_cfar(
     [(20, 30)]
     """
     _check_quantile(quantile)
-    cells, law = _checked(power, guard, train, quantile, pfa, looks, scale)
+    cells, law = _checked(power, _Options(guard, train, quantile, pfa, looks, scale))
     thresholds = cells / law.scales.astype(cells.dtype)
     return np.asarray(_count_below(cells, thresholds, guard, guard + train) >= law.ranks)
 
@@ -105,7 +105,7 @@ def ca_cfar(
     InputError
         Where `os_cfar` raises it.
     """
-    cells, law = _checked(power, guard, train, None, pfa, looks, scale)
+    cells, law = _checked(power, _Options(guard, train, None, pfa, looks, scale))
     sums_wanted = cells * (law.counts / law.scales).astype(cells.dtype)
     inner = np.zeros(2 * (guard + train) + 1)
     inner[train : train + 2 * guard + 1] = 1
@@ -120,6 +120,17 @@ def _sums(cells: NDArray[np.floating], weights: NDArray[np.float64], axis: int) 
     return correlate1d(cells, weights, axis, output=np.float64, mode="constant")
 
 
+class _Options(NamedTuple):
+    """Options of a detector; that of the mean has no quantile."""
+
+    guard: int
+    train: int
+    quantile: float | None
+    pfa: float
+    looks: int
+    scale: float | None
+
+
 class _Law(NamedTuple):
     """Number of training cells, rank and multiplier of each cell (range, velocity)."""
 
@@ -130,16 +141,9 @@ class _Law(NamedTuple):
 
 # It is the same for all maps of a capture, and as slow as a map.
 @lru_cache(maxsize=4)
-def _law(
-    shape: tuple[int, int],
-    guard: int,
-    train: int,
-    quantile: float | None,
-    pfa: float,
-    looks: int,
-    scale: float | None,
-) -> _Law:
+def _law(shape: tuple[int, ...], options: _Options) -> _Law:
     """Law of the order statistic of a quantile, or of the mean, which has no ranks."""
+    guard, train, quantile, pfa, looks, scale = options
 
     def square(half: int) -> NDArray[np.int32]:
         rows, columns = (
@@ -168,15 +172,7 @@ def _law(
     return _Law(counts, ranks[counts].astype(np.int32), scales[counts])
 
 
-def _checked(
-    power: ArrayLike,
-    guard: int,
-    train: int,
-    quantile: float | None,
-    pfa: float,
-    looks: int,
-    scale: float | None,
-) -> tuple[NDArray[np.floating], _Law]:
+def _checked(power: ArrayLike, options: _Options) -> tuple[NDArray[np.floating], _Law]:
     """The map as C-contiguous float32 or float64, and its law."""
     cells = np.asarray(power)
     if cells.ndim != 2 or cells.dtype.kind not in "fiu":
@@ -192,13 +188,12 @@ def _checked(
             "CFAR: power holds NaN or infinity; give finite samples, whose squares do not "
             f"exceed {np.finfo(np.float32).max:.1g}"
         )
-    _check_count("guard", guard, least=0)
-    _check_count("train", train)
-    _check_rate(pfa, looks)
-    if scale is not None and not 0 < scale < math.inf:
+    _check_count("guard", options.guard, least=0)
+    _check_count("train", options.train)
+    _check_rate(options.pfa, options.looks)
+    if (scale := options.scale) is not None and not 0 < scale < math.inf:
         raise InputError(f"CFAR: scale = {scale!r}; a multiplier must be positive and finite")
-    rows, columns = cells.shape
-    return cells, _law((rows, columns), guard, train, quantile, pfa, looks, scale)
+    return cells, _law(cells.shape, options)
 
 
 def _count_below(

@@ -1,4 +1,14 @@
-"""Detectors by their names: of power alone, and of all channels, which give directions too."""
+"""Detectors by their names: of power alone, and of all channels, which give directions too.
+
+One of all channels is here: the chain of the "out of box" demo of Texas Instruments. The demo of
+the mmWave SDK (its documents "Object Detection Data-path Processing Chain" and "CFAR and angle of
+arrival") sums logarithms of the magnitudes of all virtual antennas, so that a cell of the heat map
+is a mean of decibels. CFAR compares it with the mean of cells beside it, over Doppler and over
+range, by a threshold in decibels. Of neighbours only the strongest stays. One FFT over the
+horizontal antennas gives the azimuth of each cell, and the phase between the rows of antennas its
+elevation. Static clutter is removed before, as `rtradar.process.clutter_removal` does by the mean
+over the frame.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +17,15 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from rtradar.errors import InputError
-from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
+from rtradar.signal.multiplexing import tell_apart
+from rtradar.system.checks import brief
 from rtradar.system.registries import DETECTORS
 
 Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
@@ -165,3 +179,166 @@ def _parameters(find: Callable[..., Any]) -> list[str]:
         return list(inspect.signature(find).parameters)
     except (TypeError, ValueError):  # of some compiled functions
         return []
+
+
+# -- points as chips of Texas Instruments make them -----------------------------------------------
+
+ANGLE_BINS = 64
+"""Bins of the azimuth FFT, which lie evenly over the sine from -1 to 1."""
+
+_RANGE_GUARD, _RANGE_NOISE = 4, 8
+_DOPPLER_GUARD, _DOPPLER_NOISE = 2, 4
+"""Guard and noise cells on either side (cfarCfg of the demo's default profile)."""
+
+_GROUPED = {"both": (3, 3), "range": (1, 3), "doppler": (3, 1), "none": (1, 1)}
+"""Cells (Doppler, range) about a cell among which it must be the strongest, by ``grouping``."""
+
+_SAME_ROW = 0.1  # of a wavelength: antennas so near in height are in one row
+
+_Reals = NDArray[np.float64]
+
+
+def ti_oob(
+    cube: NDArray[np.complexfloating],
+    radar: Radar,
+    *,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
+    threshold_db: float = 15.0,
+    max_points: int = 100,
+    cfar_axes: str = "both",
+    grouping: str = "both",
+) -> tuple[NDArray[np.bool_], _Reals]:
+    """Points of one frame as the chips of Texas Instruments make them.
+
+    Parameters
+    ----------
+    cube : (cycle, tx, rx, range) complex
+        Range spectra of one frame, without static clutter.
+    radar : Radar
+        Radar under TDM or BPM.
+    window_functions : WindowFunctions
+        Window functions, of which that in slow time is applied.
+    threshold_db : float
+        Level of a cell above the noise beside it, over the axes of ``cfar_axes`` [dB].
+    max_points : int
+        Largest number of points. The list is filled in the order of the chip: by Doppler bin, from
+        that of no speed on, the receding ones first, then by range.
+    cfar_axes : {"both", "range"}
+        Axes over which a cell must exceed the noise. The first SDK of the IWR1443 has range alone.
+    grouping : {"both", "range", "doppler", "none"}
+        Axes along which a cell that is weaker than its neighbour is left out. The line
+        ``peakGrouping`` of a profile says it; without any, a strong echo gives a point for every
+        cell of its main lobe.
+
+    Returns
+    -------
+    mask : (range, velocity) bool
+        Cells that are points.
+    sines : (cell, 2) float64
+        Sines of the direction along the radar's y and z of each cell, in the order of
+        ``np.argwhere(mask)``; NaN where the array does not measure one.
+
+    Raises
+    ------
+    InputError
+        Where an option is out of its range, or the radar multiplexes otherwise.
+    """
+    if radar.multiplexing not in ("tdm", "bpm"):
+        raise InputError(
+            f"detector ti-oob: radar '{radar.name}' has multiplexing = '{radar.multiplexing}'; the "
+            "chain is that of tdm and bpm"
+        )
+    whole = 1 <= max_points < np.inf and max_points == int(max_points)
+    for option, value, good, wanted in (
+        ("threshold_db", threshold_db, 0 < threshold_db < np.inf, "it must be above 0 dB"),
+        ("max_points", max_points, whole, "it must be a whole number, at least 1"),
+        ("cfar_axes", cfar_axes, cfar_axes in ("both", "range"), "allowed: both, range"),
+        ("grouping", grouping, grouping in _GROUPED, f"allowed: {', '.join(_GROUPED)}"),
+    ):
+        if not good:
+            raise InputError(f"detector ti-oob: {option} = {brief(value)}; {wanted}")
+    n_cycles = len(cube)
+    window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
+    spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)
+    velocity = np.fft.ifftshift(radar.velocity_mps(n_cycles))
+    turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
+    still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
+    spectra = tell_apart(spectra * still[:, :, None, None], radar)
+    level_db = _heat_map(spectra)
+    beside_db = _along_range(level_db)
+    if cfar_axes == "both":
+        beside_db = np.maximum(_beside(level_db), beside_db)
+    detected = level_db > threshold_db + beside_db
+    # Peak grouping; the Doppler axis is a circle, and beyond the range axis there is nothing.
+    beyond = np.pad(level_db, ((0, 0), (1, 1)), constant_values=-np.inf)
+    neighbours = maximum_filter(beyond, size=_GROUPED[grouping], mode="wrap")[:, 1:-1]
+    doppler, row = np.nonzero(detected & (level_db >= neighbours))
+    doppler, row = doppler[: int(max_points)], row[: int(max_points)]
+    column = (doppler + n_cycles // 2) % n_cycles
+    mask = np.zeros((cube.shape[3], n_cycles), dtype=np.bool_)
+    mask[row, column] = True
+    order = np.lexsort((column, row))
+    values = spectra[doppler[order], :, :, row[order]]
+    return mask, _sines(values, radar)
+
+
+def _heat_map(spectra: NDArray[np.complexfloating]) -> _Reals:
+    """Level of each cell (doppler, range) [dB], the mean over the virtual antennas."""
+    power = np.square(spectra.real) + np.square(spectra.imag)
+    least = np.finfo(np.float32).tiny
+    return np.asarray(10 * np.log10(np.maximum(power, least)).mean(axis=(1, 2)), dtype=np.float64)
+
+
+def _beside(level_db: _Reals) -> _Reals:
+    """Mean level of the noise cells on both sides of each cell over Doppler, which is a circle."""
+    count = len(level_db)
+    guard = {step % count for step in range(-_DOPPLER_GUARD, _DOPPLER_GUARD + 1)}
+    farthest = _DOPPLER_GUARD + _DOPPLER_NOISE
+    steps = {step % count for step in range(-farthest, farthest + 1)} - guard
+    if not steps:
+        raise InputError(
+            f"detector ti-oob: {count} Doppler bins leave no cell for the noise beside one; take "
+            f"at least {2 * _DOPPLER_GUARD + 2} cycles in a frame (frame_duration_s)"
+        )
+    return np.asarray(np.mean([np.roll(level_db, step, axis=0) for step in sorted(steps)], axis=0))
+
+
+def _along_range(level_db: _Reals) -> _Reals:
+    """Mean level of the noise cells on that side of each cell over range where it is the less.
+
+    It is CFAR_CASO, mode 2 of cfarCfg, which the profiles of the SDK have over range, and CFAR_CA
+    over Doppler. At the ends of the axis one side is whole; infinite where none is.
+    """
+    count = level_db.shape[1]
+    means = np.full((2, *level_db.shape), np.inf)
+    total = np.cumsum(np.pad(level_db, ((0, 0), (1, 0))), axis=1)
+    whole = count - _RANGE_GUARD - _RANGE_NOISE
+    if whole > 0:
+        sums = (total[:, _RANGE_NOISE:] - total[:, :-_RANGE_NOISE]) / _RANGE_NOISE
+        means[0, :, _RANGE_GUARD + _RANGE_NOISE :] = sums[:, :whole]
+        means[1, :, :whole] = sums[:, -whole:]
+    return np.asarray(means.min(axis=0))
+
+
+def _sines(values: NDArray[np.complexfloating], radar: Radar) -> _Reals:
+    """Sines of direction (cell, 2) of cells (cell, tx, rx) without their motion in a cycle."""
+    still = values.reshape(len(values), radar.n_channels)
+    y, z = radar.virtual_m.T[1:] / radar.wavelength_m
+    row = np.unique(np.rint(z / _SAME_ROW), return_inverse=True)[1]
+    rows = [np.flatnonzero(row == number) for number in range(row.max() + 1)]
+    found = np.full((len(values), 2), np.nan)
+    along = np.zeros(len(values))
+    longest = max(rows, key=len)
+    if np.ptp(y[longest]) > 0:
+        grid = np.arange(-ANGLE_BINS // 2, ANGLE_BINS // 2) / (ANGLE_BINS / 2)
+        spectrum = still[:, longest] @ np.exp(2j * np.pi * np.outer(y[longest], grid))
+        found[:, 0] = along = grid[np.abs(spectrum).argmax(axis=1)]
+    steered = still * np.exp(2j * np.pi * np.outer(along, y))
+    sums = np.stack([steered[:, own].mean(axis=1) for own in rows], axis=1)
+    heights = np.array([z[own].mean() for own in rows])
+    if len(rows) > 1:
+        steps = np.diff(heights)
+        nearest = steps < steps.min() + _SAME_ROW
+        between = (sums[:, :-1] * sums[:, 1:].conj())[:, nearest].sum(axis=1)
+        found[:, 1] = np.angle(between) / (2 * np.pi * steps[nearest].mean())
+    return found

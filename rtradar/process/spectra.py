@@ -86,14 +86,7 @@ def range_doppler(
     (256, 133, 96)
     """
     samples = checked_chirps("IF samples", x, radar)
-    n_cycles = samples.shape[0] // radar.n_tx
-    if n_cycles < 1:
-        raise InputError(
-            f"range_doppler: {samples.shape[0]} chirps hold no whole TDM cycle; give at least "
-            f"{radar.n_tx}, one for each Tx"
-        )
-    if not np.isfinite(samples).all():
-        raise InputError("range_doppler: x holds NaN or infinity; every IF sample must be finite")
+    n_cycles = whole_cycles("range_doppler", samples, radar)
     fast = weights(window_functions.range, samples.shape[2])
     slow = weights(window_functions.doppler, n_cycles)
     kind = complex_kind(samples)
@@ -166,6 +159,18 @@ def checked_chirps(what: str, values: ArrayLike, radar: Radar) -> NDArray[np.gen
     if chirps.dtype.kind not in "fc":
         raise InputError(f"{what} are of type {chirps.dtype}; they must be complex numbers")
     return chirps
+
+
+def whole_cycles(where: str, chirps: NDArray[np.generic], radar: Radar) -> int:
+    """Whole TDM cycles of chirps; InputError where there is none, or a value is not finite."""
+    if len(chirps) < radar.n_tx:
+        raise InputError(
+            f"{where}: {len(chirps)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, "
+            "one for each Tx"
+        )
+    if not np.isfinite(chirps).all():
+        raise InputError(f"{where}: x holds NaN or infinity; every IF sample must be finite")
+    return len(chirps) // radar.n_tx
 
 
 def checked_frame(where: str, spectra: ArrayLike, radar: Radar) -> NDArray[np.complexfloating]:

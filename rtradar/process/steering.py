@@ -42,13 +42,12 @@ _TAYLOR_EQUAL_LOBES = 4
 
 @dataclass(frozen=True)
 class Line:
-    """One virtual line: the channels whose Tx and Rx both lie on it, along axis 1 or 2.
+    """One virtual line: the channels whose Tx and Rx both lie on it.
 
     ``channels (element,)`` are tx * n_rx + rx, ``tx_m`` and ``rx_m (element,)`` the positions of
     each element's Tx and Rx along the line, in the radar's axes [m].
     """
 
-    axis: int
     channels: NDArray[np.int64]
     tx_m: NDArray[np.float64]
     rx_m: NDArray[np.float64]
@@ -92,7 +91,7 @@ def _line(radar: Radar, axis: int) -> Line | None:
     if len(tx) < 2:
         return None
     places = radar.tx_m[tx, axis], radar.rx_m[radar.rx_of_tx[tx, slot], axis]
-    return Line(axis, np.asarray(tx * radar.n_rx + slot, dtype=np.int64), *places)
+    return Line(np.asarray(tx * radar.n_rx + slot, dtype=np.int64), *places)
 
 
 @lru_cache(maxsize=16)

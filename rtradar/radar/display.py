@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rtradar.antenna import Antenna
 from rtradar.cards import quantity
+from rtradar.front_end import Antenna
 from rtradar.system.figure_style import (
     STYLE,
     axes_given,

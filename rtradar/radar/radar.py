@@ -15,14 +15,13 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from rtradar.antenna import Antenna
 from rtradar.cards import html_card, text_card
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError, prefixed
+from rtradar.front_end import Antenna, Receiver
 from rtradar.radar import display
 from rtradar.radar.checks import check_rules
 from rtradar.radar.schedule import FollowingCount, Schedule
-from rtradar.receiver import Receiver
 from rtradar.system.checks import brief, check_keys, printable
 from rtradar.system.fields import Limits, MaybeEmpty, check_fields
 from rtradar.system.registries import OR_RADAR_FILE, RADARS, radar_table

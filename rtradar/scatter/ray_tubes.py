@@ -41,7 +41,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
+from rtradar.front_end import Antenna
 from rtradar.kernels.scatter.triangles import Tubes, radiate_tubes
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.target import Grid

@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
 from rtradar.scatter.common.polarization import (

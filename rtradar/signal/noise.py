@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.front_end import Receiver
 from rtradar.kernels.receiver import add_noise
 from rtradar.radar import Radar
-from rtradar.receiver import Receiver
 from rtradar.signal.synthesis import synthesize
 from rtradar.system.seeds import check_seed, stream
 from rtradar.system.threads import thread_map

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
+from rtradar.front_end import Interferer
 from rtradar.kernels.receiver import (
     add_ramps,
     add_still,
@@ -24,7 +25,6 @@ from rtradar.kernels.receiver import (
     turn_by_noise,
 )
 from rtradar.radar import Radar
-from rtradar.receiver import Interferer
 from rtradar.signal.clutter import RoomIf
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.signal.noise import PhaseNoise, mean_delays

@@ -277,7 +277,7 @@ DETECTORS = Registry(
     {
         "os-cfar": "rtradar.process.cfar:os_cfar",
         "ca-cfar": "rtradar.process.cfar:ca_cfar",
-        "ti-oob": "rtradar.process.ti_oob:ti_oob",
+        "ti-oob": "rtradar.process.detectors:ti_oob",
     },
 )
 """Functions of power (range, velocity), ``pfa`` and ``looks``, the channels summed in the power; or

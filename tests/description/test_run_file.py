@@ -20,7 +20,7 @@ import trimesh
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.description import settings_of_table, table_of, with_value
-from rtradar.description.tables import plain
+from rtradar.description.run_file import plain
 from rtradar.settings import RunSettings
 from rtradar.system.registries import RADARS, scene_files
 
@@ -205,7 +205,7 @@ def test_a_radar_has_a_table(name: str) -> None:
 
 def test_receivers_and_antennas_are_in_the_table() -> None:
     receiver = rt.Receiver(leakage_db=-30.0, iq_gain_db=0.2)
-    antenna = rt.antenna.Antenna(pattern="cosine", exponent=2.0)
+    antenna = rt.Antenna(pattern="cosine", exponent=2.0)
     radar = dataclasses.replace(RADAR, receiver=receiver, tx_antenna=antenna)
     assert rt.Radar.load(plain(radar)) == radar
 

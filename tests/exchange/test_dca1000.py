@@ -17,7 +17,7 @@ from rtradar.cli import main
 from rtradar.errors import InputError
 from rtradar.exchange import Dca1000Layout, export, open_samples
 from rtradar.exchange.int16_files import of_radar, pack, unpack, words_of
-from rtradar.pipeline.output.map_store import open_maps
+from rtradar.pipeline.output.writer import open_maps
 
 RADAR = rt.Radar(
     name="board", tx_y=2, tx_z=0, rx_y=4, rx_z=0, samples_per_chirp=4,

@@ -1,19 +1,26 @@
-"""Several models side by side: the same noise, and differences that are there or are not."""
+"""Several models side by side: the same noise, and differences that are there or are not; and
+folders of measured and simulated samples."""
 
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
+import math
 import re
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
+from rtradar.pipeline import compare_folders
+from rtradar.pipeline.compared import above_noise, chamfer, chamfer_bins, level_agreement
 from rtradar.report.comparison import _spread
 
 MODELS = ("analytic-paper", "analytic", "specular")
@@ -204,3 +211,143 @@ def test_colours_of_differences_end_at_those_of_echoes() -> None:
     model[50] = -45.0  # below the floor, whatever it differs by
     assert _spread(model, reference, -40.0) == pytest.approx(3.8)
     assert _spread(model, reference, 0.0) == 0.0
+
+
+@pytest.fixture(scope="module")
+def folders(
+    kick: rt.Motion, small: rt.Radar, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Path]:
+    """A run; its samples as the numbers of an ADC, shorter; and those of another radar."""
+    place = tmp_path_factory.mktemp("folders")
+    samples = rt.simulate(kick, small, fidelity="analytic", duration_s=0.23, seed=3).samples.values
+    found = {name: place / name for name in ("simulated", "measured", "other")}
+    rt.process_samples(samples, small, found["simulated"])
+    rt.process_samples(samples[:700] * 1e5, small, found["measured"], unit="count")
+    other = dataclasses.replace(small, bandwidth_hz=small.bandwidth_hz / 2)
+    rt.process_samples(samples[:400], other, found["other"])
+    return found
+
+
+def test_a_factor_between_both_is_a_mean_difference_alone(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [str(folders["measured"]), str(folders["simulated"])]
+    assert main(["compare", *words, "--out", str(tmp_path / "both")]) == 0
+    said = capsys.readouterr().out
+    assert said.splitlines()[0].split() == ["measured", "simulated", "(reference)"]
+    summary = json.loads((tmp_path / "both" / "compare.json").read_text())
+    found = summary["folders"]["measured"]
+    assert found["range_doppler_mean_db"] == pytest.approx(100.0, abs=1e-3)
+    assert found["range_doppler_rms_db"] == pytest.approx(0.0, abs=1e-2)
+    assert found["range_doppler_correlation"] == pytest.approx(1.0, abs=1e-4)
+    assert found["detection_overlap"] > 0.99
+    assert found["unit"] == "count"
+    assert found["windows"] < summary["folders"]["simulated"]["windows"]
+    assert summary["folders"]["simulated"]["range_doppler_rms_db"] == 0.0
+    page = (tmp_path / "both" / "compare.html").read_text()
+    assert len(re.findall("data:image/png", page)) == 3
+    assert "numbers of an ADC" not in said
+    assert {file.name for file in (tmp_path / "both").iterdir()} == set(summary["files"])
+
+
+def test_what_cannot_be_laid_on_each_other_is_refused(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "empty").mkdir()
+    damaged = tmp_path / "damaged"
+    damaged.mkdir()
+    for name in ("summary.json", "cloud_rdt.npz", "cloud_xyz.npz"):
+        (damaged / name).write_bytes((folders["simulated"] / name).read_bytes())
+    (damaged / "maps.h5").write_bytes(b"no maps")
+    simulated = folders["simulated"]
+    for one, other, says in (
+        (folders["other"], simulated, "has a range axis of 128 steps to"),
+        (simulated, simulated, "two or more, each of another name"),
+        (tmp_path / "empty", simulated, "holds no run"),
+        (damaged, simulated, "is damaged, or of another kind"),
+        ("synthetic:kick", simulated, "'synthetic:kick' is no folder"),
+    ):
+        assert main(["compare", str(one), str(other), "--out", str(tmp_path / "out")]) == 2
+        said = capsys.readouterr().err
+        assert says in said
+        assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_clouds_are_apart_in_the_bins_of_the_reference(
+    small: rt.Radar, kick: rt.Motion, tmp_path: Path
+) -> None:
+    slower = dataclasses.replace(small, frame_hop_s=2 * small.frame_hop_s)
+    for name, radar in (("a", slower), ("b", small)):
+        rt.run(
+            kick, radar, out=tmp_path / name, fidelity="analytic", duration_s=0.3, pictures=False
+        )
+    found = compare_folders([tmp_path / "a", tmp_path / "b"], out=tmp_path / "out")
+    clouds = [np.load(tmp_path / name / "cloud_rdt.npz")["points"] for name in ("a", "b")]
+    expected = chamfer_bins(*clouds, small)
+    assert found.summary["folders"]["a"]["rdt_chamfer_bins"] == pytest.approx(expected)
+
+
+EVERYWHERE = np.ones(4, dtype=bool)
+
+
+def test_levels_by_hand() -> None:
+    # 0, 10, 20, 30 dB against 0, 10, 20, 34 dB.
+    found = level_agreement([1, 10, 100, 1000], [1, 10, 100, 10**3.4], EVERYWHERE)
+    assert found.mean_db == pytest.approx(-1.0)
+    assert found.rms_db == pytest.approx(2.0)
+    # Deviations from the means 15 and 16: sums of products 610, of squares 500 and 760.
+    deviations = np.array([-15, -5, 5, 15]), np.array([-16, -6, 4, 18])
+    expected = (
+        deviations[0]
+        @ deviations[1]
+        / math.sqrt((deviations[0] @ deviations[0]) * (deviations[1] @ deviations[1]))
+    )
+    assert found.correlation == pytest.approx(expected)
+
+
+def test_only_cells_that_count_do() -> None:
+    found = level_agreement([1, 10, 0, 0], [2, 20, 5, 0], np.array([True, True, False, False]))
+    assert found.correlation == pytest.approx(1.0)
+    assert found.mean_db == pytest.approx(-10 * math.log10(2))
+
+
+@given(gain=st.floats(0.01, 100))
+def test_a_gain_is_a_shift_and_no_other_shape(gain: float) -> None:
+    power = np.array([1.0, 3.0, 200.0, 7.0])
+    found = level_agreement(gain * power, power, EVERYWHERE)
+    assert found.correlation == pytest.approx(1.0)
+    assert found.mean_db == pytest.approx(10 * math.log10(gain), abs=1e-9)
+    assert found.rms_db == pytest.approx(abs(found.mean_db), abs=1e-9)
+
+
+def test_nothing_to_compare_is_no_number() -> None:
+    assert all(math.isnan(value) for value in level_agreement([1.0], [1.0], np.array([False])))
+    flat = level_agreement([1.0, 1.0], [1.0, 2.0], np.array([True, True]))
+    assert math.isnan(flat.correlation)
+    assert flat.rms_db > 0
+
+
+def test_noise_is_left_out() -> None:
+    power = np.full(100, 1.0)
+    power[:3] = [9.0, 11.0, 1e9]
+    assert np.flatnonzero(above_noise(power)).tolist() == [2]  # 11 is 80 dB below the peak
+    power[2] = 1e6
+    assert np.flatnonzero(above_noise(power)).tolist() == [1, 2]
+
+
+def test_chamfer_by_hand() -> None:
+    first, second = np.array([[0.0, 0], [2, 0]]), np.array([[0.0, 3]])
+    # There: 3 and sqrt(13); back: 3.
+    expected = ((3 + math.sqrt(13)) / 2 + 3) / 2
+    assert (
+        chamfer(first, second, (1, 1)) == chamfer(second, first, (1, 1)) == pytest.approx(expected)
+    )
+    assert chamfer(first, first, (1, 1)) == 0
+    assert chamfer(first * [2, 5], second * [2, 5], (2, 5)) == pytest.approx(expected)
+
+
+def test_chamfer_of_nothing() -> None:
+    nothing = np.zeros((0, 3))
+    assert chamfer(nothing, nothing, (1, 1, 1)) == 0
+    assert chamfer(nothing, np.zeros((1, 3)), (1, 1, 1)) == math.inf

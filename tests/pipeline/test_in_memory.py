@@ -133,11 +133,6 @@ def test_a_radar_of_one_channel_has_no_angles_and_does_without(small: rt.Radar) 
     assert processing.bytes_of_maps(radar, result.summary["chirps"]) == pytest.approx(size, rel=0.1)
 
 
-def test_a_start_that_is_no_number_is_refused(kick: rt.Motion, small: rt.Radar) -> None:
-    with pytest.raises(InputError, match="start_s = nan"):
-        rt.run(kick, small, start_s=math.nan)
-
-
 def test_if_samples_are_not_kept_without_a_folder(kick: rt.Motion, small: rt.Radar) -> None:
     with pytest.raises(InputError, match="save_if = True keeps IF samples in a folder"):
         rt.run(kick, small, save_if=True)

@@ -6,6 +6,7 @@ import base64
 import json
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -28,7 +29,7 @@ LINES = {
 
 @pytest.fixture(scope="module", params=LINES)
 def made(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest, small: rt.Radar, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[str, Path, dict[str, Figure]]:
     """The line, the folder of a run, and the figures drawn for it by the names of their files."""
     figures: dict[str, Figure] = {}
@@ -39,12 +40,7 @@ def made(
         original(figure, file)
 
     out, original = tmp_path_factory.mktemp("made"), figure_style.write_png
-    radar = rt.Radar(
-        chirp_duration_s=250e-6,
-        samples_per_chirp=128,
-        frame_duration_s=0.05,
-        **LINES[request.param],
-    )
+    radar = replace(small, **LINES[request.param])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figure_style, "write_png", save)
         rt.run(

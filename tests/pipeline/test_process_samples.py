@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 import rtradar as rt
-from rtradar.errors import InputError, ValidityWarning
+from rtradar.errors import InputError
 from rtradar.pipeline import processing
 from rtradar.settings import SimulationOptions
 
@@ -173,11 +173,3 @@ def test_numbers_of_an_adc_are_shown_as_such(small: rt.Radar, samples: xr.DataAr
     assert bar.get_ylabel() == "Power, mean of channels [dB re 1 count^2]"
     with pytest.raises(InputError, match="unit = 'V'; it must be m, or count"):
         rt.process_samples(samples, small, unit="V")  # type: ignore[arg-type]
-
-
-def test_noise_alone_gives_empty_clouds_and_says_so(small: rt.Radar) -> None:
-    noise = np.random.default_rng(0).standard_normal((600, 4, 256)).view(np.complex128)
-    with pytest.warns(ValidityWarning, match="nothing was detected"):
-        result = rt.process_samples(noise, small, pfa=1e-12)
-    assert result.points.shape == (0, 3)
-    assert len(repr(result).splitlines()) <= 10

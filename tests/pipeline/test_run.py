@@ -1,4 +1,5 @@
-"""The whole chain from Python: noise where asked for, and the same answer for any block size."""
+"""The whole chain from Python: noise where asked for, the same answer for any block size, and IF
+samples without a run."""
 
 from __future__ import annotations
 
@@ -11,13 +12,17 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import xarray as xr
 import zarr
 
 import rtradar as rt
-from rtradar.antenna import Antenna
+from rtradar.cli.values import window
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.front_end import Antenna
+from rtradar.motion import synthetic_motion
+from rtradar.pipeline import processing
 from rtradar.scatter import MODELS
-from rtradar.settings import RunOptions
+from rtradar.settings import RunOptions, SimulationOptions
 
 SHORT: RunOptions = {"fidelity": "analytic", "duration_s": 0.3}
 
@@ -137,6 +142,8 @@ def test_scalars_of_numpy_do_as_well(kick: rt.Motion, small: rt.Radar, tmp_path:
         ({"fidelity": "perfect"}, f"allowed: {', '.join(MODELS)}$"),
         ({"duration_s": 0.01}, "no whole frame"),
         ({"start_s": 5.0}, "5"),
+        ({"start_s": math.nan}, "start_s = nan"),
+        ({"range_window": "hat"}, "range window 'hat' is unknown; allowed: barthann"),
         ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, cpu, llvm, scalar, cuda"),
     ],
 )
@@ -199,16 +206,9 @@ def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(
     [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})],
 )
 def test_a_radar_without_a_line_has_no_angles_along_it(
-    lines: dict[str, int], there: set[str], tmp_path: Path
+    small: rt.Radar, lines: dict[str, int], there: set[str], tmp_path: Path
 ) -> None:
-    radar = rt.Radar(
-        tx_z=0,
-        rx_z=0,
-        chirp_duration_s=500e-6,
-        samples_per_chirp=128,
-        frame_duration_s=0.05,
-        **lines,
-    )
+    radar = dataclasses.replace(small, chirp_duration_s=500e-6, **lines)
     walk = rt.synthetic_motion("walk", seed=0, duration_s=1.0)
     rt.run(walk, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
     with h5py.File(tmp_path / "maps.h5") as maps:
@@ -218,18 +218,89 @@ def test_a_radar_without_a_line_has_no_angles_along_it(
     assert (tmp_path / "report.html").exists()
 
 
-def test_a_capture_shorter_than_the_spectrograms_window_has_none(tmp_path: Path) -> None:
-    radar = rt.Radar(
-        tx_y=2,
-        tx_z=0,
-        rx_y=4,
-        rx_z=0,
-        chirp_duration_s=1e-3,
-        samples_per_chirp=128,
-        frame_duration_s=0.05,
+SAMPLES: SimulationOptions = {"fidelity": "analytic", "duration_s": 0.23, "snr_db": 10.0}
+
+
+@pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])
+def test_samples_and_blocks_are_what_a_run_keeps(
+    kick: rt.Motion, small: rt.Radar, multiplexing: str, tmp_path: Path
+) -> None:
+    radar = dataclasses.replace(small, multiplexing=multiplexing)
+    capture = rt.simulate(kick, radar, **SAMPLES)
+    rt.run(kick, radar, out=tmp_path / "out", save_if=True, **SAMPLES)
+    kept = zarr.open_array(tmp_path / "out" / "if.zarr", mode="r")[:]
+    assert capture.samples.dtype == np.complex64
+    assert capture.samples.shape == capture.shape
+    np.testing.assert_array_equal(capture.samples, kept)
+    blocks = list(capture.blocks())
+    assert len(blocks) > 3
+    xr.testing.assert_identical(xr.concat(blocks, "chirp"), capture.samples)
+
+
+def test_samples_have_the_times_and_transmitters_of_their_chirps(
+    kick: rt.Motion, small: rt.Radar
+) -> None:
+    samples = rt.simulate(kick, small, **SAMPLES).samples
+    assert samples.dims == ("chirp", "rx", "sample")
+    np.testing.assert_array_equal(samples.time, small.chirp_times(len(samples)))
+    assert samples.tx[:5].values.tolist() == [0, 1, 0, 1, 0]
+    assert float(samples.fast_time[1]) == 1 / small.sample_rate_hz
+    assert (samples.attrs["units"], samples.time.attrs["units"]) == ("m", "s")
+
+
+def test_samples_too_large_for_memory_are_refused_and_blocks_are_not(
+    kick: rt.Motion, small: rt.Radar, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processing, "MEMORY_LIMIT_BYTES", 1e5)
+    capture = rt.simulate(kick, small, **SAMPLES)
+    with pytest.raises(InputError, match=r"IF samples of 0.23 s .* block by block, blocks\(\), or"):
+        _ = capture.samples
+    assert next(capture.blocks()).shape == (100, 4, 128)
+
+
+def test_a_simulation_says_what_it_will_give(kick: rt.Motion, small: rt.Radar) -> None:
+    text = repr(rt.simulate(kick, small, **SAMPLES))
+    assert "samples  chirp 920, rx 4, sample 128" in text
+
+
+WALK = synthetic_motion("walk", seed=1, duration_s=0.3)
+
+
+def maps(radar: rt.Radar, out: Path, **options: Any) -> dict[str, np.ndarray]:
+    given = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
+    rt.run(WALK, radar, out=out, **given, **options)
+    with h5py.File(out / "maps.h5") as file:
+        stored = [name for name in file if isinstance(file[name], h5py.Dataset)]
+        names = [name for name in stored if file[name].ndim > 1 and file[name].dtype.kind == "f"]
+        return {name: file[name][()] for name in names}
+
+
+@pytest.mark.parametrize(
+    ("options", "kept"),
+    [
+        ({"range_window": "blackman"}, set()),
+        # The range-time map is not transformed over slow time.
+        ({"doppler_window": ("chebwin", 80.0)}, {"range_time"}),
+    ],
+)
+def test_window_functions_reach_every_map(
+    small: rt.Radar, tmp_path: Path, options: dict[str, Any], kept: set[str]
+) -> None:
+    hann = {"range_window": "hann", "doppler_window": "hann"}
+    usual, found = (
+        maps(small, tmp_path / "hann", **hann),
+        maps(small, tmp_path / "other", **(hann | options)),
     )
-    stand = rt.synthetic_motion("stand", seed=0, duration_s=1.0)
-    rt.run(stand, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)  # 100 cycles of 128
-    with h5py.File(tmp_path / "maps.h5") as maps:
-        assert maps["spectrogram"].shape == (0, 128)
-    assert not (tmp_path / "spectrogram.png").exists()
+    assert {"range_doppler", "range_doppler_received", "spectrogram", "range_time"} < usual.keys()
+    assert found.keys() == usual.keys()
+    for name, values in found.items():
+        difference = np.abs(values - usual[name]).max() / usual[name].max()
+        truth = name.startswith(("person", "joint"))
+        assert (difference == 0) if truth or name in kept else (difference > 0.01), name
+
+
+def test_the_command_line_gives_a_name_or_a_name_and_its_parameter() -> None:
+    assert window("blackman") == "blackman"
+    assert window("chebwin:80") == ("chebwin", 80.0)
+    with pytest.raises(ValueError, match="much"):
+        window("kaiser:much")

@@ -10,7 +10,7 @@ import trimesh
 import xarray as xr
 
 import rtradar as rt
-from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output.truth import EchoTable
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.sources import Sources
 from rtradar.scene import Wall, material
@@ -140,6 +140,6 @@ def test_who_returned_a_cell_does_not_depend_on_how_far_ahead_is_looked(
 ) -> None:
     found = []
     for ahead in (1, 8):
-        monkeypatch.setattr("rtradar.pipeline.output.echo_table._LOOKS_AHEAD", ahead)
+        monkeypatch.setattr("rtradar.pipeline.output.truth._LOOKS_AHEAD", ahead)
         found.append(rt.run([WALKER, KICKER], RADAR, duration_s=0.15).maps["source"].values)
     np.testing.assert_array_equal(*found)

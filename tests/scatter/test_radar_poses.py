@@ -12,10 +12,10 @@ import pytest
 import trimesh
 
 import rtradar as rt
-from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.output.map_store import read_maps
+from rtradar.pipeline.capture import Capture, PreparedRoom
 from rtradar.pipeline.output.truth import truth_of
-from rtradar.pipeline.prepared_room import PreparedRoom
-from rtradar.pipeline.processing import Clouds
-from rtradar.radar import Radar
-from rtradar.report import rooms
+from rtradar.pipeline.output.writer import read_maps
+from rtradar.pipeline.result import Result
+from rtradar.report import rooms, write_report
 from rtradar.report.plots import Plots
+from rtradar.report.run_view import RunView
 from rtradar.scatter.multipath.path_summary import Ghost, ghosts
-from rtradar.settings import RunSettings
 from rtradar.system.figure_style import new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -27,28 +25,24 @@ if TYPE_CHECKING:
 _TRACK_POINTS = 400
 
 
-def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, Path]:
-    """Draw ``maps.h5`` of this folder, the clouds, and the room if there is one.
+def draw_pictures(folder: Path, capture: Capture, result: Result) -> dict[str, Path]:
+    """Draw ``maps.h5`` of this folder, the clouds of its result, and the room if there is one.
 
     Returns the PNG files by their titles, in the order in which they are best looked at.
     """
-    drawn, frame = draw_found(folder, clouds, capture.radar, capture.settings)
+    drawn, frame = draw_found(folder, result)
     if capture.room:
         with read_maps(folder / "maps.h5") as maps:
             drawn |= _draw_room(folder, capture, capture.room, maps, frame)
     return drawn
 
 
-def draw_found(
-    folder: Path, clouds: Clouds, radar: Radar, settings: RunSettings
-) -> tuple[dict[str, Path], int]:
+def draw_found(folder: Path, result: Result) -> tuple[dict[str, Path], int]:
     """Draw ``maps.h5`` of this folder and the clouds; also return the frame that was chosen."""
     drawn: dict[str, Path] = {}
     with read_maps(folder / "maps.h5") as maps:
-        found = maps, clouds.rdt.points, clouds.spatial, radar
-        ranges = clouds.ranges and (clouds.ranges.low_m, clouds.ranges.high_m)
-        said = {"parameters": settings.parameters(), "detected_range_m": ranges}
-        plots = Plots(*found, said, new_figure=new_figure)
+        found = maps, result.points, result.spatial, result.radar, result.summary
+        plots = Plots(*found, new_figure=new_figure)
         angles = [name for name in ("azimuth", "elevation") if name in maps]
         pictures: dict[str, tuple[str, Callable[[], Axes]]] = {
             "Range over time": ("range_time.png", plots.range_time)
@@ -67,6 +61,21 @@ def draw_found(
             drawn[name] = folder / file
             save_figure(draw().get_figure(root=True), drawn[name])
         return drawn, plots.frame()[0]
+
+
+def write_page(
+    folder: Path, result: Result, pictures: Mapping[str, Path], run_view: RunView | None = None
+) -> None:
+    """Write the report of what was found into a folder."""
+    write_report(
+        folder / "report.html",
+        radar=result.radar,
+        summary=result.summary,
+        pictures=pictures,
+        rdt_points=result.points,
+        spatial=result.spatial,
+        run_view=run_view,
+    )
 
 
 def _draw_room(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -10,8 +11,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.pipeline.output.echo_table import EchoTable, Look
-from rtradar.pipeline.output.truth import truth_of
+from rtradar.pipeline.output.truth import EchoTable, Look, truth_of
 from rtradar.radar import Radar
 from rtradar.report.snapshots import Snapshots
 from rtradar.report.three_d import semi_axis_poses
@@ -88,29 +88,30 @@ def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], _Observed]:
 
     Echoes of one path, part and number of reflections are summed.
     """
-    owned = []
-    for look in looks:
-        columns = (column.tolist() for column in (look.path, look.part, look.bounces))
-        owned.append(list(zip(*columns, strict=True)))
+    step = np.repeat(np.arange(len(looks)), [len(look.part) for look in looks])
+    path, part, bounces, range_m, rate, power = (
+        np.concatenate([getattr(look, name) for look in looks])
+        for name in ("path", "part", "bounces", "range_m", "rate_mps", "power_m2")
+    )
     # The view follows the parts of people, not objects.
-    every = dict.fromkeys(key for own in owned for key in own if key[1] < n_parts)
-    place = {key: column for column, key in enumerate(every)}
-    total, sums = np.zeros((len(looks), len(place))), np.zeros((3, len(looks), len(place)))
-    for step, (look, own) in enumerate(zip(looks, owned, strict=True)):
-        echo = np.array([n for n, key in enumerate(own) if key in place], dtype=np.int64)
-        column = np.array([place[own[n]] for n in echo], dtype=np.int64)
-        power = look.power_m2[echo]
-        np.add.at(total[step], column, power)
-        fraction = np.where(total[step, column] > 0, power, 1.0)
-        values = fraction, fraction * look.range_m[echo], fraction * look.rate_mps[echo]
-        for table, own_values in zip(sums[:, step], values, strict=True):
-            np.add.at(table, column, own_values)
-    known = np.where(sums[0] > 0, sums[0], 1.0)
-    return list(place), _Observed(sums[1] / known, sums[2] / known, total)
+    own = part < n_parts
+    keys, column = np.unique(np.stack([path, part, bounces])[:, own], axis=1, return_inverse=True)
+    cell, shape = step[own] * keys.shape[1] + column.ravel(), (len(looks), keys.shape[1])
+
+    def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Of nothing NumPy counts in whole numbers.
+        return np.bincount(cell, values, math.prod(shape)).reshape(shape).astype(np.float64)
+
+    total = summed(power[own])
+    fraction = np.where(total.ravel()[cell] > 0, power[own], 1.0)
+    weight = summed(fraction)
+    known = np.where(weight > 0, weight, 1.0)
+    ranges, rates = (summed(fraction * values[own]) / known for values in (range_m, rate))
+    return [tuple(key) for key in keys.T.tolist()], _Observed(ranges, rates, total)
 
 
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
-    """Choose direct echoes and the strongest of the others, in the order in which they came."""
+    """Choose direct echoes and the strongest of the others, in the order of the keys."""
     mean = power_m2.mean(axis=0)
     mean[[bounces == 1 for _, _, bounces in keys]] = np.inf
     order = np.argsort(-mean, kind="stable")[:MAX_ECHOES]

@@ -20,7 +20,7 @@ from rtradar.radar import Radar
 from rtradar.scatter import account_of
 from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scatter.validity import Limit
-from rtradar.settings import ProcessingOptions, RunSettings
+from rtradar.settings import ProcessingOptions
 from rtradar.system.clock import Moment
 
 _SINGLE_REFLECTIONS = {
@@ -126,17 +126,13 @@ def _people(capture: Capture) -> list[dict[str, Any]]:
 
 
 def summary_of_samples(
-    processing: Processing,
-    settings: RunSettings,
-    n_chirps: int,
-    clouds: Clouds,
-    started: Moment,
+    processing: Processing, n_chirps: int, clouds: Clouds, started: Moment
 ) -> dict[str, Any]:
     """Return the summary of so many chirps of IF samples; their processing began at ``started``.
 
     It has no entries of motion, scene, echoes and noise, which are not known.
     """
-    radar = processing.radar
+    radar, settings = processing.radar, processing.settings
     names = set(ProcessingOptions.__annotations__)
     of_processing = {key: value for key, value in settings.parameters().items() if key in names}
     capture_s = radar.duration_of(n_chirps)
@@ -217,9 +213,9 @@ def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
 
 
 def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
-    """Return what the maps of a room add to ``summary["room"]``; nothing without a room.
+    """Return the ``room`` of the summary with what its maps tell; nothing without a room.
 
-    ``maps`` are those of the run, open. The keys are ``ghosts``, with ``time_s`` and ``paths``, a
+    ``maps`` are those of the run, open. They add ``ghosts``, with ``time_s`` and ``paths``, a
     list of path, range [m], velocity [m/s], azimuth [deg] and power [m^2]; and ``clutter``, to
     which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least, and of
     a room in which nobody and nothing moves ``false_alarm_rate``, that of a cell.
@@ -255,7 +251,8 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
         )
         if received > 0 and left > 0:
             clutter["after_removal_db"] = before_db + 10 * math.log10(received / left)
-    return {"ghosts": {"time_s": time_s, "paths": paths}, "clutter": clutter}
+    added = {"ghosts": {"time_s": time_s, "paths": paths}, "clutter": clutter}
+    return {"room": capture.room.summary | added}
 
 
 def at_rest(power: NDArray[np.floating], velocity: NDArray[np.float64]) -> float:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.output.map_store import read_maps
+from rtradar.pipeline.output.writer import read_maps
+from rtradar.pipeline.result import Result
 from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
@@ -96,59 +97,27 @@ def view(
 
 
 def load_run_view(folder: Path) -> RunView:
-    """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
+    """Read what a run left in a folder.
 
-    InputError if one of them is missing or damaged, or they are not of one run.
+    InputError if a file is missing or damaged, or they are not of one run.
     """
-    summary, radar, windows = run_summary(folder)
-    if "unit" in summary["parameters"]:  # which a simulation does not name
+    result = read_result(folder)
+    if "unit" in result.summary["parameters"]:  # which a simulation does not name
         raise InputError(
             f"'{folder}' holds what was found in IF samples, which have no body to show; look at "
             "its report.html"
         )
-    return run_view_of(folder, summary, radar, windows)
-
-
-def run_view_of(
-    folder: Path,
-    summary: Mapping[str, Any],
-    radar: Radar,
-    windows: WindowFunctions,
-    *,
-    at_most: tuple[int, float] | None = None,
-) -> RunView:
-    """Read ``view.npz``, ``maps.h5`` and both clouds of a run with this summary and radar.
-
-    ``at_most`` so many snapshots are shown, at no more than this rate [Hz]; all if left out.
-    InputError as in `load_run_view`.
-    """
     snapshots = load_snapshots(folder / "view.npz")
-    if at_most is not None:
-        snapshots = snapshots.every(snapshots.stride(*at_most))
-    points = run_points(folder)
-    path = folder / "cloud_xyz.npz"
-    spatial = _archive(path, ("points", "velocity", "power", "time"), ("points",), ("source",))
-    try:
-        cloud = SpatialCloud(**spatial)
-    except DAMAGE as error:
-        raise refused(path, ValueError(str(error))) from None
     with run_maps(folder) as file:
         maps = _maps(file)
         if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
             raise ValueError("it is not of one run with view.npz")
-        return assembled(maps, snapshots, points, cloud, radar, summary, windows)
+        return run_view_of(result, maps, snapshots)
 
 
-def assembled(
-    maps: Mapping[str, Any],
-    snapshots: Snapshots,
-    points: NDArray[np.float64],
-    spatial: SpatialCloud,
-    radar: Radar,
-    summary: Mapping[str, Any],
-    windows: WindowFunctions,
-) -> RunView:
-    """Return the view of a run from its maps and their axes, snapshots, clouds and summary."""
+def run_view_of(result: Result, maps: Mapping[str, Any], snapshots: Snapshots) -> RunView:
+    """Return the view of a run from what it found, its maps with their axes, and snapshots."""
+    summary, radar, points = result.summary, result.radar, result.points
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
     fidelity = _line(summary.get("fidelity", ""))
@@ -161,17 +130,20 @@ def assembled(
         snapshots=snapshots,
         radar=radar,
         range_doppler=_range_doppler(maps, snapshots, radar, spreading),
-        spectrogram=_spectrogram(maps, radar, spreading, windows),
+        spectrogram=_spectrogram(maps, radar, spreading, _windows(parameters)),
         rdt_points=points,
         rdt_power_db=_at_points(maps, points, radar, spreading),
         rdt_source=_source_of_points(maps, points, len(snapshots.sources)),
-        spatial=spatial,
+        spatial=result.spatial,
         spreading=spreading,
     )
 
 
-def run_summary(folder: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
-    """Read the summary of a folder, its radar and window functions; InputError if there is none."""
+def read_result(folder: Path) -> Result:
+    """Read the summary, the radar and both clouds of a folder.
+
+    InputError if there is no run, or a file is missing or damaged.
+    """
     path = folder / "summary.json"
     if not os.path.isfile(path):
         raise InputError(
@@ -180,21 +152,27 @@ def run_summary(folder: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
         )
     try:
         summary = read_json(path)
-        parameters = summary["parameters"]
-        # Folders of older versions name none; theirs were Hann windows.
-        names = (parameters.get(f"{axis}_window", "hann") for axis in ("range", "doppler"))
-        return summary, Radar(**parameters["radar"]), WindowFunctions(*names)
+        radar = Radar(**summary["parameters"]["radar"])
+        _windows(summary["parameters"])
+        path = folder / "cloud_rdt.npz"
+        points = _archive(path, ("points",))["points"]
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise ValueError(f"points have shape {points.shape}")
+        path = folder / "cloud_xyz.npz"
+        spatial = _archive(path, ("points", "velocity", "power", "time"), ("points",), ("source",))
+        try:
+            cloud = SpatialCloud(**spatial)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return Result(points, cloud, summary, radar, out=folder)
     except DAMAGE as error:
         raise refused(path, error) from None
 
 
-def run_points(folder: Path) -> NDArray[np.float64]:
-    """Read the RDT cloud (point, 3) of a folder; InputError if it is missing or damaged."""
-    path = folder / "cloud_rdt.npz"
-    points: NDArray[np.float64] = _archive(path, ("points",))["points"]
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise refused(path, ValueError(f"points have shape {points.shape}"))
-    return points
+def _windows(parameters: Mapping[str, Any]) -> WindowFunctions:
+    # Folders of older versions name none; theirs were Hann windows.
+    names = (parameters.get(f"{axis}_window", "hann") for axis in ("range", "doppler"))
+    return WindowFunctions(*names)
 
 
 @contextmanager
@@ -221,14 +199,11 @@ def _archive(
     may_be_nan: tuple[str, ...] = (),
     may_lack: tuple[str, ...] = (),
 ) -> dict[str, NDArray[Any]]:
-    try:
-        arrays = read_arrays(path)
-        for name in names:
-            _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
-        found = {name: arrays[name].astype(np.float64) for name in names}
-        return found | {name: _whole(arrays[name]) for name in may_lack if name in arrays}
-    except DAMAGE as error:
-        raise refused(path, error) from None
+    arrays = read_arrays(path)
+    for name in names:
+        _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
+    found = {name: arrays[name].astype(np.float64) for name in names}
+    return found | {name: _whole(arrays[name]) for name in may_lack if name in arrays}
 
 
 def _finite(values: NDArray[Any]) -> NDArray[Any]:

@@ -46,10 +46,10 @@ from math import ceil, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import furniture_returns
 from rtradar.scatter.clutter.returns import (

@@ -14,10 +14,10 @@ from typing import Any, Literal, NamedTuple, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scene import Material, material, reflection

@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.body.body import Poses
+from rtradar.front_end import Antenna
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, received_from_conductors
 from rtradar.radar import Radar

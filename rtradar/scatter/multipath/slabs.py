@@ -23,8 +23,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.antenna import Antenna
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.polarization import (

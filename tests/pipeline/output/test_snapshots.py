@@ -15,10 +15,10 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.body.people import body_of_people
 from rtradar.motion import place
-from rtradar.pipeline.output import echo_table
 from rtradar.pipeline.output import snapshots as module
-from rtradar.pipeline.output.echo_table import EchoTable
+from rtradar.pipeline.output import truth as truth_module
 from rtradar.pipeline.output.snapshots import snapshots
+from rtradar.pipeline.output.truth import EchoTable
 from rtradar.scatter import build_model
 from rtradar.scatter.people_and_objects import PeopleAndObjects
 from rtradar.scene import Furniture, Scene, Wall, material
@@ -185,7 +185,7 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
 def test_long_captures_and_rich_rooms_keep_no_more(
     spheres: Body, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(echo_table, "MAX_SHOWN", 4)
+    monkeypatch.setattr(truth_module, "MAX_SHOWN", 4)
     monkeypatch.setattr(module, "MAX_ECHOES", 25)
     scene = Scene(name="one wall", walls=(WALL,))
     found = look(spheres, build_model("analytic", RADAR, spheres, scene=scene), scene)

@@ -1,7 +1,8 @@
-"""What is made of range spectra does not depend on the pieces they come in."""
+"""What is made of range spectra, whatever the pieces they come in, and the file of the maps."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import h5py
@@ -10,8 +11,10 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline import processing
-from rtradar.pipeline.output.writer import RunWriter
+from rtradar.pipeline.output.writer import MapStore, RunWriter, read_maps
 from rtradar.pipeline.processing import Processing
+from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb
+from rtradar.process import power_map
 from rtradar.settings import RunSettings
 
 RADAR = rt.Radar(
@@ -102,3 +105,81 @@ def test_clutter_is_removed_from_every_map_and_each_says_how(method: str, tmp_pa
         assert zero_doppler < 0.1  # of the walker's skirts
         assert still < 1e-2
     assert moving > 0.05  # MTI weakens 1.5 m/s by 10 dB
+
+
+def test_the_middle_frame_is_kept_as_it_was_received(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    spectra = random.standard_normal((800, 4, 128)).astype(np.float32).view(np.complex64)
+    starts = RADAR.window_starts(800)
+    processing = Processing.of(RADAR, RunSettings(clutter_removal="mti"))
+    with RunWriter(tmp_path / "maps.h5", processing, "", starts) as made:
+        for first in range(0, 800, 62):
+            made.push(spectra[first : first + 62], first)
+    first = starts[len(starts) // 2] * RADAR.n_tx
+    cube = spectra[first : first + RADAR.chirps_per_frame].reshape(-1, 2, 4, 64)
+    with read_maps(tmp_path / "maps.h5") as maps:
+        kept = maps["range_doppler_received"]
+        assert kept.attrs["time_s"] == RADAR.window_times(starts)[len(starts) // 2]
+        np.testing.assert_array_equal(kept, power_map(cube, RADAR))
+
+
+FIXED = {"range": np.arange(256.0), "velocity": np.arange(128.0)}
+
+
+def test_maps_grow_step_by_step_however_many_come_at_once(tmp_path: Path) -> None:
+    power = np.random.default_rng(0).random((150, 256)).astype(np.float32)
+    times = np.arange(150.0)
+    store = MapStore(tmp_path / "maps.h5", FIXED, {"title": "some"})
+    for part in np.split(np.arange(150), [1, 63, 64, 65, 130]):
+        store.extend("slow_time", times[part], range_time=power[part])
+    store.close()
+    store.close()
+    with h5py.File(tmp_path / "maps.h5") as maps:
+        np.testing.assert_array_equal(maps["range_time"][:], power)
+        np.testing.assert_array_equal(maps["slow_time"][:], times)
+        assert maps.attrs["title"] == "some"
+        assert "range_azimuth" not in maps  # no such axis
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
+def test_a_long_file_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
+    store = MapStore(tmp_path / "maps.h5", FIXED, {})
+    power, mask, rows = (
+        np.ones((1, 256, 128), np.float32),
+        np.ones((1, 256, 128), bool),
+        np.ones((64, 256), np.float32),
+    )
+
+    def write(windows: range) -> None:
+        for window in windows:
+            store.extend("time", [window], range_doppler=power, detections=mask)
+            store.extend("slow_time", window + np.arange(64) / 64, range_time=rows)
+
+    write(range(20))  # 5 MB, some of which have waited to be written together
+    forget_peak_memory()
+    before = peak_memory_mb()
+    write(range(20, 220))
+    # 46 MB are written; HDF5 would keep 8 MB of each map. Its own book-keeping takes a few hundred
+    # kB.
+    assert peak_memory_mb() - before < 4
+    store.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
+def test_reading_a_long_file_through_takes_no_more_memory_than_a_frame(tmp_path: Path) -> None:
+    store = MapStore(tmp_path / "maps.h5", FIXED, {})
+    ones = np.ones((1, 256, 128), np.float32)
+    for window in range(200):
+        store.extend("time", [window], range_doppler=ones, detections=ones > 0)
+    store.close()
+    with read_maps(tmp_path / "maps.h5") as maps:
+        power, mask = maps["range_doppler"], maps["detections"]
+        assert power[0].all()
+        assert mask[0].all()
+        forget_peak_memory()
+        before = peak_memory_mb()
+        for window in range(200):
+            assert power[window].all()
+            assert mask[window].all()
+    # 33 MB are read; HDF5 would keep 8 MB of each map.
+    assert peak_memory_mb() - before < 4

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.antenna import Antenna
 from rtradar.errors import InputError
+from rtradar.front_end import Antenna
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
+from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter import build_model
