@@ -41,6 +41,18 @@ def test_half_of_the_error_of_a_torso_goes(polarization: Literal["v", "h"]) -> N
     assert np.linalg.norm(two - truth) < 0.5 * np.linalg.norm(one - truth)
 
 
+def test_near_a_sphere_it_is_that_of_the_exact_series() -> None:
+    """The backscatter of a conducting sphere is that of geometric optics times 1 + j / 2ka."""
+    radius, k = 0.1, 2 * np.pi * 12e9 / SPEED_OF_LIGHT_MPS
+    sphere = rt.Ellipsoids([np.zeros(3)], [np.eye(3)], [(radius,) * 3])
+    at = np.array([[4.0, 0.0, 0.0], [1.0, 2.0, -1.0]])
+    place = target_geometry(sphere, at, at)
+    points = solve_specular_points(place, points=True)[2]
+    for polarization in ("v", "h"):
+        found = with_second_term(place, points, Polarization(polarization), np.array(k))
+        np.testing.assert_allclose(found, 1 + 0.5j / (k * radius), rtol=0, atol=1e-9)
+
+
 def test_a_model_has_what_the_scattering_length_has() -> None:
     body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.3))
     chirps = np.array([0, 5])

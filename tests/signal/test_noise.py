@@ -106,6 +106,14 @@ def test_any_number_of_threads_makes_the_same(
         np.testing.assert_array_equal(noise(1.0, SMALL, 300), usual)
 
 
+def test_it_is_the_transform_of_its_bits() -> None:
+    cycle = noise(1.0, SMALL, SMALL.n_tx, seed=3)
+    bits = np.random.SFC64([3, 0]).random_raw(cycle.size).reshape(cycle.shape)
+    u, turns = ((bits >> 33) + 0.5) / 2**31, bits.astype(np.uint32).view(np.int32) / 2.0**32
+    # float32 logarithm, sine and cosine: 1e-7 each, of radii up to 5.
+    np.testing.assert_allclose(cycle, np.sqrt(-np.log(u)) * np.exp(2j * np.pi * turns), atol=2e-6)
+
+
 def test_power_scales_the_same_noise() -> None:
     np.testing.assert_allclose(
         noise(4.0, SMALL, 30), 2 * noise(1.0, SMALL, 30), rtol=1e-6

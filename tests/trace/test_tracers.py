@@ -171,6 +171,7 @@ def test_the_first_part_is_that_of_the_smooth_ellipsoids(
     np.testing.assert_array_equal(hits.part[sure], expected[sure])
     assert 0.2 < (expected >= 0).mean() < 0.9
     np.testing.assert_array_equal(np.isinf(hits.distance), hits.part < 0)
+    assert (first_hits(backend, crowd, origins, 2 * origins - targets).part == -1).all()  # behind
 
 
 def test_the_distance_is_that_to_the_ellipsoid(backend: Backend, crowd: Ellipsoids) -> None:

@@ -16,17 +16,47 @@ from rtradar.motion.skeleton import NODE_PARENTS, NODES, to_nodes
 
 RATE_HZ = 60.0
 
-_JOINTS = {
-    "hip": "hip", "knee": "knee", "ankle": "ankle", "foot": "toe",
-    "shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist",
-}  # fmt: skip
-_SIDED = [(side, *pair) for side in ("left", "right") for pair in _JOINTS.items()]
-KINECT_V1 = {"HipCenter": "root", "Spine": "lowerback", "ShoulderCenter": "thorax", "Head": "head"}
-KINECT_V1 |= {f"{joint}_{side}".title(): f"{side[0]}_{node}" for side, joint, node in _SIDED}
-KINECT_V1 |= {"Hand_Left": "l_hand", "Hand_Right": "r_hand"}
-HUMANML3D = {"pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax"}
-HUMANML3D |= {"neck": "neck", "head": "head"}
-HUMANML3D |= {f"{side}_{joint}": f"{side[0]}_{node}" for side, joint, node in _SIDED}
+KINECT_V1 = {
+    "HipCenter": "root",
+    "Spine": "lowerback",
+    "ShoulderCenter": "thorax",
+    "Head": "head",
+    **{
+        f"{joint}{side}": f"{side[0].lower()}_{node}"
+        for side in ("Left", "Right")
+        for joint, node in (
+            ("Hip", "hip"),
+            ("Knee", "knee"),
+            ("Ankle", "ankle"),
+            ("Foot", "toe"),
+            ("Shoulder", "shoulder"),
+            ("Elbow", "elbow"),
+            ("Wrist", "wrist"),
+            ("Hand", "hand"),
+        )
+    },
+}
+HUMANML3D = {
+    "pelvis": "root",
+    "spine1": "lowerback",
+    "spine2": "upperback",
+    "spine3": "thorax",
+    "neck": "neck",
+    "head": "head",
+    **{
+        f"{side}_{joint}": f"{side[0]}_{node}"
+        for side in ("left", "right")
+        for joint, node in (
+            ("hip", "hip"),
+            ("knee", "knee"),
+            ("ankle", "ankle"),
+            ("foot", "toe"),
+            ("shoulder", "shoulder"),
+            ("elbow", "elbow"),
+            ("wrist", "wrist"),
+        )
+    },
+}
 LIMBS = [
     NODES.index(f"{side}_{node}")
     for side in "lr"

@@ -18,7 +18,7 @@ from rtradar.pipeline.output.truth import CYCLES_COMPARED, truth_of
 from rtradar.pipeline.output.writer import open_maps
 from rtradar.settings import RunSettings
 
-RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=0, rx_y=2, rx_z=0)
+RADAR = replace(rt.Radar.preset("paper-12ghz"), tx_y=2, tx_z=0, rx_y=3, rx_z=0)
 WALK = rt.synthetic_motion("walk", duration_s=0.5)
 
 

@@ -184,6 +184,14 @@ def test_each_wall_has_its_own() -> None:
     assert np.abs(phases[0] - phases[1]).max() > 1
 
 
+def test_sums_over_phases_are_speckle() -> None:
+    (echoes,) = rough(replace(FAR, bandwidth_hz=4e9), wall())
+    values = np.exp(1j * np.angle(echoes.amplitude[0, 0, 0]))
+    # A hundred and more phases at random: their mean is below 3 / sqrt(n).
+    assert len(values) > 100
+    assert abs(values.mean()) < 3 / np.sqrt(len(values))
+
+
 def test_smooth_walls_and_walls_from_behind() -> None:
     assert rough(FAR, wall(0.0, 0.0)) == []
     behind = replace(FAR, position_m=(8.0, 0, 1))

@@ -16,7 +16,7 @@ from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.radar import Radar
-from rtradar.scatter import build_model
+from rtradar.scatter import account_of, build_model
 from rtradar.scatter.models.auto import CANDIDATES, Auto, choose_level, optics_error
 
 RADARS = {name: rt.Radar.preset(name) for name in ("paper-12ghz", "paper-77ghz")}
@@ -111,12 +111,14 @@ def test_its_echoes_are_those_of_the_level(
     room = None if scene is None else rt.Scene.load(scene)
     radar = SMALL if room is None else room.place(SMALL)
     chirps = CHIRPS[:2] if level == "reference" else CHIRPS
-    ours, theirs = (
-        build_model(name, radar, BODY, scene=room, **options).echoes(chirps)
-        for name, options in (("auto", {"tolerance_db": tolerance_db}), (level, {}))
-    )
+    model = build_model("auto", radar, BODY, scene=room, tolerance_db=tolerance_db)
+    ours = model.echoes(chirps)
+    theirs = build_model(level, radar, BODY, scene=room).echoes(chirps)
     for name in ("length", "amplitude", "frequency", "tx", "part", "bounces"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
+    account = account_of(model)
+    assert account is not None
+    assert account["ways"][level] == 1.0
 
 
 def test_the_account_says_all_and_adds_up() -> None:

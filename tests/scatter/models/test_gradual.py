@@ -100,6 +100,17 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
     assert np.abs(got - exact).max() < 0.04
 
 
+@pytest.mark.slow
+def test_an_edge_that_wanders_changes_the_share_without_jumps() -> None:
+    # Steps of 2e-3, where the edge is in sight, at its corner and where it vanishes.
+    u = (np.array([-0.8, 0.0, 0.6])[:, None] + np.linspace(-0.02, 0.02, 21)).ravel()
+    k = 2 * np.pi * 14e9 / C
+    edges = u / np.sqrt(k * (2 / 3.9 + 2 / 0.1) / 2)
+    share = np.array([share_behind_plate(0.1, 14e9, edge) for edge in edges])
+    # exp(-j u^2) bends by 2 u / sqrt(pi) a unit squared: 5e-6 at a step of 2e-3.
+    assert np.abs(np.diff(share.reshape(3, -1), 2)).max() < 1e-4
+
+
 def test_full_view_is_one_and_full_cover_exactly_nothing(backend: Backend) -> None:
     radar, chirps = small_radar(tx_y=3, rx_y=2, tx_spacing_wavelengths=1.0), np.arange(30)
     for body, target in ((Curtain(edge=0.5), 1.0), (Curtain(edge=-0.3), 0.0)):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import chirp_poses, keyframe_step
 from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.multipath.image_paths import images
@@ -264,6 +265,11 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(make: Any) -> None:
         make.room(*given, materials=[name]).echoes(np.arange(2))
         for name in ("perfect-conductor", "skin")
     )
+    for name in ("perfect-conductor", "skin"):  # to whom the signal-to-noise ratio refers
+        alone = make.room(*given, materials=[name]).person.echoes(np.arange(2))
+        free = build_model("specular", *given[:2], materials=[name]).echoes(np.arange(2))
+        np.testing.assert_array_equal(alone.length, free.length)
+        np.testing.assert_array_equal(alone.amplitude, free.amplitude)
     # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand,
     # and nearly alike.
     eta = material("skin").eta(metal.frequency)[0]
