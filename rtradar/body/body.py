@@ -171,7 +171,9 @@ class Body:
             raise InputError(
                 f"Body: semi_axes have shape {axes.shape}; semi_axes must be ({len(PART_NAMES)}, 3)"
             )
-        for part in np.flatnonzero(~(np.isfinite(axes) & (axes > 0)).all(axis=1)):
+        wrong = ~(np.isfinite(axes) & (axes > 0)).all(axis=1)
+        if wrong.any():
+            part = int(wrong.argmax())
             raise InputError(
                 f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes "
                 f"of {axes[part].tolist()} m; semi_axes must be positive and finite: give the bone "

@@ -218,16 +218,18 @@ class HumanMesh:
             raise InputError(
                 f"HumanMesh: divisions = {divisions}; allowed are 0 to {MOST_DIVISIONS}"
             )
-        for number in range(len(self._kept), divisions + 1):
-            features, faces = self._kept[number - 1]
-            smooth, finer = loop_subdivision(faces, features.shape[0])
-            self._kept.append((smooth @ features, finer))
-        return self._kept[divisions]
+        kept = self._kept
+        for number in range(1, divisions + 1):
+            if number not in kept:
+                features, faces = kept[number - 1]
+                smooth, finer = loop_subdivision(faces, features.shape[0])
+                kept[number] = smooth @ features, finer
+        return kept[divisions]
 
     @cached_property
-    def _kept(self) -> list[tuple[Any, NDArray[np.int64]]]:
-        """Skinning and faces of the mesh, and of those divided ones that were asked for."""
-        return [(self.fit.skinning, self.fit.faces)]
+    def _kept(self) -> dict[int, tuple[Any, NDArray[np.int64]]]:
+        """Skinning and faces by number of divisions, of those meshes that were asked for."""
+        return {0: (self.fit.skinning, self.fit.faces)}
 
 
 def loop_subdivision(faces: NDArray[np.int64], vertices: int) -> tuple[Any, NDArray[np.int64]]:

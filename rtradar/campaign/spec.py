@@ -240,7 +240,8 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
     values = each.get(key, usual)
     if not isinstance(values, list) or not values:
         raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
-    if len({repr(value) for value in values}) < len(values):
+    # 10 and 10.0 are one value.
+    if any(value in values[:place] for place, value in enumerate(values)):
         raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
     return values
 

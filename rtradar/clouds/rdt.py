@@ -149,10 +149,8 @@ class RdtCloud:
                 f"it must be (range, velocity) bool{others}"
             )
         if not (self._last_time < time_s < np.inf):
-            raise InputError(
-                f"RDT cloud: time_s = {time_s}; it must be finite, and later than that of the last "
-                f"mask, {self._last_time}"
-            )
+            later = "" if self._last is None else f", and later than {self._last_time} of the last"
+            raise InputError(f"RDT cloud: time_s = {time_s}; it must be finite{later}")
         if self._last is None:
             self._slab(np.zeros_like(cells), cells, time_s - self._radar.frame_hop_s, time_s)
         else:

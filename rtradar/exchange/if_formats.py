@@ -222,8 +222,12 @@ def open_npy(path: Path) -> SampleFile:
         found = np.lib.format.open_memmap(path, mode="r")
     except Exception as error:  # it parses the header as Python, which fails in many ways
         raise ValueError(in_short(error)) from None
-    if found.dtype.kind not in "ciuf" or not found.flags.c_contiguous:
-        raise ValueError(f"it holds {found.dtype}, or is in the order of Fortran")
+    if found.dtype.kind not in "ciuf":
+        raise ValueError(f"it holds {found.dtype}, not numbers")
+    if not found.flags.c_contiguous:
+        raise ValueError("it is in the order of Fortran; save numpy.ascontiguousarray of it")
+    if found.offset + found.nbytes != path.stat().st_size:
+        raise ValueError("it is longer than its header tells")
 
     def read(first: int, last: int) -> NDArray[Any]:
         # Mapped anew, so that what was read takes no memory.

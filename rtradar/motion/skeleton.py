@@ -74,11 +74,16 @@ class Convention:
         return known
 
     def missing(self, there: Container[str]) -> list[str]:
-        """Names of the joints that are not there, where no alternative is."""
+        """Joints that are not there, with their alternatives, where none of these is."""
         known = self.found(there)
         known |= dict.fromkeys(self.may_lack, "")
-        last = [choices[-1] for node, choices in self.joints.items() if node not in known]
-        return list(dict.fromkeys(one for each in last for one in _names(each) if one not in there))
+        lacking = dict[str, None]()
+        for choices in (self.joints[node] for node in self.joints if node not in known):
+            if all(_names(choice) == [choice] for choice in choices):
+                lacking[" or ".join(choices)] = None
+            else:
+                lacking |= dict.fromkeys(one for one in _names(choices[-1]) if one not in there)
+        return list(lacking)
 
 
 def plain(name: str) -> str:
@@ -114,6 +119,12 @@ def _convention(path: Path, table: Mapping[str, Any], kind: str) -> Convention:
         joints = {node: tuple(re.split(r",\s*", text)) for node, text in texts.items()}
         for choice in itertools.chain(*joints.values()):
             _fraction(choice)
+            if kind == "skeletons" and _names(choice) != [choice]:
+                raise ValueError(f"{choice}: a node of a skeleton is one joint")
+        if kind == "skeletons" and open_ended:
+            # No end site at all: the part starts and ends in one joint, and is extended from there.
+            for end in ("head", "l_hand", "r_hand"):
+                joints[end] += joints[NODE_PARENT[end]]
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(
             f"{path}: {table['name']}: sides, middle and sided are needed, as in names.toml of "
@@ -121,9 +132,6 @@ def _convention(path: Path, table: Mapping[str, Any], kind: str) -> Convention:
         ) from None
     own = {key: table[key] for key in ("low_pass_hz", "head_is_top", "up") if key in table}
     if kind == "skeletons" and open_ended:
-        # No end site at all: the part starts and ends in one joint, and is extended from there.
-        for end in ("head", "l_hand", "r_hand"):
-            joints[end] += joints[NODE_PARENT[end]]
         own["may_lack"] = ("thorax",)
     return Convention(table["name"], joints, open_ended, **own)
 
@@ -286,7 +294,11 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     if "thorax" not in found:  # without a neck the head's own parent is where the trunk ends
         found["thorax"] = motion.parents[found["neck"]]
         if found["thorax"] < 0:
-            raise unknown(motion.name, motion.joints, [(convention, convention.joints["thorax"])])
+            raise unknown(
+                motion.name,
+                motion.joints,
+                [(convention, [" or ".join(convention.joints["thorax"])])],
+            )
     return convention, found
 
 

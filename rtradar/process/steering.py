@@ -24,7 +24,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.cells import Steering
 from rtradar.process.window_functions import taylor
 from rtradar.radar import Radar
-from rtradar.system.threads import one_blas_thread, thread_map
+from rtradar.system.threads import one_blas_thread, thread_count, thread_map
 
 _Reals = NDArray[np.float64]
 _Complex = NDArray[np.complexfloating]
@@ -220,7 +220,7 @@ def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
 # -- arrays of antennas anywhere -------------------------------------------------------------------
 
 _MOST_BEAMS = 2**18  # of the grid
-_WEIGHTS_AT_ONCE = 2**20  # of all channels, toward all sines of the cuts of some cells
+_WEIGHTS_AT_ONCE = 2**20  # of all channels, toward some directions, in all threads together
 
 
 @one_blas_thread()
@@ -242,19 +242,11 @@ def cuts_through_highest(
         )
     range_m = None if bins is None else np.asarray(bins * radar.range_bin_m, np.float64)
     at = _highest(cells, range_m, radar, (y, z), walk)
-    at_once = max(1, _WEIGHTS_AT_ONCE // (len(sines) * radar.n_channels))
 
     def cut(axis: int) -> NDArray[np.float32]:
-        power = np.empty((len(cells), len(sines)), np.float32)
-
-        def fill(first: int) -> None:
-            some = slice(first, first + at_once)
-            toward = np.repeat(at[some, None], len(sines), axis=1)
-            toward[..., axis] = sines
-            own = None if range_m is None else range_m[some]
-            power[some] = _power(cells[some], toward, own, radar, walk)
-
-        thread_map(fill, range(0, len(cells), at_once))
+        toward = np.repeat(at[:, None], len(sines), axis=1)
+        toward[..., axis] = sines
+        power = _powers(cells, toward, range_m, radar, walk)
         power[:, np.abs(sines) > limits[axis] + 1e-12] = 0
         return power
 
@@ -282,7 +274,7 @@ def _highest(
     """
     grid = np.stack([own.ravel() for own in np.meshgrid(*axes, indexing="ij")], axis=1)
     at = np.empty((len(cells), 2))
-    at_once = max(1, _WEIGHTS_AT_ONCE // (len(grid) * radar.n_tx))
+    at_once = max(1, _WEIGHTS_AT_ONCE // (thread_count() * len(grid) * radar.n_tx))
     ranges = np.zeros(len(cells)) if range_m is None else range_m
     pieces = [
         same[first : first + at_once]
@@ -300,8 +292,9 @@ def _highest(
     steps = np.array([np.ptp(own[:2]) for own in axes])
     nine = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(9, 2)
     for step in (steps, steps / 4):
-        around = _power(cells, at[:, None] + nine * step, range_m, radar, walk)
-        at = np.clip(at + _vertices(around.reshape(-1, 3, 3)) * step, -largest, largest)
+        around = _powers(cells, at[:, None] + nine * step, range_m, radar, walk)
+        vertices = _vertices(around.reshape(-1, 3, 3).astype(np.float64))
+        at = np.clip(at + vertices * step, -largest, largest)
     return at
 
 
@@ -327,6 +320,22 @@ def _vertices(power: _Reals) -> _Reals:
         bend.prod(axis=1, keepdims=True) - twist**2
     )
     return np.asarray(np.clip(shift, -1, 1))
+
+
+def _powers(
+    cells: _Complex, sines: _Reals, range_m: _Reals | None, radar: Radar, walk: int
+) -> NDArray[np.float32]:
+    """`_power` of cells that have directions of their own, some at a time."""
+    power = np.empty(sines.shape[:2], np.float32)
+    at_once = max(1, _WEIGHTS_AT_ONCE // (thread_count() * sines.shape[1] * radar.n_channels))
+
+    def fill(first: int) -> None:
+        some = slice(first, first + at_once)
+        own = None if range_m is None else range_m[some]
+        power[some] = _power(cells[some], sines[some], own, radar, walk)
+
+    thread_map(fill, range(0, len(cells), at_once))
+    return power
 
 
 def _power(

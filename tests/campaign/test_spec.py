@@ -179,6 +179,7 @@ NONSENSE = [
     (SMALL + "[each]\nscene = ['moon']", "[each] scene: scene 'moon' is unknown"),
     (SMALL + "[each]\nfidelity = ['perfect']", "[each] fidelity 'perfect' is unknown; allowed: an"),
     (SMALL + "[each]\nsnr_db = [1, 1]", "a value is given twice"),
+    (SMALL + "[each]\nsnr_db = [10, 10.0]", "a value is given twice"),
     (SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]", "is under [each] and under [drawn]"),
     (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
     (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range [least, most]"),

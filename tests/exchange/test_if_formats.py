@@ -86,6 +86,10 @@ def test_rows_are_read_where_they_are_asked_for(
     if suffix == ".npy":
         with pytest.raises(InputError, match="does not tell of its radar"):
             read_if(tmp_path / "cube.npy")
+        with (tmp_path / "cube.npy").open("ab") as file:
+            file.write(b"more")
+        with pytest.raises(InputError, match="longer than its header tells"):
+            open_samples(tmp_path / "cube.npy", RADAR)
     if suffix == ".zarr":
         with pytest.raises(InputError, match=r"cube\.zarr' is there"):
             export(folder, tmp_path / "cube.zarr")

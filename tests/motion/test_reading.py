@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar import InputError, Motion, ValidityWarning, load_motion, synthetic_motion
-from rtradar.motion.skeleton import NODES, to_nodes
+from rtradar.motion.skeleton import NODES, recognise, to_nodes
 from rtradar.recordings import UNITS_M, UPWARD
 
 Array = NDArray[np.float64]
@@ -531,6 +531,23 @@ def test_names_of_ones_own_count_first(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("RTRADAR_NAMES", str(tmp_path / "worse.toml"))
     with pytest.raises(InputError, match=r"worse.toml: \[\[joints\]\] number 1 unknown key 'side'"):
         load_motion(path)
+
+
+@pytest.mark.parametrize(
+    ("middle", "says"),
+    [
+        ('neck = "spine+head"', "spine\\+head: a node of a skeleton is one joint"),
+        ("", "'head'"),
+    ],
+)
+def test_a_skeleton_of_ones_own_names_single_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, middle: str, says: str
+) -> None:
+    names = '[[skeletons]]\nname = "Ours"\nsides = ["left", "right"]\n'
+    (tmp_path / "names.toml").write_text(f"{names}middle = {{{middle}}}\nsided = {{}}\n")
+    monkeypatch.setenv("RTRADAR_NAMES", str(tmp_path / "names.toml"))
+    with pytest.raises(InputError, match=f"Ours: sides, middle and sided are needed.*({says})"):
+        recognise("a file", ["Hips"], "skeletons")
 
 
 # -- body models -----------------------------------------------------------------------------------

@@ -449,6 +449,8 @@ def test_antennas_anywhere_add_up_in_the_direction_of_a_point(array: str, focus:
                 values[cell, walk + offset, channel] = np.exp(2j * np.pi * turns)
     if array == "wide" and focus:
         assert (values[:, walk] == 0).any()  # some echoes end in other bins
+    nothing = angle_spectra(values[:0], radar, range_m[:0], range_m[:0], focus=focus)
+    assert nothing.y.shape == nothing.z.shape == (0, len(nothing.sines))
     seen = angle_spectra(values, radar, range_m, np.zeros(len(bins)), focus=focus)
     for axis, power in enumerate((seen.y, seen.z)):
         assert power is not None

@@ -317,7 +317,8 @@ def _clauses(text: TextFile) -> Iterator[tuple[str, list[str], int]]:
     key, words, line = "", list[str](), 1
     for raw in text:
         for word in raw.replace("{", " { ").replace("}", " } ").split():
-            if word.upper() not in _KEYS:
+            names = key.upper() in ("ROOT", "JOINT", "END")  # any words, up to the brace
+            if word.upper() not in _KEYS or (names and word != "{"):
                 if key in ("{", "}"):
                     raise text.fail(f"{word[:40]!r} is not expected in a BVH hierarchy")
                 words.append(word)

@@ -175,6 +175,8 @@ def _checked(asked: str, traits: Traits) -> tuple[str, _Chosen]:
                 f"{asked!r}: {text!r} is no NAME=VALUE; allowed names are {', '.join(names)}"
             )
         given[name] = _parsed(value)
+    if others := traits.keys() - rules_of(_Chosen):
+        raise TypeError(f"synthetic_motion: {min(others)!r} is no trait; {', '.join(names)} are")
     every: dict[str, Any] = {**given, **traits}
     chosen = _Chosen(**every)
     check_fields(chosen, f"synthetic {activity}: ")

@@ -349,7 +349,12 @@ class _OverLegs:
 
     def __init__(self, model: EchoModel, radar: Radar, body: Body, surfaces: Surfaces) -> None:
         self._model, self._radar, self._body, self._surfaces = model, radar, body, surfaces
-        self.variant = model.variant
+        self.traces = bool(getattr(model, "traces", False))
+
+    @property
+    def variant(self) -> str | None:
+        """Backend that traced, or None."""
+        return self._model.variant
 
     def account(self) -> dict[str, Any] | None:
         """Report what the model did."""

@@ -83,6 +83,15 @@ def test_poses_by_hand(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["root", "End", "Root Motion", "Joint"])
+def test_a_joint_may_have_the_name_of_a_key(tmp_path: Path, name: str) -> None:
+    usual = load_motion(write(tmp_path, CARRIED))
+    named = load_motion(write(tmp_path, CARRIED.replace("ROOT world", f"ROOT {name}")))
+    np.testing.assert_array_equal(named.root_positions, usual.root_positions)
+    named = load_motion(write(tmp_path, CARRIED.replace("JOINT chest", f"JOINT {name}")))
+    assert name.split()[-1] in named.joints or name in named.joints
+
+
 def test_carrying_joint_becomes_root_and_positions_replace_offsets(tmp_path: Path) -> None:
     motion = load_motion(write(tmp_path, CARRIED))
     assert motion.joints == ("hip", "knee", "knee_end", "chest")
