@@ -101,7 +101,7 @@ def rows_of(kind: Any, quick: bool) -> Iterator[Row]:
     def spheres(_: Poses, time_: int, targets: Array) -> NDArray[np.bool_]:
         tracer.pose(poses.centres[time_], poses.frames[time_])
         far = ANTENNA + 3 * (targets - ANTENNA)
-        return ~tracer.sees(np.broadcast_to(ANTENNA, far.shape), far, none)
+        return ~tracer.sees(np.broadcast_to(ANTENNA, far.shape), far, none[: len(far)])
 
     ways: dict[str, Callable[[Poses, int, Array], NDArray[np.bool_]]] = {
         "the sphere in each part's axes": spheres,
