@@ -50,10 +50,11 @@ count = {half}
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 BUILD = """import json, sys
+from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 if __name__ == "__main__":
     from rtradar.campaign import build_dataset
-    report = build_dataset(sys.argv[2], sys.argv[3], workers=int(sys.argv[4]))
+    report = build_dataset(Path(sys.argv[2]), Path(sys.argv[3]), workers=int(sys.argv[4]))
     print(json.dumps([report["made"], report["wall_s"]]))
 """
 
