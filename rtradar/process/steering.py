@@ -346,16 +346,12 @@ def _power(
     ``range_m (cell or 1,)`` are the ranges; without them waves are plane. It is 0 where both sines
     together are no direction.
     """
-    tx, rx = (np.arange(radar.n_tx).repeat(radar.n_rx), radar.rx_of_tx.ravel())
-    carrier = radar.centre_frequency_hz + radar.tx_offset_hz
-    # A receiver has one phase for each carrier, of which there are several under FDM alone.
-    used, which = np.unique(np.stack([rx, carrier[tx]]), axis=1, return_inverse=True)
-    rx = used[0].astype(np.int64)
+    tx, which, rx, carrier, carrier_back = _phased(radar)
     ahead = 1 - (sines**2).sum(axis=2)
     direction = np.concatenate([np.sqrt(np.maximum(ahead, 0))[..., None], sines], axis=2)
     there = _excess_m(direction, radar.tx_m, range_m)
-    back = _excess_m(direction, radar.rx_m[rx], range_m)
-    of_tx, of_rx = _phasors(there, carrier), _phasors(back, used[1])
+    back = _excess_m(direction, rx, range_m)
+    of_tx, of_rx = _phasors(there, carrier), _phasors(back, carrier_back)
     values = np.zeros((len(cells), radar.n_tx, len(rx)), np.complex64)
     values[:, tx, which] = cells[:, walk]
     # First the receivers of each Tx are added, then all Tx. Where cells share their directions, it
@@ -363,12 +359,12 @@ def _power(
     part = values.reshape(len(sines), -1, len(rx)) @ of_rx.swapaxes(1, 2)
     part = part.reshape(len(cells), radar.n_tx, -1)
     beams = (part * of_tx.swapaxes(1, 2)).sum(axis=1)
-    if walk and range_m is not None:
+    farthest = np.abs(there).max(axis=2) + np.abs(back).max(axis=2)
+    far = farthest.max(axis=0) > radar.range_bin_m
+    if walk and range_m is not None and far.any():
         # Elements whose path ends in another range bin are read there. From one range bin to the
         # next the phase also turns by half a turn, because the window function is even about the
         # middle of the chirp.
-        farthest = np.abs(there).max(axis=2) + np.abs(back).max(axis=2)
-        far = farthest.max(axis=0) > radar.range_bin_m
         weights = of_tx[:, far][..., tx] * of_rx[:, far][..., which]
         excess = there[:, far][..., tx] + back[:, far][..., which]
         offsets = np.rint(excess / (2 * radar.range_bin_m))
@@ -380,6 +376,21 @@ def _power(
             beams[:, far] += added.reshape(len(cells), -1)
     power = np.abs(beams / radar.n_channels) ** 2
     return np.asarray(power * (ahead >= 0))
+
+
+@lru_cache(maxsize=16)
+def _phased(radar: Radar) -> tuple[NDArray[np.int64], NDArray[np.int64], _Reals, _Reals, _Reals]:
+    """Which antennas have phases of their own: all Tx, and each receiver at each carrier.
+
+    There are several carriers under FDM alone. Returned are the Tx of each channel and its number
+    among the receivers (channel,), places of these (receiver, 3) [m], and the carriers of the Tx
+    and of the receivers [Hz].
+    """
+    tx, carrier = np.arange(radar.n_tx), radar.centre_frequency_hz + radar.tx_offset_hz
+    channels = np.stack([radar.rx_of_tx.ravel(), carrier.repeat(radar.n_rx)])
+    receivers, which = np.unique(channels, axis=1, return_inverse=True)
+    places = radar.rx_m[receivers[0].astype(np.int64)]
+    return tx.repeat(radar.n_rx), which.ravel(), places, carrier, receivers[1]
 
 
 def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | None) -> _Reals:
