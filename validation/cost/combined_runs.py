@@ -123,7 +123,7 @@ CASES = {
         BOARD + MOVING + RECEIVER,
     ),
     "fan beside a mesh body, Doppler division": Case(
-        (), "fan-beside-person", ("--fidelity", "specular"), MESH_BODY, DIVISION
+        (), "fan-beside-person", ("--fidelity", "physical-optics"), MESH_BODY, DIVISION
     ),
     "swinging door, two people, auto": Case(
         ("synthetic:walk", "synthetic:punch"),
