@@ -58,13 +58,8 @@ class Line:
         The direction has the ``sines (...)`` along the line; without a range it is a plane wave.
         """
         u = np.asarray(sines, dtype=np.float64)[..., None]
-        if range_m is None:
-            return np.asarray(-(self.tx_m + self.rx_m) * u)
-        there, back = (
-            np.sqrt(range_m**2 - 2 * range_m * place * u + place**2)
-            for place in (self.tx_m, self.rx_m)
-        )
-        return np.asarray(there + back - 2 * range_m)
+        there, back = (_excess_m(u, own[:, None], range_m) for own in (self.tx_m, self.rx_m))
+        return there + back
 
 
 @lru_cache(maxsize=16)
@@ -349,8 +344,8 @@ def _power(
     tx, which, rx, carrier, carrier_back = _phased(radar)
     ahead = 1 - (sines**2).sum(axis=2)
     direction = np.concatenate([np.sqrt(np.maximum(ahead, 0))[..., None], sines], axis=2)
-    there = _excess_m(direction, radar.tx_m, range_m)
-    back = _excess_m(direction, rx, range_m)
+    away = None if range_m is None else range_m[:, None, None]
+    there, back = (_excess_m(direction, places, away) for places in (radar.tx_m, rx))
     of_tx, of_rx = _phasors(there, carrier), _phasors(back, carrier_back)
     values = np.zeros((len(cells), radar.n_tx, len(rx)), np.complex64)
     values[:, tx, which] = cells[:, walk]
@@ -393,13 +388,17 @@ def _phased(radar: Radar) -> tuple[NDArray[np.int64], NDArray[np.int64], _Reals,
     return tx.repeat(radar.n_rx), which.ravel(), places, carrier, receivers[1]
 
 
-def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | None) -> _Reals:
-    """Path (..., place) from a point to each place less the range [m]; plane without range."""
+def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | float | None) -> _Reals:
+    """Path (..., place) from a point to each place less the range, :eq:`near-field` [m].
+
+    ``direction (..., axis)`` are the sines of the point along the axes of ``places_m (place,
+    axis)``; without a range the wave is plane.
+    """
     along = direction @ places_m.T
     if range_m is None:
         return np.asarray(-along)
-    own = range_m[:, None, None]
-    return np.asarray(np.sqrt(own**2 - 2 * own * along + (places_m**2).sum(axis=1)) - own)
+    square = range_m**2 - 2 * range_m * along + (places_m**2).sum(axis=1)
+    return np.asarray(np.sqrt(square) - range_m)
 
 
 def _phasors(excess_m: _Reals, carrier_hz: _Reals) -> NDArray[np.complex64]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import runpy
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -35,9 +36,11 @@ from rtradar.recognition.recogniser import (
     occupancy,
     outline,
 )
-from rtradar.validate import validation_folder
 
-MAKER = runpy.run_path(str(validation_folder() / "measurements" / "shipped_weights.py"))
+
+@pytest.fixture
+def maker(script: Callable[[str], ModuleType]) -> ModuleType:
+    return script("measurements/shipped_weights.py")
 
 
 def cloud(n_points: int, length_s: float = 3.0) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -58,13 +61,15 @@ def run_folder(folder: Path, radar: Radar, **parameters: Any) -> Path:
     return folder
 
 
-def test_the_forest_in_numpy_answers_as_scikit_learn_does(tmp_path: Path) -> None:
+def test_the_forest_in_numpy_answers_as_scikit_learn_does(
+    tmp_path: Path, maker: ModuleType
+) -> None:
     random = np.random.default_rng(0)
     described = random.normal(size=(80, 5)).astype(np.float32)
     forest = ExtraTreesClassifier(20, random_state=0).fit(described, random.integers(3, size=80))
     usual = {"mean": np.zeros(5), "inverse_covariance": np.eye(5), "most": 1.0}
     card = {"classes": ["a", "b", "c"], "temperature": 1.0, "usual": usual}
-    Recogniser(MAKER["arrays_of"](forest), card).save(tmp_path / "weights.npz")
+    Recogniser(maker.arrays_of(forest), card).save(tmp_path / "weights.npz")
     recogniser = Recogniser.load(tmp_path / "weights.npz")
     assert recogniser.classes == ("a", "b", "c")
     asked = random.normal(size=(50, 5)).astype(np.float32)
@@ -153,16 +158,16 @@ def test_no_extra_is_needed() -> None:
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0
 
 
-def test_a_temperature_mends_what_is_too_sure_of_itself() -> None:
+def test_a_temperature_mends_what_is_too_sure_of_itself(maker: ModuleType) -> None:
     random = np.random.default_rng(0)
     honest = random.uniform(0.05, 0.95, 4000)
     truth = (random.random(4000) > honest).astype(int)
     names = np.arange(4000).astype(str)
     both = np.stack([honest, 1 - honest], axis=1)
-    sure = Answers(MAKER["with_temperature"](both, 0.5), truth, names, names)
+    sure = Answers(maker.with_temperature(both, 0.5), truth, names, names)
     assert calibration_error(sure) > 0.1
-    assert MAKER["best_temperature"](sure) == pytest.approx(2, rel=0.1)
-    mended = sure._replace(probabilities=MAKER["with_temperature"](sure.probabilities, 2.0))
+    assert maker.best_temperature(sure) == pytest.approx(2, rel=0.1)
+    mended = sure._replace(probabilities=maker.with_temperature(sure.probabilities, 2.0))
     assert mended.probabilities == pytest.approx(both)
     assert calibration_error(mended) < 0.03  # 4000 answers
 

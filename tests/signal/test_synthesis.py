@@ -179,7 +179,8 @@ def test_many_echoes_are_the_plain_sum_to_float32(samples: int, nodes: int) -> N
     frequency = radar.centre_frequency_hz + radar.bandwidth_hz * places
     tx = radar.tx_of_chirp(np.arange(3))
     echoes = make_echoes(length, parts[0] + 1j * parts[1], frequency, tx)
-    received = dataclasses.replace(echoes, amplitude=echoes.amplitude * in_band(echoes, radar))
+    within = (echoes.length >= 0) & (echoes.length < 2 * radar.max_range_m)
+    received = dataclasses.replace(echoes, amplitude=echoes.amplitude * within)
     found = synthesize_block(echoes, radar, np.complex64)
     assert found.dtype == np.complex64
     assert relative_error(found, plain_sum(received, radar)) < 6e-7

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -24,12 +23,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from same_maps import largest_difference
+from speed_since import RUN, children_s
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-RUN = """import sys
-sys.path.insert(0, sys.argv.pop(1))
-from rtradar.cli import main
-sys.exit(main())"""
 
 FAN = """
 [[objects]]
@@ -144,13 +140,12 @@ def words_of(case: Case, folder: Path, duration_s: float) -> list[str]:
 
 def run(checkout: Path, words: list[str], out: Path) -> float:
     """Run a checkout, and return the CPU time of the process and of all that it starts [s]."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-c", RUN, str(checkout), "run", *words, "--out", str(out)]
+    before = children_s()
+    command = [sys.executable, "-P", "-c", RUN, str(checkout), "run", *words, "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=out.parent, check=False)
     if done.returncode:
         raise RuntimeError(f"{checkout}: {done.stderr.strip().splitlines()[-1]}")
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return children_s() - before
 
 
 def main() -> int:

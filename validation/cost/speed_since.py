@@ -38,6 +38,7 @@ CASES = {
     "specular, mean removed": ("--fidelity", "specular", "--clutter-removal", "mean"),
     "specular, living-room": ("--fidelity", "specular", "--scene", "living-room"),
     "specular, 77 GHz": ("--fidelity", "specular", "--radar", "paper-77ghz"),
+    "specular, board": ("--fidelity", "specular", "--radar", "iwr6843"),
 }
 RUN = """import sys
 sys.path.insert(0, sys.argv.pop(1))
