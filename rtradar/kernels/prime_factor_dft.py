@@ -47,13 +47,6 @@ class PrimeFactorDft(NamedTuple):
     sines: tuple[NDArray[np.float32], NDArray[np.float32]]
     factors: tuple[int, int]
 
-    @property
-    def multiply_adds(self) -> int:
-        """Multiply-adds of one transform: those of paired terms, real and imaginary parts."""
-        return 4 * sum(
-            len(self.cycle_at) // factor * ((factor - 1) // 2) ** 2 for factor in self.factors
-        )
-
 
 @lru_cache(maxsize=8)
 def prime_factor_dft(n_cycles: int) -> PrimeFactorDft | None:

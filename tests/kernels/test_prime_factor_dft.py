@@ -105,11 +105,3 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
     add_doppler_power(spectra, range(1), np.ones(133, dtype=np.float32), dft, power)
     assert np.isnan(power[:, 3]).all()
     assert np.isfinite(np.delete(power, 3, axis=1)).all()
-
-
-def test_its_multiply_adds_are_counted() -> None:
-    dft = prime_factor_dft(35)
-    assert dft is not None
-    # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and
-    # five of seven; of both parts.
-    assert dft.multiply_adds == 2 * (7 * (2 * 2 + 2 * 2) + 5 * (3 * 3 + 3 * 3))

@@ -255,9 +255,6 @@ class SolidFace(Wall):
         """Area of the face itself [m^2]."""
         return self.fraction * sum(wide * high for _, _, wide, high in self.patches)
 
-    def _check_slab(self, where: str) -> None:
-        """A half-space has no thickness to be checked."""
-
 
 class FaceSummary(NamedTuple):
     """What became of a face: its area [m^2], and the ``reason`` why it was left out, "" if not."""
