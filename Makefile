@@ -21,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 demo: $(VENV)/.installed
 	$(BIN)/rtradar doctor
-	$(BIN)/rtradar compare synthetic:walk --duration 3 --fidelities analytic,specular --out out/demo --overwrite
+	$(BIN)/rtradar compare synthetic:walk --duration 3 --fidelities analytic,specular --pictures --out out/demo --overwrite
 	@echo
 	@echo "A synthetic person walked before the paper's 12 GHz radar, by two models with the same noise: 'analytic', with"
 	@echo "closed forms that no part occludes, and 'specular', which traces what is occluded. The table says how they differ."

@@ -196,24 +196,14 @@ def small_run(small: rt.Radar, tmp_path_factory: pytest.TempPathFactory) -> Path
     """The folder of a small run, with its IF samples, for all who only read one."""
     out = tmp_path_factory.mktemp("run") / "out"
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
-    rt.run(motion, small, out=out, fidelity="analytic", save_if=True, pictures=False)
+    rt.run(motion, small, out=out, fidelity="analytic", save_if=True)
     return out
 
 
 @pytest.fixture(scope="session")
-def beside_a_wall(small: rt.Radar) -> tuple[rt.Radar, rt.Scene]:
+def beside_a_wall(small: rt.Radar, rtradar_scene: rt.Scene) -> tuple[rt.Radar, rt.Scene]:
     """The small radar, and a scene with one metal wall on its left: few echoes on each path."""
-    from rtradar.scene import Wall, material
-
-    left = Wall(
-        name="left",
-        corner_m=(-4.4, 2.7, 0.0),
-        edge_u_m=(6.8, 0.0, 0.0),
-        edge_v_m=(0.0, 0.0, 2.5),
-        material=material("metal"),
-        thickness_m=0.01,
-    )
-    return small, rt.Scene(name="one wall", walls=(left,))
+    return small, rtradar_scene
 
 
 @pytest.fixture(scope="session")

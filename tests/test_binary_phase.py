@@ -94,7 +94,7 @@ def test_a_run_finds_the_person_where_tdm_does() -> None:
 def test_samples_that_were_written_give_the_maps_of_the_run(tmp_path: Path) -> None:
     motion = rt.synthetic_motion("walk", duration_s=0.1)
     folder = tmp_path / "run"
-    ran = rt.run(motion, TWO, fidelity="analytic", out=folder, save_if=True, pictures=False)
+    ran = rt.run(motion, TWO, fidelity="analytic", out=folder, save_if=True)
     maps = []
     for name, layout in ("run", None), ("sums.npy", None), ("adc.bin", Dca1000Layout()):
         if name != "run":

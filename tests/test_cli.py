@@ -66,7 +66,8 @@ def run(*words: object) -> int:
 @pytest.fixture(scope="module")
 def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("walk") / "new" / "out"
-    assert run("synthetic:walk", *SHORT, "--fidelity", "specular", "--save-if", "--out", out) == 0
+    words = [*SHORT, "--fidelity", "specular", "--save-if", "--pictures"]
+    assert run("synthetic:walk", *words, "--out", out) == 0
     return out
 
 
@@ -159,7 +160,7 @@ def test_if_samples_are_kept_whole(walked: Path) -> None:
 def test_the_same_seed_gives_the_same_files_and_replaces_them(walked: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
     for _ in range(2):
-        words = [*SHORT, "--fidelity", "specular", "--no-pictures", "--out", tmp_path]
+        words = [*SHORT, "--fidelity", "specular", "--out", tmp_path]
         assert run("synthetic:walk", *words) == 0
     assert (tmp_path / "mine.txt").read_text() == "keep"
     with h5py.File(walked / "maps.h5") as first, h5py.File(tmp_path / "maps.h5") as second:
@@ -183,7 +184,7 @@ def test_a_model_option_reaches_the_model_and_json_goes_where_it_is_asked_for(
     small_file: Path, tmp_path: Path
 ) -> None:
     words = ["--fidelity", "specular", "--model-option", "visibility=gradual"]
-    words += ["--out", tmp_path / "out", "--radar", small_file, "--no-pictures"]
+    words += ["--out", tmp_path / "out", "--radar", small_file]
     assert run("synthetic:punch", *SHORT, *words, "--json", tmp_path / "s.json") == 0
     summary = json.loads((tmp_path / "s.json").read_text())
     assert summary["parameters"]["model_options"] == {"visibility": "gradual"}

@@ -52,7 +52,7 @@ def run_into(small_file: Path) -> Runner:
     """Runs a small simulation into a folder, with more words, and gives the exit status."""
 
     def run_into(out: Path, *more: str) -> int:
-        words = ["synthetic:walk", "--duration", "0.2", "--fidelity", "analytic", "--no-pictures"]
+        words = ["synthetic:walk", "--duration", "0.2", "--fidelity", "analytic"]
         return main(["run", *words, *more, "--radar", str(small_file), "--out", str(out)])
 
     return run_into

@@ -14,7 +14,7 @@ from rtradar.cli import main
 from rtradar.pipeline.timing import Stages, lines_shown, stage_line
 
 Capture = pytest.CaptureFixture[str]
-RUN = ["run", "synthetic:walk", "--duration", "0.2", "--fidelity", "analytic", "--no-pictures"]
+RUN = ["run", "synthetic:walk", "--duration", "0.2", "--fidelity", "analytic"]
 
 
 class Terminal(io.StringIO):
@@ -29,7 +29,7 @@ def on_terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return shown
 
 
-def test_a_run_names_its_page_opens_it_and_draws_no_pictures_if_so_asked(
+def test_a_run_names_its_page_opens_it_and_draws_no_pictures_unless_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     opened: list[str] = []

@@ -104,7 +104,6 @@ def test_a_run_by_watts(tmp_path: Path) -> None:
             radar,
             out=tmp_path / name,
             fidelity="analytic",
-            pictures=False,
             snr_db="physical",
             range_window="hann",
             doppler_window="hann",

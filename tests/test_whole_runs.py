@@ -36,7 +36,7 @@ def fraction_at(out: Path, range_m: float) -> float:
 @pytest.mark.parametrize("level", MODELS.built_in)
 def test_a_run_by_every_level(level: str, small_file: Path, tmp_path: Path) -> None:
     words = ["--radar", str(small_file), *SHORT, *LESS.get(level, ()), "--out", str(tmp_path)]
-    words += [] if level == "specular" else ["--no-pictures"]
+    words += ["--pictures"] if level == "specular" else []
     assert main(["run", "synthetic:kick", "--fidelity", level, *words]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["fidelity"] == level
@@ -50,8 +50,8 @@ def test_a_run_in_every_scene(name: str, small_file: Path, tmp_path: Path) -> No
     scene, radar = rt.Scene.load(name), tmp_path / "one_tx.toml"
     radar.write_text(small_file.read_text().replace("tx_y = 2", "tx_y = 1"))
     words = ["--radar", str(radar), *SHORT, "--clutter-removal", "mean"]
-    # Pictures of rooms, which take most of the time, are those of `tests/pipeline/test_indoors.py`.
-    words += ["--no-pictures", "--scene", name, "--out", str(tmp_path / "out")]
+    words += ["--scene", name, "--out", str(tmp_path / "out")]
+    words += ["--pictures"] if name == "living-room" else []
     assert main(["run", "synthetic:kick", *words]) == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["parameters"]["scene"] == name

@@ -99,13 +99,12 @@ def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     from rtradar.pipeline.timing import lines_shown
 
     capture.pop("fidelity")
+    capture |= {"fidelities": fidelities, "pictures": options.pictures}
     with lines_shown():
         if several:
-            found = pipeline.compare_recordings(
-                capture.pop("motion"), **capture, fidelities=fidelities
-            )
+            found = pipeline.compare_recordings(capture.pop("motion"), **capture)
         else:
-            found = pipeline.compare(**capture, fidelities=fidelities)
+            found = pipeline.compare(**capture)
     yield found.summary
     if options.verbose and not several:
         for name, figures in found.summary["fidelities"].items():
@@ -347,6 +346,7 @@ def process(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
             samples.radar,
             options.out,
             overwrite=options.overwrite,
+            pictures=options.pictures,
             unit=samples.unit,
             **settings,
         )

@@ -28,7 +28,8 @@ from rtradar.paper.items import ACTIVITIES, Sources
 from rtradar.pipeline import Result, run, simulate
 from rtradar.process import ca_cfar, os_cfar, power_map, range_spectrum
 from rtradar.radar import Radar
-from rtradar.report.canvas import VELOCITY_LABEL, add_colour_bar, bin_edges, draw_levels, few_ticks
+from rtradar.report.canvas import VELOCITY_LABEL, add_colour_bar, few_ticks
+from rtradar.report.maps import bin_edges, draw_levels
 from rtradar.system.figure_style import DIVERGING, LIGHT, dress, new_figure, save_figure
 from rtradar.validate import choose, claims, run_claim, validation_folder
 

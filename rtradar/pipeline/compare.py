@@ -78,6 +78,7 @@ def compare(
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
     overwrite: bool = False,
+    pictures: bool = False,
     **options: Unpack[RunOptions],
 ) -> Comparison:
     """Run several models on the same recording and tell how they differ.
@@ -98,6 +99,8 @@ def compare(
     overwrite : bool
         Whether files that ``out`` holds under names of the new ones are replaced even where no
         ``compare.json`` lists them.
+    pictures : bool
+        Whether each run draws PNG files of its own as well, as `run` does.
     **options
         Settings of all runs, the fields of `rtradar.RunSettings` but ``fidelity``.
 
@@ -117,7 +120,7 @@ def compare(
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     asked = settings = settings_of("compare", RunOptions, options)
-    moving, before, there = given_parts(motion, radar, scene, settings)
+    parts = moving, _, there = given_parts(motion, radar, scene, settings)
     if not people_in(there, moving)[1]:
         raise InputError(
             f"compare: nobody is in scene '{there.name}', and it is people's echoes that levels "
@@ -130,25 +133,25 @@ def compare(
         occluded: dict[str, _Occluded] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            into = folder / name
-            results[name] = run_into(into, moving, before, there, own, place=place / name)
-            occluded[name] = _occluded(results[name], moving, before, there, own)
+            written: dict[str, Any] = {"pictures": pictures, "place": place / name}
+            results[name] = run_into(folder / name, *parts, own, **written)
+            occluded[name] = _occluded(results[name], *parts, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, occluded, names[-1])
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
-            other = run_into(Path(again, "again"), moving, before, there, own, pictures=False)
+            other = run_into(Path(again, "again"), *parts, own)
             summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]])
-        pictures, unit = _draw(results, occluded, folder, names[-1])
+        drawn, unit = _draw(results, occluded, folder, names[-1])
         views = {name: load_run_view(folder / name) for name in names}
         comparison.write_comparison(
-            folder / "compare.html", summary, comparison_rows(summary), pictures, unit, views
+            folder / "compare.html", summary, comparison_rows(summary), drawn, unit, views
         )
         write_figures(folder, summary, kind)
 
     def capture(name: str) -> Capture:
-        return prepare(moving, before, there, replace(asked, fidelity=name))
+        return prepare(*parts, replace(asked, fidelity=name))
 
     return Comparison(summary, Path(out), _captures=lambda: {name: capture(name) for name in names})
 
@@ -162,6 +165,7 @@ def compare_recordings(
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
     overwrite: bool = False,
+    pictures: bool = False,
     **options: Unpack[RunOptions],
 ) -> Comparison:
     """Compare models on several recordings, each by itself, and tell the mean and its interval.
@@ -180,6 +184,8 @@ def compare_recordings(
         Two models or more, each once, the reference last; `rtradar.scatter.MODELS` has their names.
     overwrite : bool
         Whether files of other origin are replaced, as by `compare`.
+    pictures : bool
+        Whether each run draws PNG files of its own as well, as `run` does.
     **options
         Settings of all runs: fields of `rtradar.RunSettings`.
 
@@ -207,6 +213,7 @@ def compare_recordings(
             out=place / name,
             fidelities=fidelities,
             overwrite=overwrite,
+            pictures=pictures,
             **options,
         )
         found.append(one.summary)

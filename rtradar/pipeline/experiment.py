@@ -98,7 +98,7 @@ class Experiment:
         return parts_of(self.table, self.folder)
 
     def run(
-        self, out: str | Path | None = None, *, overwrite: bool = False, pictures: bool = True
+        self, out: str | Path | None = None, *, overwrite: bool = False, pictures: bool = False
     ) -> Result:
         """Run it, as `rtradar.run` does.
 
@@ -109,7 +109,7 @@ class Experiment:
         overwrite : bool
             Whether files of others that have the names of new ones are replaced.
         pictures : bool
-            Whether pictures are drawn.
+            Whether PNG files are drawn, as by `rtradar.run`.
 
         Returns
         -------
@@ -193,7 +193,7 @@ def sweep(
     *,
     out: str | Path,
     overwrite: bool = False,
-    pictures: bool = True,
+    pictures: bool = False,
 ) -> Sweep:
     """Run an experiment with every combination of the values of some keys.
 
@@ -208,7 +208,7 @@ def sweep(
     overwrite : bool
         Whether files of other origin are replaced.
     pictures : bool
-        Whether pictures of the runs are drawn.
+        Whether the runs draw PNG files of their own.
 
     Returns
     -------

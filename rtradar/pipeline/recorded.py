@@ -13,9 +13,15 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.output.pictures import draw_found, write_page
+from rtradar.pipeline.output.pictures import Shown
 from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
-from rtradar.pipeline.output.writer import RUN_FILES, RunWriter, open_maps, write_clouds
+from rtradar.pipeline.output.writer import (
+    RUN_FILES,
+    RunWriter,
+    open_maps,
+    read_maps,
+    write_clouds,
+)
 from rtradar.pipeline.prepare import with_background
 from rtradar.pipeline.processing import Clouds, Processing, block_chirps, refuse_large_maps
 from rtradar.pipeline.result import Result
@@ -58,6 +64,7 @@ def process_samples(
     out: str | Path | None = None,
     *,
     overwrite: bool = False,
+    pictures: bool = False,
     unit: Literal["m", "count"] = "m",
     **options: Unpack[ProcessingOptions],
 ) -> Result:
@@ -77,6 +84,8 @@ def process_samples(
         Folder for maps, clouds, pictures, report and summary; as for `run`.
     overwrite : bool
         Whether files of others in ``out`` are replaced; as for `run`.
+    pictures : bool
+        Whether PNG files are drawn as well; as for `run`.
     unit : {"m", "count"}
         Unit of the samples. Powers of the maps are in its square; pictures show cross-sections of
         samples in metres, and levels of those that are the numbers of an ADC.
@@ -120,17 +129,32 @@ def process_samples(
             maps.load()
         result = _result(blocks, processing, clouds, started)
         return replace(result, summary=finished(result.summary), _in_memory=maps)
-    with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
+    return _into(Path(out), blocks, processing, started, overwrite, pictures)
+
+
+def _into(
+    out: Path,
+    blocks: _Blocks,
+    processing: Processing,
+    started: Moment,
+    overwrite: bool,
+    pictures: bool,
+) -> Result:
+    """Process samples and write the files of `RUN_FILES` into a folder."""
+    with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         clouds = _stream(blocks, processing, folder / "maps.h5")
         with processing.stages.time("write"):
             write_clouds(folder, clouds)
         result = _result(blocks, processing, clouds, started)
-        with processing.stages.time("pictures"):
-            pictures, _ = draw_found(folder, result)
-        with processing.stages.time("report"):
-            write_page(folder, result, pictures)
+        with read_maps(folder / "maps.h5") as maps:
+            shown = Shown.of(result, maps)
+            if pictures:
+                with processing.stages.time("pictures"):
+                    shown.draw(folder)
+            with processing.stages.time("report"):
+                shown.write_page(folder, result)
         summary = finished(result.summary | cost(processing, blocks.n_chirps, started), folder)
-        return replace(result, summary=summary, out=Path(out).absolute())
+        return replace(result, summary=summary, out=out.absolute())
 
 
 def _result(blocks: _Blocks, processing: Processing, clouds: Clouds, started: Moment) -> Result:

@@ -24,7 +24,7 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.pictures import draw_pictures, write_page
+from rtradar.pipeline.output.pictures import Shown
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
 from rtradar.pipeline.output.truth import EchoTable, chirps_between, labelled_echoes
@@ -67,7 +67,7 @@ def run(
     *,
     out: str | Path | None = None,
     overwrite: bool = False,
-    pictures: bool = True,
+    pictures: bool = False,
     **options: Unpack[RunOptions],
 ) -> Result:
     """Simulate people before a radar: maps, clouds and a summary, in memory or in a folder.
@@ -90,7 +90,8 @@ def run(
         Whether files that ``out`` holds under names of the new ones are replaced even where no
         ``summary.json`` lists them.
     pictures : bool
-        Whether pictures are drawn into ``out``. The report is made without them too.
+        Whether maps, clouds and room are also drawn as PNG files into ``out``. The report shows
+        them all by itself.
     **options
         Settings, such as ``fidelity``, ``snr_db`` or ``seed``: the fields of `rtradar.RunSettings`.
 
@@ -153,7 +154,7 @@ def run_into(
     scene: Scene,
     settings: RunSettings,
     overwrite: bool = False,
-    pictures: bool = True,
+    pictures: bool = False,
     place: Path | None = None,
 ) -> Result:
     """Run with these settings and write the files of `RUN_FILES` into a folder; see `run`.
@@ -172,19 +173,20 @@ def run_into(
         with capture.stages.time("write"):
             write_clouds(folder, clouds)
         result = _result(capture, clouds, started, rays_before)
-        drawn: dict[str, Path] = {}
-        if pictures:
-            with capture.stages.time("pictures"):
-                drawn = draw_pictures(folder, capture, result)
         summary = result.summary
         summary["run"] = write_run_file(folder, place or out, capture.described())
-        with capture.stages.time("view"), read_maps(folder / "maps.h5") as maps:
-            shown = snapshots(table)
-            save_snapshots(folder / "view.npz", shown)
-            summary |= room_findings(capture, maps)
-            run_view = run_view_of(result, maps, shown.every(shown.stride(*_MOMENTS)))
-        with capture.stages.time("report"):
-            write_page(folder, result, drawn, run_view)
+        with read_maps(folder / "maps.h5") as maps:
+            with capture.stages.time("view"):
+                moments = snapshots(table)
+                save_snapshots(folder / "view.npz", moments)
+                summary |= room_findings(capture, maps)
+                run_view = run_view_of(result, maps, moments.every(moments.stride(*_MOMENTS)))
+            shown = Shown.of(result, maps, capture)
+            if pictures:
+                with capture.stages.time("pictures"):
+                    shown.draw(folder)
+            with capture.stages.time("report"):
+                shown.write_page(folder, result, run_view)
         summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
         return replace(result, summary=finished(summary, folder), out=out.absolute())
 

@@ -37,7 +37,6 @@ from rtradar.system.figure_style import DIVERGING, STYLE, dress, fit, theme_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.image import AxesImage
 
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
@@ -107,78 +106,6 @@ def field_unit(
     # The first bin begins at the antennas.
     distance = np.maximum(np.asarray(range_m, dtype=np.float64), radar.range_bin_m / 2)
     return FieldUnit("dBsm", distance**4)
-
-
-def colour_limits(
-    level_db: NDArray[np.float64], below_peak_db: float = 60.0
-) -> tuple[float, float]:
-    """Return the limits of the colour scale [dB].
-
-    They are the peak and 3 dB below the median, or ``below_peak_db`` below the peak if higher.
-    """
-    top = float(level_db.max())
-    return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
-
-
-def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
-    """Outer edges of evenly spaced bins."""
-    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
-    return float(centres[0] - half), float(centres[-1] + half)
-
-
-def draw_levels(
-    axes: Axes,
-    level_db: NDArray[np.float64],
-    across: NDArray[np.float64],
-    up: NDArray[np.float64],
-    limits_db: tuple[float, float] | None = None,
-    **style: Any,
-) -> AxesImage:
-    """Draw ``level_db`` (up, across) over evenly spaced axes, in the colours of `colour_limits`.
-
-    Each pixel shows the nearest cell.
-    """
-    low, high = limits_db or colour_limits(level_db)
-    extent = (*bin_edges(across), *bin_edges(up))
-    style = {"cmap": "viridis", "aspect": "auto", "origin": "lower"} | style
-    # Levels are resampled before they have colours, and in float32, which takes less memory.
-    style |= {"interpolation": "nearest", "interpolation_stage": "data"}
-    return axes.imshow(level_db.astype(np.float32), vmin=low, vmax=high, extent=extent, **style)
-
-
-def draw_view(
-    axes: Axes,
-    level_db: NDArray[np.float64],
-    across: NDArray[np.float64],
-    up: NDArray[np.float64],
-    view: tuple[tuple[float, float] | None, tuple[float, float]],
-    *,
-    unit: FieldUnit,
-    below_peak_db: float = 60.0,
-) -> tuple[AxesImage, str]:
-    """Draw ``level_db`` (up, across) within the limits of a ``view``, coloured for what it shows.
-
-    ``view`` has the limits across, None for the whole axis, and up. Returns the image, and a
-    sentence on the floor and the ceiling of its colours, as `colour_limits` sets them, and on what
-    removing the loss with range does to an echo that is not at the range of its cell.
-    """
-    x_limits, y_limits = view[0] or bin_edges(across), view[1]
-    seen = level_db[np.ix_(_inside(up, y_limits), _inside(across, x_limits))]
-    low, high = colour_limits(seen if seen.size else level_db, below_peak_db)
-    image = draw_levels(axes, level_db, across, up, (low, high))
-    axes.set(xlim=x_limits, ylim=y_limits)
-    floor = (
-        f"{below_peak_db:.0f} dB below that"
-        if low <= high - below_peak_db
-        else "3 dB below the median of the view"
-    )
-    words = f"Colours: ceiling {round(high)} {unit.decibels}, the strongest cell; "
-    lifted = " What leaks or folds over from near shows R^4 higher." * (np.size(unit.scale) > 1)
-    return image, f"{words}floor {round(low)} {unit.decibels}, {floor}.{lifted}"
-
-
-def _inside(centres: NDArray[np.float64], limits: tuple[float, float]) -> NDArray[np.bool_]:
-    return (centres >= limits[0]) & (centres <= limits[1])
 
 
 def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any) -> None:

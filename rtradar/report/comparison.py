@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from rtradar.report.canvas import (
     FieldUnit,
     add_colour_bar,
-    colour_limits,
-    draw_levels,
     fitted_limits,
     rdt_points,
 )
 from rtradar.report.html import write_page
+from rtradar.report.maps import colour_limits, draw_levels
 from rtradar.report.run_view import RunView
 from rtradar.report.three_d import posed_figure
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading

@@ -24,7 +24,6 @@ from rtradar.report.canvas import (
     add_colour_bar,
     angle_label,
     angle_view,
-    draw_view,
     field_unit,
     fitted_limits,
     masking_note,
@@ -32,6 +31,7 @@ from rtradar.report.canvas import (
     rdt_points,
     thinned,
 )
+from rtradar.report.maps import Overlay, ShownMap
 from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 _BYTES_AT_ONCE = 1 << 21  # of a map that is read through
 _DOTS = 20_000
@@ -104,38 +105,22 @@ class Plots:
             Axes of the map.
         """
         when_s, ax = axes_given(time_s, ax)
-        frame, when = self.frame(when_s)
-        maps = self.maps["range_doppler"]
-        power, mask = np.asarray(maps[frame]), np.asarray(self.maps["detections"][frame]) > 0
-        unit = self._unit(range_m=self.radar.range_m[:, None])
-        level = unit.level(power / self.radar.n_channels)
-        velocity, distance = self._axis("velocity"), self.radar.range_m
-        view = (
-            fitted_limits(mask.sum(axis=0), velocity, include=0.0),
-            fitted_limits(mask.sum(axis=1), distance),
-        )
+        shown = self._range_doppler(when_s)
         if ax is None:
             left, right = self.new_figure(4.6).subplots(1, 2, sharex=True, sharey=True)
         else:
             left, right = ax, None
-        image, colours = draw_view(left, level, velocity, distance, view, unit=unit)
-        left.set(xlabel=VELOCITY_LABEL if right is None else _TWO_LINES, ylabel="Range [m]")
-        note = colours
-        if self._parameters.get("detector") != "ti-oob":  # which leaves out what is no peak
-            note += f" {masking_note(power, mask)}"
-        what = "Range-Doppler map"
-        what += f" and {np.count_nonzero(mask)} detections" if right is not None else ""
-        title = self._title(f"{what},\n{when}", maps)
-        axes = [left]
+        image = shown.draw(left)
+        axes, title = [left], shown.title
         if right is not None:
-            rows, columns = np.nonzero(mask)
-            colour = theme_of(right).detection
-            right.scatter(velocity[columns], distance[rows], s=3, color=colour, linewidths=0)
+            title = title.replace("map", f"map and {shown.over[0].name}")
+            style: dict[str, Any] = {"s": 3, "color": theme_of(right).detection, "linewidths": 0}
+            right.scatter(*shown.over[0].xy.T, **style)
+            left.set_xlabel(_TWO_LINES)
             right.set_xlabel(_TWO_LINES)
             dress(right)
             axes.append(right)
-        dress(left, title=title, note=note, grid=False, across=len(axes))
-        add_colour_bar(image, axes, unit.label("mean of channels"))
+        self._dress(left, shown, image, axes, title)
         return left
 
     def range_time(self, ax: Axes | None = None) -> Axes:
@@ -151,17 +136,7 @@ class Plots:
         Axes
             Axes of the map.
         """
-        axes = self._axes(ax)
-        data = self.maps["range_time"]
-        power, times = thinned(data, self._axis("slow_time"))
-        unit = self._unit(range_m=self.radar.range_m)
-        view = None, self._range_limits
-        level = unit.level(power).T
-        image, colours = draw_view(axes, level, times, self.radar.range_m, view, unit=unit)
-        axes.set(xlabel="Time [s]", ylabel="Range [m]")
-        dress(axes, title=self._title("Range over time", data), note=colours, grid=False)
-        add_colour_bar(image, [axes], unit.label("mean of channels"))
-        return axes
+        return self._draw(self._range_time, ax)
 
     def spectrogram(self, ax: Axes | None = None) -> Axes:
         """Draw power over time and velocity.
@@ -181,27 +156,11 @@ class Plots:
         InputError
             If the capture is shorter than a window of the spectrogram.
         """
-        data = self.maps["spectrogram"]
-        if not len(data):
+        if not len(self.maps["spectrogram"]):
             raise InputError(
                 "spectrogram: the capture is shorter than one window; simulate a longer one"
             )
-        axes = self._axes(ax)
-        power, times = thinned(data, self._axis("spectrogram_time"))
-        velocity = self._axis("spectrogram_velocity")
-        # One echo is spread over as many range bins.
-        power = power / noise_bandwidth_bins(
-            self._parameters.get("range_window", "hann"), self.radar.samples_per_chirp
-        )
-        unit = self._unit(strongest_m2=float(power.max()))
-        fitted = fitted_limits(above_floor(power).sum(axis=0), velocity, include=0.0)
-        seen = self._velocity_limits if self._found.by_velocity.any() else fitted
-        view = None, (min(fitted[0], seen[0]), max(fitted[1], seen[1]))
-        image, colours = draw_view(axes, unit.level(power).T, times, velocity, view, unit=unit)
-        axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL)
-        dress(axes, title=self._title("Spectrogram", data), note=colours, grid=False)
-        add_colour_bar(image, [axes], unit.label("one channel"))
-        return axes
+        return self._draw(self._spectrogram, ax)
 
     def range_angle(self, time_s: float | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw power over range and each measured angle of one frame, in a panel for each.
@@ -225,11 +184,12 @@ class Plots:
         """
         when_s, ax = axes_given(time_s, ax)
         names = self._measured("range_angle")
+        first = self._range_angle(names[0], when_s)
         if ax is not None or len(names) == 1:
-            return self._range_angle(names[0], when_s, ax)
+            return self._draw(first, ax)
         upper, lower = self.new_figure(7.0).subplots(2, 1)
-        self._range_angle(names[0], when_s, upper)
-        self._range_angle(names[1], when_s, lower, heading=False)
+        self._draw(first, upper)
+        self._draw(self._range_angle(names[1], when_s), lower, heading=False)
         return cast("Axes", upper)
 
     def rdt(self, ax: Axes | None = None) -> Axes:
@@ -265,7 +225,7 @@ class Plots:
         title = f"Range-Doppler-time cloud, {len(points)} points"
         if not shown.all():
             title += f" ({int(shown.sum())} of them within the axes)"
-        dress(axes, title=self._title(title, self.maps["range_doppler"]))
+        dress(axes, title=self._title(title, _made(self.maps["range_doppler"])))
         add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
         return cast("Axes", axes)
 
@@ -339,7 +299,7 @@ class Plots:
             dress(axes)
         lowest = [axes.get_position(original=True).y0 for axes in panels]
         beside = len(panels) if lowest[0] == lowest[-1] else 1
-        title = self._title(heading, self.maps["range_doppler"])
+        title = self._title(heading, _made(self.maps["range_doppler"]))
         dress(panels[0], title=title, across=0.92 * beside)
         add_colour_bar(dots, panels, VELOCITY_LABEL)
         return panels[0]
@@ -373,6 +333,109 @@ class Plots:
         wanted_s = check_number("plot", "time_s", time_s, times[0] - half, times[-1] + half)
         frame = int(np.abs(times - wanted_s).argmin())
         return frame, f"window at {times[frame]:.2f} s"
+
+    # -- the maps, for figures and pages -----------------------------------------------------------
+
+    @property
+    def shown(self) -> list[ShownMap]:
+        """Maps as `range_time`, `spectrogram`, `range_doppler` and `range_angle` show them."""
+        found = [self._range_time]
+        if len(self.maps["spectrogram"]):
+            found.append(self._spectrogram)
+        found.append(self._range_doppler(None))
+        return found + [self._range_angle(name) for name in self._angles]
+
+    @property
+    def _range_time(self) -> ShownMap:
+        power, times = thinned(self.maps["range_time"], self._axis("slow_time"))
+        unit, view = self._unit(range_m=self.radar.range_m), (None, self._range_limits)
+        return ShownMap(
+            title="Range over time",
+            made=_made(self.maps["range_time"]),
+            labels=("Time [s]", "Range [m]"),
+            level_db=unit.level(power).T,
+            across=times,
+            up=self.radar.range_m,
+            view=view,
+            unit=unit,
+            qualifier="mean of channels",
+        )
+
+    @property
+    def _spectrogram(self) -> ShownMap:
+        power, times = thinned(self.maps["spectrogram"], self._axis("spectrogram_time"))
+        velocity = self._axis("spectrogram_velocity")
+        # One echo is spread over as many range bins.
+        power = power / noise_bandwidth_bins(
+            self._parameters.get("range_window", "hann"), self.radar.samples_per_chirp
+        )
+        unit = self._unit(strongest_m2=float(power.max()))
+        fitted = fitted_limits(above_floor(power).sum(axis=0), velocity, include=0.0)
+        seen = self._velocity_limits if self._found.by_velocity.any() else fitted
+        return ShownMap(
+            title="Spectrogram",
+            made=_made(self.maps["spectrogram"]),
+            labels=("Time [s]", VELOCITY_LABEL),
+            level_db=unit.level(power).T,
+            across=times,
+            up=velocity,
+            view=(None, (min(fitted[0], seen[0]), max(fitted[1], seen[1]))),
+            unit=unit,
+            qualifier="one channel",
+        )
+
+    def _range_doppler(self, time_s: float | None) -> ShownMap:
+        frame, when = self.frame(time_s)
+        power = np.asarray(self.maps["range_doppler"][frame])
+        mask = np.asarray(self.maps["detections"][frame]) > 0
+        unit = self._unit(range_m=self.radar.range_m[:, None])
+        velocity, distance = self._axis("velocity"), self.radar.range_m
+        rows, columns = np.nonzero(mask)
+        # TI's chain leaves out what is no peak.
+        masked = self._parameters.get("detector") != "ti-oob"
+        return ShownMap(
+            title=f"Range-Doppler map,\n{when}",
+            made=_made(self.maps["range_doppler"]),
+            labels=(VELOCITY_LABEL, "Range [m]"),
+            level_db=unit.level(power / self.radar.n_channels),
+            across=velocity,
+            up=distance,
+            view=(
+                fitted_limits(mask.sum(axis=0), velocity, include=0.0),
+                fitted_limits(mask.sum(axis=1), distance),
+            ),
+            unit=unit,
+            qualifier="mean of channels",
+            over=(
+                Overlay(
+                    "detection",
+                    f"{len(rows)} detections",
+                    np.column_stack([velocity[columns], distance[rows]]),
+                ),
+            ),
+            note=masking_note(power, mask) if masked else "",
+        )
+
+    def _range_angle(self, name: str, time_s: float | None = None) -> ShownMap:
+        frame, when = self.frame(time_s)
+        angles = np.degrees(self._axis(name))
+        # One echo is spread over as many velocities.
+        power = np.asarray(self.maps[f"range_{name}"][frame]) / noise_bandwidth_bins(
+            self._parameters.get("doppler_window", "hann"), self.radar.cycles_per_frame
+        )
+        unit = self._unit(range_m=self.radar.range_m[:, None])
+        return ShownMap(
+            title=f"Range-{name}, {when}",
+            made=_made(self.maps[f"range_{name}"]),
+            labels=(angle_label(name, self.radar), "Range [m]"),
+            level_db=unit.level(power),
+            across=angles,
+            up=self.radar.range_m,
+            view=angle_view(power, angles, self.radar),
+            unit=unit,
+            qualifier="detected cells",
+            below_peak_db=40,
+        )
 
     # -- what the pictures share -------------------------------------------------------------------
 
@@ -416,12 +479,30 @@ class Plots:
     def _axis(self, name: str) -> NDArray[np.float64]:
         return np.asarray(self.maps[name])
 
-    def _title(self, what: str, data: Any) -> str:
-        lines = [what, str(self.maps.attrs.get("title", ""))]
-        how = str(data.attrs.get("clutter_removal", "none"))
-        lines += [] if how == "none" else [f"static clutter removed: {how}"]
-        lines.append(str(data.attrs.get("gaps", "")))
+    def _title(self, what: str, made: str) -> str:
+        lines = (what, str(self.maps.attrs.get("title", "")), made)
         return "\n".join(line for line in lines if line)
+
+    def _draw(self, shown: ShownMap, ax: Axes | None, heading: bool = True) -> Axes:
+        axes = self._axes(ax)
+        title = shown.title if heading else shown.title.partition(",")[0]
+        self._dress(axes, shown, shown.draw(axes), [axes], title, heading)
+        return axes
+
+    def _dress(
+        self,
+        axes: Axes,
+        shown: ShownMap,
+        image: AxesImage,
+        panels: list[Axes],
+        title: str,
+        heading: bool = True,
+    ) -> None:
+        """Give a drawn map its title, note and colour bar."""
+        note = f"{shown.colours} {shown.note}".strip()
+        title = self._title(title, shown.made) if heading else title
+        dress(axes, title=title, note=note, grid=False, across=len(panels))
+        add_colour_bar(image, panels, shown.unit.label(shown.qualifier))
 
     @cached_property
     def _found(self) -> _Found:
@@ -466,24 +547,10 @@ class Plots:
         cells = self.maps["detections"].size
         return max(HANDFUL, 2 * self._parameters.get("pfa", 0.0) * cells)
 
-    def _range_angle(
-        self, name: str, time_s: float | None, ax: Axes | None, heading: bool = True
-    ) -> Axes:
-        frame, when = self.frame(time_s)
-        axes = self._axes(ax)
-        maps, angles = self.maps[f"range_{name}"], np.degrees(self._axis(name))
-        # One echo is spread over as many velocities.
-        power = np.asarray(maps[frame]) / noise_bandwidth_bins(
-            self._parameters.get("doppler_window", "hann"), self.radar.cycles_per_frame
-        )
-        unit = self._unit(range_m=self.radar.range_m[:, None])
-        level = unit.level(power)
-        view = angle_view(power, angles, self.radar)
-        image, colours = draw_view(
-            axes, level, angles, self.radar.range_m, view, unit=unit, below_peak_db=40
-        )
-        axes.set(xlabel=angle_label(name, self.radar), ylabel="Range [m]")
-        title = self._title(f"Range-{name}, {when}", maps) if heading else f"Range-{name}"
-        dress(axes, title=title, note=colours, grid=False)
-        add_colour_bar(image, [axes], unit.label("detected cells"))
-        return axes
+
+def _made(data: Any) -> str:
+    """Return lines that say how static clutter was removed from a map, and where it has gaps."""
+    how = str(data.attrs.get("clutter_removal", "none"))
+    lines = ["" if how == "none" else f"static clutter removed: {how}"]
+    lines.append(str(data.attrs.get("gaps", "")))
+    return "\n".join(line for line in lines if line)

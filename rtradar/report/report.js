@@ -2,7 +2,7 @@
 
 /** The radar beside its cloud, at coordinates named as the axes of the view. */
 const radarMark = (type, place) => ({
-  type, mode: "markers+text", text: ["radar"], textposition: "top center", ...Object.fromEntries(Object.entries(place).map(([name, value]) => [name, [value]])),
+  type, mode: "markers+text", textposition: "top center", ...Object.fromEntries(Object.entries(place).map(([name, value]) => [name, [value]])),
   marker: { size: 6, symbol: "diamond", color: colour("--tx") }, hoverinfo: "skip", showlegend: false,
 });
 
@@ -34,6 +34,46 @@ async function plan() {
   });
 }
 
+// What lies over a map, by its kind: points or a line, in colours that stand out of the map and of the page.
+const lining = (color, more) => ({ mode: "lines", line: { color, width: 1.5, ...more } });
+const overlays = {
+  detection: { mode: "markers", marker: { size: 3, color: "#ff5a4d" } },
+  ghost: { mode: "markers+text", textposition: "top right", textfont: { color: "#ff8fd0" }, marker: { size: 11, symbol: "circle-open", color: "#ff8fd0", line: { width: 1.5 } } },
+  wall: lining("#9aa6b8", { dash: "dash" }),
+  furniture: lining("#d9a24e"),
+  reflector: lining("#4ec2d9"),
+  person: lining("#2f9e6e", { width: 3 }),
+  path: lining("#8f7be0", { width: 1 }),
+  radar: { mode: "markers+text", textposition: "top center", marker: { size: 10, symbol: "triangle-up", color: "#d6402b" } },
+};
+
+/** One map with what lies over it, or the plan of a room, which has no levels and equal scales. */
+function drawMap(number, levels) {
+  const map = data.maps[number];
+  const traces = levels ? [heat(map, mapRows(map, levels, 0), {
+    colorscale: "Viridis", colorbar: flatBar(map.label), hovertemplate: `%{x:.2f}, %{y:.2f}<br>%{z:.1f} ${unitOf(map)}<extra></extra>`,
+  })] : [];
+  for (const { kind, name, xy } of map.over) {
+    const places = floats(xy);
+    const [x, y] = [0, 1].map((k) => places.filter((_, index) => index % 2 === k));
+    traces.push({ type: "scatter", name, x, y, text: [name], hovertemplate: "%{fullData.name}<extra></extra>", ...overlays[kind] });
+  }
+  const side = (k) => ({ text: narrow ? map.labels[k].replace(/ \(.*\)/, "") : map.labels[k], range: map.view[k] });
+  return drawFlat(`scene-map-${number}`, traces, { xaxis: side(0), yaxis: levels ? side(1) : { ...side(1), scaleanchor: "x" } });
+}
+
+/** Draws each map when it comes near the window, or all before they are printed, so that the page opens at once. */
+async function drawMaps() {
+  const levels = await Promise.all(data.maps.map((map) => map.levels && unpacked(map.levels)));
+  const left = new Set(data.maps.keys());
+  const drawOnce = (number) => left.delete(number) && drawMap(number, levels[number]);
+  const watcher = new IntersectionObserver((places) => {
+    for (const { isIntersecting, target } of places) if (isIntersecting) drawOnce(Number(target.id.split("-").pop()));
+  }, { rootMargin: "50%" });
+  for (const number of left) watcher.observe(document.getElementById(`scene-map-${number}`));
+  window.addEventListener("beforeprint", () => [...left].forEach(drawOnce));
+}
+
 async function main() {
   if (data.echoes) await drawLinked();
   if (data.rdt.count && !data.echoes) {
@@ -59,6 +99,7 @@ async function main() {
   } else if (data.spatial && data.spatial.count) {
     await plan();
   }
+  await drawMaps();
   document.documentElement.dataset.ready = "true";
 }
 

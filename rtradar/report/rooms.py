@@ -7,6 +7,7 @@ each other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,12 +24,11 @@ from rtradar.report.canvas import (
     add_colour_bar,
     angle_label,
     angle_view,
-    draw_levels,
-    draw_view,
     field_unit,
     fitted_limits,
     masking_note,
 )
+from rtradar.report.maps import Overlay, ShownMap
 from rtradar.scene import Furniture, Scene
 from rtradar.scene.plan import (
     draw_plan,
@@ -45,6 +45,7 @@ from rtradar.system.figure_style import DARK, dress, new_figure, save_figure, th
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+CIRCLES = "Circles are ghosts, predicted over"
 _HALF_TURN = 180.0
 
 
@@ -55,25 +56,68 @@ class GhostMark(NamedTuple):
     range_m: float
     across: float
 
+    @property
+    def overlay(self) -> Overlay:
+        """What marks it over a map."""
+        return Overlay("ghost", str(self.number), np.array([[self.across, self.range_m]]))
 
-def draw_room_plan(
-    path: Path,
-    scene: Scene,
-    radar: Radar,
-    tracks: Mapping[str, NDArray[np.float64]],
-    paths: Mapping[int, NDArray[np.float64]],
-    key: Mapping[int, str],
-    title: str,
-) -> None:
-    """Draw the room from above: walls, furniture, radar, people's tracks and paths of echoes.
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShownRoom:
+    """What pictures and page show of a room.
 
     ``tracks`` (time, 2) are positions of each person's root [m] by name, ``paths`` the corners
-    (point, 3) of the path of each ghost [m] by its number, ``key`` the walls of each.
+    (point, 3) of the path of each ghost [m] by its number, ``key`` the walls of each. Maps are
+    ``before_after`` the removal of clutter, and one over ``azimuth`` where it is measured.
     """
+
+    scene: Scene
+    radar: Radar
+    tracks: Mapping[str, NDArray[np.float64]]
+    paths: Mapping[int, NDArray[np.float64]]
+    key: Mapping[int, str]
+    before_after: Sequence[ShownMap]
+    azimuth: Sequence[ShownMap]
+
+    @property
+    def plan_limits(self) -> NDArray[np.float64]:
+        """Limits of the plan, of x and of y (2, 2) [m]."""
+        ways = [xy for way in self.paths.values() for xy in way[:, :2]]
+        walked = np.concatenate([np.empty((0, 2)), *self.tracks.values()])
+        return plan_limits(self.scene, [self.radar.position_m[:2], *walked, *ways])
+
+    def plan(self) -> dict[str, Any]:
+        """Return the plan as plain values for JSON, as `ShownMap.packed` has them."""
+        place = np.asarray(self.radar.position_m)[None, :2]
+        over = [
+            *(Overlay("path", str(number), way[:, :2]) for number, way in self.paths.items()),
+            *outlines(self.scene),
+            *(Overlay("person", name, track) for name, track in self.tracks.items()),
+            Overlay("radar", "radar", place),
+        ]
+        return {
+            "labels": ["x [m]", "y [m]"],
+            "view": self.plan_limits.tolist(),
+            "over": [one.packed() for one in over],
+            "note": key_of("Paths of echoes over", self.key),
+        }
+
+
+def outlines(scene: Scene) -> list[Overlay]:
+    """Return the feet of upright walls, and what furniture covers of the floor [m]."""
+    feet = feet_of_walls(scene)
+    found = [Overlay("wall", one.wall.name, np.stack([one.first, one.last])) for one in feet]
+    for piece in scene.furniture:
+        kind = "furniture" if piece.triangles().closed else "reflector"
+        found.append(Overlay(kind, piece.name, _outline(piece)))
+    return found
+
+
+def draw_room_plan(path: Path, room: ShownRoom, title: str) -> None:
+    """Draw a room from above: walls, furniture, radar, people's tracks and paths of echoes."""
+    scene, radar, paths, limits = room.scene, room.radar, room.paths, room.plan_limits
+    walked = np.concatenate([np.empty((0, 2)), *room.tracks.values()])
     place = radar.position_m[:2]
-    walked = np.concatenate([np.empty((0, 2)), *tracks.values()])
-    ways = [xy for way in paths.values() for xy in way[:, :2]]
-    limits = plan_limits(scene, [place, *walked, *ways])
     axes = new_figure(height_of_plan(limits) + 0.5).add_subplot()
     theme = theme_of(axes)
     draw_plan(axes, scene, limits)
@@ -91,133 +135,146 @@ def draw_room_plan(
         labels.append(Label(words, [((x, y), (0.0, 0.0)) for x, y in places], colour))
     draw_radar(axes, place, radar)
     labels.append(Label("radar", around((place[0], place[1]), 12.0), theme.radar))
-    for name, track in tracks.items():
+    for name, track in room.tracks.items():
         axes.plot(*track.T, color=theme.person, linewidth=2.5)
         x, y = track[len(track) // 2].tolist()
         labels.append(Label(name, around((x, y), 12.0), theme.person))
     square = np.array([[-0.03], [0.03]])
-    avoided = [point + square for point in walked[:: len(walked) // (20 * max(1, len(tracks))) + 1]]
-    notes = [_key("Paths of echoes over", key), plan_note(scene)]
+    every = len(walked) // (20 * max(1, len(room.tracks))) + 1
+    avoided = [point + square for point in walked[::every]]
+    notes = [key_of("Paths of echoes over", room.key), plan_note(scene)]
     dress(axes, title=f"Plan of the room\n{title}", note="\n".join(filter(None, notes)))
     name_parts(axes, scene, labels, avoided)
     save_figure(axes.get_figure(root=True), path)
 
 
-def draw_before_after(
-    path: Path,
+def before_after(
     maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.bool_]]],
     ghosts: Sequence[GhostMark],
-    key: Mapping[int, str],
     radar: Radar,
-    title: str,
-) -> None:
-    """Draw range-Doppler maps, their detections beside them, and ghosts where they are predicted.
+) -> list[ShownMap]:
+    """Return range-Doppler maps with their detections, and ghosts where they are predicted.
 
     ``maps`` are, by what was done with them, power summed over all channels [m^2] and detections,
-    (range, velocity); ``ghosts`` are marked over velocity [m/s].
+    (range, velocity); ``ghosts`` are marked over velocity [m/s]. All have the colours of the first.
     """
-    figure = new_figure(1.2 + 3.2 * len(maps))
-    panels = figure.subplots(len(maps), 2, sharex=True, sharey=True, squeeze=False)
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     found = np.sum([mask for _, mask in maps.values()], axis=0)
     velocity, distance = radar.velocity_mps(found.shape[1]), radar.range_m
-    view = (
-        fitted_limits(found.sum(axis=0), velocity, include=[0.0, *(one.across for one in ghosts)]),
-        fitted_limits(found.sum(axis=1), distance, include=[one.range_m for one in ghosts]),
-    )
-    colours: tuple[float, float] | None = None
-    for (left, right), (name, (power, mask)) in zip(panels, maps.items(), strict=True):
-        level = unit.level(power / radar.n_channels)
-        if colours is None:
-            image, words = draw_view(left, level, velocity, distance, view, unit=unit)
-            colours = image.get_clim()
-        else:
-            draw_levels(left, level, velocity, distance, colours)
+    shown: list[ShownMap] = []
+    for name, (power, mask) in maps.items():
         rows, columns = np.nonzero(mask)
-        style: dict[str, Any] = {"s": 2, "linewidths": 0, "color": theme_of(right).detection}
-        right.scatter(velocity[columns], distance[rows], **style)
-        labels = [_circle(axes, ghosts) for axes in (left, right)]
-        left.set_ylabel("Range [m]")
-        first, last = left is panels[0, 0], left is panels[-1, 0]
-        heading = f"{name}: {len(rows)} detections"
-        if first:
-            heading = f"Range-Doppler map and detections\n{title}\n{heading}"
-        notes = [masking_note(power, mask)]
-        if last:
-            notes = [words, _key("Circles are ghosts, predicted over", key), *notes]
-            for axes in (left, right):
-                axes.set_xlabel(VELOCITY_LABEL.replace(" (", "\n("))
-        dress(left, title=heading, note="\n".join(filter(None, notes)), grid=False, across=2)
-        dress(right)
-    add_colour_bar(image, list(panels.flat), unit.label("mean of channels"))
-    for left in panels[:, 0]:
-        left.set(xlim=view[0], ylim=view[1])
-        place_labels(left, labels[0])
-    save_figure(figure, path)
+        places = np.column_stack([velocity[columns], distance[rows]])
+        detected = Overlay("detection", f"{len(rows)} detections", places)
+        shown.append(
+            ShownMap(
+                title=f"{name}: {detected.name}",
+                labels=(VELOCITY_LABEL, "Range [m]"),
+                level_db=unit.level(power / radar.n_channels),
+                across=velocity,
+                up=distance,
+                view=(
+                    fitted_limits(
+                        found.sum(axis=0), velocity, include=[0.0, *(one.across for one in ghosts)]
+                    ),
+                    fitted_limits(
+                        found.sum(axis=1), distance, include=[one.range_m for one in ghosts]
+                    ),
+                ),
+                unit=unit,
+                qualifier="mean of channels",
+                colours_db=shown[0].limits_db if shown else None,
+                over=(detected, *(one.overlay for one in ghosts)),
+                note=masking_note(power, mask),
+            )
+        )
+    return shown
 
 
-def draw_range_azimuth_with_walls(
-    path: Path,
+def azimuth_and_walls(
     found: tuple[NDArray[np.floating], NDArray[np.float64]],
     scene: Scene,
     radar: Radar,
     ghosts: Sequence[GhostMark],
-    key: Mapping[int, str],
-    title: str,
     window_functions: WindowFunctions = DEFAULT_WINDOWS,
-) -> None:
-    """Draw power over azimuth and range, with upright walls and furniture where they are.
+) -> ShownMap:
+    """Return power over azimuth and range, with upright walls and furniture where they are.
 
     What was ``found`` is the power (range, azimuth), summed over detected cells [m^2], and the
     angles (azimuth,) of its columns [rad], over which ``ghosts`` are marked. The
     ``window_functions`` are those of the transforms that gave the power.
     """
     power, azimuth = found
-    axes = new_figure(5.6).add_subplot()
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
-    level = unit.level(power / velocities)  # one echo is spread over as many velocities
     angles = np.degrees(azimuth)
     marked = [one._replace(across=float(np.degrees(one.across))) for one in ghosts]
-    view = angle_view(power, angles, radar, [(one.across, one.range_m) for one in marked])
-    image, words = draw_view(axes, level, angles, radar.range_m, view, unit=unit, below_peak_db=40)
     place = np.asarray(radar.position_m)[:2]
     yaw = np.radians(radar.yaw_deg)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    labels = _circle(axes, marked)
-    for first, last, wall in feet_of_walls(scene):
-        along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
-        labels += _line(axes, along @ turn, wall.name, "wall", linestyle="--")
-    for piece in scene.furniture:
-        kind = "furniture" if piece.triangles().closed else "reflector"
-        labels += _line(axes, (_outline(piece) - place) @ turn, piece.name, kind)
-    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]")
-    notes = [words, _key("Circles are ghosts, predicted over", key)]
-    notes += ["Dashed: walls. Outlined: furniture and reflectors."] if labels else []
-    note = "\n".join(filter(None, notes))
-    dress(axes, title=f"Range-azimuth map and room\n{title}", note=note, grid=False)
-    add_colour_bar(image, [axes], unit.label("detected cells"))
-    place_labels(axes, labels)
-    save_figure(axes.get_figure(root=True), path)
-
-
-def _line(axes: Axes, xy: NDArray[np.float64], name: str, kind: str, **style: Any) -> list[Label]:
-    """Draw points (point, 2) [m] from the radar over azimuth and range; return their name."""
-    angle, distance = np.degrees(np.arctan2(xy[:, 1], xy[:, 0])), np.hypot(*xy.T)
-    # A line behind the radar would cross the whole picture.
-    gaps = np.abs(np.diff(angle, prepend=angle[0])) > _HALF_TURN
-    # Maps are dark on every page.
-    axes.plot(
-        np.where(gaps, np.nan, angle), distance, color=getattr(DARK, kind), linewidth=1.2, **style
+    over = [one.overlay for one in marked]
+    for one in outlines(scene):
+        xy = one.xy
+        if one.kind == "wall":
+            xy = xy[0] + np.linspace(0, 1, 200)[:, None] * (xy[1] - xy[0])
+        x, y = ((xy - place) @ turn).T
+        angle = np.degrees(np.arctan2(y, x))
+        # A line behind the radar would cross the whole picture.
+        gaps = np.abs(np.diff(angle, prepend=angle[0])) > _HALF_TURN
+        line = np.column_stack([np.where(gaps, np.nan, angle), np.hypot(x, y)])
+        over.append(one._replace(xy=line))
+    return ShownMap(
+        title="Range-azimuth map and room",
+        labels=(angle_label("azimuth", radar), "Range [m]"),
+        level_db=unit.level(power / velocities),  # one echo is spread over as many velocities
+        across=angles,
+        up=radar.range_m,
+        view=angle_view(power, angles, radar, [(one.across, one.range_m) for one in marked]),
+        unit=unit,
+        qualifier="detected cells",
+        below_peak_db=40,
+        over=tuple(over),
     )
+
+
+def draw_room_maps(
+    path: Path, shown: Sequence[ShownMap], key: Mapping[int, str], title: str
+) -> None:
+    """Draw maps one above another with what lies over them; ``key`` names the walls of ghosts."""
+    figure = new_figure(1.2 + 4.4 * len(shown))
+    for axes, one in zip(figure.subplots(len(shown), squeeze=False).flat, shown, strict=True):
+        image = one.draw(axes)
+        labels = [label for line in one.over for label in _overlaid(axes, line)]
+        kinds = {line.kind for line in one.over}
+        notes = [one.colours, key_of(CIRCLES, key) if "ghost" in kinds else "", one.note]
+        notes += ["Dashed: walls. Outlined: furniture and reflectors."] if "wall" in kinds else []
+        heading = f"{one.title}\n{title}" if one is shown[0] else one.title
+        dress(axes, title=heading, note="\n".join(filter(None, notes)), grid=False)
+        add_colour_bar(image, [axes], one.unit.label(one.qualifier))
+        place_labels(axes, labels)
+    save_figure(figure, path)
+
+
+def _overlaid(axes: Axes, over: Overlay) -> list[Label]:
+    """Draw detections, a ghost or a line over a map; return its name where it is in view."""
+    theme = theme_of(axes)
+    x, y = over.xy.T
+    if over.kind == "detection":
+        axes.scatter(x, y, s=2, linewidths=0, color=theme.detection)
+        return []
+    if over.kind == "ghost":
+        style: dict[str, Any] = {"markerfacecolor": "none", "markersize": 8}
+        axes.plot(x, y, "o", markeredgecolor=theme.ghost, **style)
+        return [Label(over.name, around((float(x[0]), float(y[0])), 9.0), theme.text)]
+    # Maps are dark on every page.
+    style = {"color": getattr(DARK, over.kind), "linestyle": "--" if over.kind == "wall" else "-"}
+    axes.plot(x, y, linewidth=1.2, **style)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    shown = (angle > left) & (angle < right) & (distance > low) & (distance < high)
-    points = np.column_stack([angle, distance])[shown]
+    points = over.xy[(x > left) & (x < right) & (y > low) & (y < high)]
     if not len(points):
         return []
     chosen = points[(np.array([0.5, 0.3, 0.7, 0.1, 0.9]) * len(points)).astype(int)].tolist()
-    places = [place for x, y in chosen for place in around((x, y))[:17]]
-    return [Label(name, places, theme_of(axes).text)]
+    return [Label(over.name, [at for x, y in chosen for at in around((x, y))[:17]], theme.text)]
 
 
 def _outline(piece: Furniture) -> NDArray[np.float64]:
@@ -232,17 +289,7 @@ def _outline(piece: Furniture) -> NDArray[np.float64]:
     return np.concatenate([first + steps * (last - first) for first, last in sides])
 
 
-def _circle(axes: Axes, ghosts: Sequence[GhostMark]) -> list[Label]:
-    """Draw a circle about each ghost, and return the numbers to be written beside them."""
-    theme = theme_of(axes)
-    style: dict[str, Any] = {"markerfacecolor": "none", "markersize": 8}
-    for one in ghosts:
-        axes.plot(one.across, one.range_m, "o", markeredgecolor=theme.ghost, **style)
-    return [
-        Label(str(one.number), around((one.across, one.range_m), 9.0), theme.text) for one in ghosts
-    ]
-
-
-def _key(words: str, key: Mapping[int, str]) -> str:
+def key_of(words: str, key: Mapping[int, str]) -> str:
+    """Return a sentence that names the walls of each number, empty where there is none."""
     listed = ", ".join(f"{number} {walls}" for number, walls in key.items())
     return f"{words}: {listed}." if key else ""

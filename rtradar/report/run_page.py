@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,10 @@ from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.canvas import central_limits, field_unit
 from rtradar.report.html import signal_to_noise, write_page
+from rtradar.report.maps import ShownMap
+from rtradar.report.rooms import CIRCLES, ShownRoom, key_of
 from rtradar.report.run_view import RunView, linked_views, view_data
 from rtradar.report.three_d import rdt_data, spatial_data
-
-ROOM_PICTURES = ("plan.png", "range_azimuth_walls.png", "clutter_removal.png")
-"""Files of pictures that belong to a room, in the order of the section."""
 
 _COSTS = ("wall_s", "warmup_s", "capture_s", "real_time_factor", "peak_memory_mb")
 _ELSEWHERE = (
@@ -32,12 +31,13 @@ def write_report(
     *,
     radar: Radar,
     summary: Mapping[str, Any],
-    pictures: Mapping[str, Path],
+    maps: Sequence[ShownMap],
+    room: ShownRoom | None = None,
     rdt_points: ArrayLike,
     spatial: SpatialCloud | None = None,
     run_view: RunView | None = None,
 ) -> None:
-    """Write a run as a page: what was seen, body and maps that move together, pictures and tables.
+    """Write a run as a page: what was seen, body and maps that move together, and tables.
 
     The file includes plotly.js (2.3 MB), and its content security policy forbids any request.
 
@@ -50,8 +50,10 @@ def write_report(
     summary : mapping
         Values of ``summary.json``, any of which may be missing. Those that have no place of their
         own on the page are listed in words.
-    pictures : mapping of title to path
-        PNG files in the order of the page.
+    maps : sequence of ShownMap
+        Maps in the order of the page.
+    room : ShownRoom, optional
+        Room around the person.
     rdt_points : (point, 3)
         Time [s], range [m] and velocity [m/s] of each point.
     spatial : SpatialCloud, optional
@@ -63,8 +65,7 @@ def write_report(
     Raises
     ------
     InputError
-        If a picture is missing or is not a PNG file, or ``rdt_points`` has a wrong shape or values
-        that are not finite.
+        If ``rdt_points`` has a wrong shape or values that are not finite.
     """
     parameters = dict(summary.get("parameters", {}))
     data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
@@ -72,7 +73,12 @@ def write_report(
     if spatial is not None:
         data["spatial"] = spatial_data(spatial, radar)
     clouds = dict(data)
-    values = _summary(summary, radar) | _room(summary.get("room"), radar, pictures)
+    values = _summary(summary, radar) | _room(summary.get("room"), radar)
+    shown_maps = [_captioned(one) for one in maps]
+    of_room = [] if room is None else _maps_of(room)
+    # The script draws all maps by their numbers.
+    data["maps"] = [*shown_maps, *of_room]
+    values |= {"maps": shown_maps, "room_maps": of_room}
     scripts = ["plots.js"]
     if run_view is not None:
         data |= view_data(run_view) | {"name": Path(path).stem}
@@ -82,7 +88,7 @@ def write_report(
         "figure": ("The moving body, its echoes and its maps", run_view),
         "rdt": ("Range-Doppler-time cloud", run_view is None),
         "spatial": ("Spatial cloud", spatial),
-        "maps": ("Maps", values["pictures"]),
+        "maps": ("Maps", shown_maps),
         "room": ("The room", values["room"]),
         "limits": ("Limits of this result", True),
         "parameters": ("Radar and settings", True),
@@ -126,13 +132,27 @@ def _summary(summary: Mapping[str, Any], radar: Radar) -> dict[str, Any]:
     }
 
 
-def _room(
-    room: Mapping[str, Any] | None, radar: Radar, pictures: Mapping[str, Path]
-) -> dict[str, Any]:
-    """Return what the page tells about a room, and the pictures that are none of a room."""
+def _captioned(shown: ShownMap, note: str = "") -> dict[str, Any]:
+    """Return a map as plain values, with what is to be read below it."""
+    made = shown.made.replace("\n", "; ")
+    said = (made and f"{made[0].upper()}{made[1:]}.", shown.colours, note, shown.note)
+    title = shown.title.replace("\n", " ")
+    if detected := [one.name for one in shown.over if one.kind == "detection"]:
+        title = title.replace("map,", f"map and {detected[0]},")
+    return shown.packed() | {"title": title, "note": " ".join(filter(None, said))}
+
+
+def _maps_of(room: ShownRoom) -> list[dict[str, Any]]:
+    """Return plan and maps of a room as plain values, in the order of the section."""
+    circles = key_of(CIRCLES, room.key)
+    found = [_captioned(one, circles) for one in (*room.azimuth, *room.before_after)]
+    return [room.plan() | {"title": "Plan of the room, with paths"}, *found]
+
+
+def _room(room: Mapping[str, Any] | None, radar: Radar) -> dict[str, Any]:
+    """Return what the page tells about a room."""
     if not room:
-        return {"room": None, "pictures": pictures}
-    own = {title: path for title, path in pictures.items() if Path(path).name in ROOM_PICTURES}
+        return {"room": None}
     ghosts = sorted(room.get("ghosts", {}).get("paths", ()), key=lambda one: -one["power_m2"])
     unit = field_unit(radar, range_m=np.array([ghost["range_m"] for ghost in ghosts]))
     levels = unit.level([ghost["power_m2"] for ghost in ghosts])
@@ -147,10 +167,6 @@ def _room(
     left_out += [(face["name"], "ghosts over a face", face["reason"]) for face in faces]
     return {
         "room": room,
-        "room_pictures": dict(
-            sorted(own.items(), key=lambda one: ROOM_PICTURES.index(Path(one[1]).name))
-        ),
-        "pictures": {title: path for title, path in pictures.items() if title not in own},
         "ghosts": list(zip(ghosts, levels, strict=True)),
         "ghost_unit": unit,
         "left_out": left_out,

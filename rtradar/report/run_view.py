@@ -5,9 +5,7 @@ The page has body, room, paths and echoes beside the maps and the cloud of the s
 
 from __future__ import annotations
 
-import base64
 import tomllib
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
@@ -21,6 +19,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.canvas import FieldUnit, central_limits, field_unit
 from rtradar.report.html import write_page
+from rtradar.report.maps import Levels
 from rtradar.report.snapshots import Snapshots
 from rtradar.report.three_d import (
     packed,
@@ -58,54 +57,6 @@ def group_of_parts(parts: Sequence[str]) -> list[int]:
 
 
 _LOOKED_AT = 40  # snapshots at which moving meshes must be inside of the axes
-
-MOST_LEVEL = 250
-"""Highest quantised level."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Levels:
-    """Maps in decibels, quantised coarsely so that a page stays small.
-
-    ``level`` (map, row, column) means ``low_db + step_db level`` [dB]; ``label`` is that of a
-    colour bar; ``across`` and ``up`` are the value of the first column or row and the step to the
-    next.
-    """
-
-    level: NDArray[np.uint8]
-    low_db: float
-    step_db: float
-    label: str
-    across: tuple[float, float]
-    up: tuple[float, float]
-
-    @property
-    def high_db(self) -> float:
-        """Power of the highest level of the colour scale [dB]."""
-        return self.low_db + self.step_db * MOST_LEVEL
-
-    def drawn(self, number: int) -> tuple[Any, ...]:
-        """Return one map [dB], its axes across and up, and the limits of its colours."""
-        rows, columns = self.level.shape[1:]
-        across = self.across[0] + self.across[1] * np.arange(columns)
-        up = self.up[0] + self.up[1] * np.arange(rows)
-        decibels = self.low_db + self.step_db * self.level[number]
-        return decibels, across, up, (self.low_db, self.high_db)
-
-    def packed(self) -> dict[str, Any]:
-        """Return plain values for JSON; ``levels`` are compressed by zlib and encoded in base64."""
-        return {
-            # A higher level takes much longer, and leaves little less.
-            "levels": base64.b64encode(zlib.compress(self.level.tobytes(), 4)).decode(),
-            "shape": list(self.level.shape[1:]),
-            "x": list(self.across),
-            "y": list(self.up),
-            "low_db": self.low_db,
-            "high_db": self.high_db,
-            "step_db": self.step_db,
-            "label": self.label,
-        }
-
 
 _NEAREST_BINS = 4.0  # a point of the cloud farther from any echo belongs to none
 

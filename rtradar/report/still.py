@@ -15,7 +15,8 @@ from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
-from rtradar.report.canvas import VELOCITY_LABEL, add_colour_bar, draw_levels
+from rtradar.report.canvas import VELOCITY_LABEL, add_colour_bar
+from rtradar.report.maps import draw_levels
 from rtradar.report.run_view import GROUPS, VELOCITY_COLOURS, RunView, group_of_parts
 from rtradar.report.three_d import drawn_sphere
 from rtradar.system.figure_style import dress, new_figure, save_figure, write_heading

@@ -74,7 +74,7 @@ def test_maps_are_those_of_a_run(built: rt.Collection, folder: Path, tmp_path: P
     plans = plan_samples(read_spec(folder / "set.toml"))
     (plan,) = (plan for plan in plans if plan.identity == built.ids[0])
     settings = vars(plan.run_settings())
-    rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", pictures=False, **settings)
+    rt.run(motion, plan.radar, plan.scene, out=tmp_path / "run", **settings)
     with h5py.File(tmp_path / "run" / "maps.h5") as file:
         for name in ("spectrogram", "range_doppler", "range_azimuth"):
             np.testing.assert_array_equal(maps[name], file[name])

@@ -27,7 +27,7 @@ from rtradar.system.registries import RADARS, scene_files
 RADAR = rt.Radar(
     name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, samples_per_chirp=256, frame_duration_s=0.05
 )
-QUICK: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.1, "pictures": False}
+QUICK: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.1}
 SETTINGS = RunSettings()
 
 
@@ -75,12 +75,12 @@ def test_a_run_of_the_command_line_is_repeated_from_elsewhere(
     (tmp_path / "small.toml").write_text("tx_y = 2\nrx_y = 4\nsamples_per_chirp = 128\n")
     monkeypatch.chdir(tmp_path)
     given = ["synthetic:kick,side=right", "--radar", "small.toml", "--pitch", "-5", "--seed", "3"]
-    quick = ["--duration", "0.15", "--fidelity", "analytic", "--no-pictures", "--quiet"]
+    quick = ["--duration", "0.15", "--fidelity", "analytic", "--quiet"]
     assert main(["run", *given, *quick, "--snr-db", "12", "--out", "first"]) == 0
     (tmp_path / "small.toml").unlink()
     (tmp_path / "there").mkdir()
     monkeypatch.chdir(tmp_path / "there")
-    again = ["run", "../first/run.toml", "--no-pictures", "--quiet", "--out", "../second"]
+    again = ["run", "../first/run.toml", "--quiet", "--out", "../second"]
     assert main(again) == 0
     assert bits(tmp_path / "first") == bits(tmp_path / "second")
     first, second = (
@@ -100,11 +100,11 @@ def test_what_no_file_holds_is_kept_beside_the_run(tmp_path: Path) -> None:
     first = rt.run([person, fan], RADAR, out=tmp_path / "first", snr_db=np.inf, **QUICK)
     assert (tmp_path / "first" / "person-1.motion").is_file()
     again = rt.Experiment.load(tmp_path / "first" / "run.toml")
-    again.run(tmp_path / "second", pictures=False)
+    again.run(tmp_path / "second")
     assert bits(tmp_path / "first") == bits(tmp_path / "second")
     # Neither run in its own folder is refused, nor loses what it needs.
     rt.run([person, fan], RADAR, out=tmp_path / "first", snr_db=np.inf, **QUICK)
-    rt.Experiment.load(tmp_path / "second" / "run.toml").run(tmp_path / "second", pictures=False)
+    rt.Experiment.load(tmp_path / "second" / "run.toml").run(tmp_path / "second")
     for name in ("first", "second"):
         assert (tmp_path / name / "person-1.motion").is_file()
     assert bits(tmp_path / "first") == bits(tmp_path / "second")
@@ -160,7 +160,7 @@ def test_flags_and_keys_replace_what_the_run_file_says(tmp_path: Path) -> None:
     chosen += ["scene.room.left.material=concrete", "settings.clutter_removal=mean"]
     words = ["run", str(tmp_path / "run.toml"), "--snr-db", "inf", "--order", "0", "--quiet"]
     words += [word for key in chosen for word in ("--set", key)]
-    assert main([*words, "--no-pictures", "--out", str(out)]) == 0
+    assert main([*words, "--out", str(out)]) == 0
     made = tomllib.loads((out / "run.toml").read_text())
     assert made["radar"]["pitch_deg"] == -15
     assert made["radar"]["name"] == "iwr6843"
@@ -178,7 +178,7 @@ def test_the_runs_of_a_comparison_can_be_repeated(recording: Path, tmp_path: Pat
     rt.compare(walk, RADAR, out=tmp_path / "both", fidelities=levels, **own)  # type: ignore[arg-type]
     for level in levels:
         again = rt.Experiment.load(tmp_path / "both" / level / "run.toml")
-        again.run(tmp_path / level, pictures=False)
+        again.run(tmp_path / level)
         assert bits(tmp_path / level) == bits(tmp_path / "both" / level)
 
 
@@ -306,7 +306,7 @@ def test_a_run_file_can_leave_people_to_its_scene(tmp_path: Path) -> None:
     (tmp_path / "run.toml").write_text(
         '[scene]\nbase = "room.toml"\n[settings]\nfidelity = "analytic"\nduration_s = 0.1\n'
     )
-    words = ["run", str(tmp_path / "run.toml"), "--no-pictures", "--quiet"]
+    words = ["run", str(tmp_path / "run.toml"), "--quiet"]
     assert main([*words, "--out", str(tmp_path / "one")]) == 0
     several = [f"settings.snr_db={value}" for value in (0, 10)]
     sets = [word for key in several for word in ("--set", key)]
@@ -337,7 +337,7 @@ def test_names_and_paths_are_taken_and_signatures_list_every_setting(recording: 
 
 def test_a_run_of_somebody_else_is_not_replaced_unasked(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    words = ["--duration", "0.1", "--fidelity", "analytic", "--no-pictures", "--quiet"]
+    words = ["--duration", "0.1", "--fidelity", "analytic", "--quiet"]
     assert main(["run", "synthetic:walk", *words, "--out", str(out)]) == 0
     assert main(["run", "synthetic:walk", *words, "--snr-db", "3", "--out", str(out)]) == 0
     before = (out / "maps.h5").read_bytes()
@@ -373,7 +373,7 @@ def test_several_values_of_a_key_are_a_run_each(
     keys += ["people.0.heading_deg=45"]
     words += [word for key in keys for word in ("--set", key)]
     out = tmp_path / "out"
-    assert main([*words, "--no-pictures", "--out", str(out)]) == 0
+    assert main([*words, "--out", str(out)]) == 0
     found = json.loads((out / "sweep.json").read_text())
     assert found["keys"] == ["settings.snr_db"]
     folders = [run["folder"] for run in found["runs"]]

@@ -146,7 +146,7 @@ def test_bad_input_is_one_line(
 def test_a_run_as_the_paper_warns_of_each_fault(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["run", "synthetic:walk", "--as-paper", "--duration", "0.15", "--no-pictures"]
+    words = ["run", "synthetic:walk", "--as-paper", "--duration", "0.15"]
     assert main([*words, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr().err
     assert all(text in said for text in paper_warnings())

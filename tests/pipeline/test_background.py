@@ -25,7 +25,7 @@ def empty(
 ) -> Path:
     """The folder of a run of a room without people and noise, without its IF samples."""
     out = tmp_path_factory.mktemp("empty") / "out"
-    rt.run([], *beside_a_wall, duration_s=0.2, snr_db=float("inf"), out=out, pictures=False)
+    rt.run([], *beside_a_wall, duration_s=0.2, snr_db=float("inf"), out=out)
     return out
 
 
@@ -64,7 +64,7 @@ def test_a_run_again_and_its_kept_samples_are_the_same_background(
     maps = []
     for save_if in (False, True):
         out = tmp_path / str(save_if)
-        rt.run([], radar, scene, duration_s=0.2, out=out, save_if=save_if, pictures=False)
+        rt.run([], radar, scene, duration_s=0.2, out=out, save_if=save_if)
         found = rt.run(STILL, radar, scene, background=out, duration_s=0.2, fidelity="analytic")
         maps.append(found.maps.range_doppler.values)
     np.testing.assert_array_equal(*maps)
@@ -77,7 +77,7 @@ def test_a_run_again_and_its_kept_samples_are_the_same_background(
 def test_the_run_file_names_the_background_and_notices_a_change(
     small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = "--radar", str(small_file), "--duration", "0.2", "--no-pictures", "--quiet"
+    words = "--radar", str(small_file), "--duration", "0.2", "--quiet"
     empty, out = tmp_path / "empty", tmp_path / "out"
     assert main(["run", *words, "--out", str(empty)]) == 0
     more = "--fidelity", "analytic", "--background", str(empty)
@@ -99,7 +99,7 @@ def test_a_background_that_names_itself_is_that_of_its_samples(
 ) -> None:
     radar, scene = beside_a_wall
     out = tmp_path / "out"
-    rt.run([], radar, scene, duration_s=0.2, out=out, pictures=False)
+    rt.run([], radar, scene, duration_s=0.2, out=out)
     options = {"duration_s": 0.2, "fidelity": "analytic", "background": str(out)}
     before = rt.run(STILL, radar, scene, **options).maps.range_doppler.values
     file = out / "run.toml"

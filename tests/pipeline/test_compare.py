@@ -279,9 +279,7 @@ def test_clouds_are_apart_in_the_bins_of_the_reference(
 ) -> None:
     slower = dataclasses.replace(small, frame_hop_s=2 * small.frame_hop_s)
     for name, radar in (("a", slower), ("b", small)):
-        rt.run(
-            kick, radar, out=tmp_path / name, fidelity="analytic", duration_s=0.3, pictures=False
-        )
+        rt.run(kick, radar, out=tmp_path / name, fidelity="analytic", duration_s=0.3)
     found = compare_folders([tmp_path / "a", tmp_path / "b"], out=tmp_path / "out")
     clouds = [np.load(tmp_path / name / "cloud_rdt.npz")["points"] for name in ("a", "b")]
     expected = chamfer_bins(*clouds, small)

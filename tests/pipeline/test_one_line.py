@@ -43,9 +43,8 @@ def made(
     radar = replace(small, **LINES[request.param])
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figure_style, "write_png", save)
-        rt.run(
-            rt.synthetic_motion("walk", seed=0, duration_s=0.2), radar, out=out, fidelity="analytic"
-        )
+        walk = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
+        rt.run(walk, radar, out=out, fidelity="analytic", pictures=True)
     return request.param, out, figures
 
 

@@ -116,7 +116,7 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
             before[:, : still - 2], after[:, : still - 2], rtol=1e-2, atol=1e-6 * before.max()
         )
     # Without a room they would be of another run than all else.
-    rt.run(motion, RADAR, out=tmp_path / "out", fidelity="analytic", pfa=1e-4, pictures=False)
+    rt.run(motion, RADAR, out=tmp_path / "out", fidelity="analytic", pfa=1e-4)
     assert {path.name for path in (tmp_path / "out").glob("*.png")}.isdisjoint(pictures)
 
 

@@ -100,7 +100,7 @@ def test_a_folder_holds_maps_clouds_and_pictures(
 ) -> None:
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path)
-    written = rt.process_samples(samples, small, "out", pfa=1e-4)
+    written = rt.process_samples(samples, small, "out", pictures=True, pfa=1e-4)
     monkeypatch.chdir("elsewhere")
     assert_same(written, rt.process_samples(samples, small, pfa=1e-4))
     assert set(written.summary["files"]) >= {

@@ -94,8 +94,9 @@ def test_a_person_who_turns_is_another_echo(kick: rt.Motion, small: rt.Radar) ->
 def test_noise_alone_leaves_an_empty_cloud_and_says_so(
     kick: rt.Motion, small: rt.Radar, tmp_path: Path
 ) -> None:
+    options: Any = {**SHORT, "pictures": True, "snr_db": -90.0, "pfa": 1e-12}
     with pytest.warns(ValidityWarning, match="nothing was detected"):
-        result = rt.run(kick, small, out=tmp_path / "out", **SHORT, snr_db=-90.0, pfa=1e-12)
+        result = rt.run(kick, small, out=tmp_path / "out", **options)
     assert result.points.shape == (0, 3)
     assert result.summary["rdt_points"] == 0
     assert (tmp_path / "out" / "cloud_rdt.png").exists()
@@ -104,7 +105,7 @@ def test_noise_alone_leaves_an_empty_cloud_and_says_so(
 def test_the_summary_is_json_that_anyone_reads(
     kick: rt.Motion, small: rt.Radar, tmp_path: Path
 ) -> None:
-    result = rt.run(kick, small, out=tmp_path / "out", pictures=False, **SHORT, snr_db=math.inf)
+    result = rt.run(kick, small, out=tmp_path / "out", **SHORT, snr_db=math.inf)
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == result.summary
     # Nothing is traced in the closed form.
     assert result.summary["variant"] is None
@@ -210,7 +211,7 @@ def test_a_radar_without_a_line_has_no_angles_along_it(
 ) -> None:
     radar = dataclasses.replace(small, chirp_duration_s=500e-6, **lines)
     walk = rt.synthetic_motion("walk", seed=0, duration_s=1.0)
-    rt.run(walk, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
+    rt.run(walk, radar, out=tmp_path, pictures=True, fidelity="analytic", duration_s=0.2)
     with h5py.File(tmp_path / "maps.h5") as maps:
         assert {"range_azimuth", "range_elevation"} & set(maps) == there
     assert (tmp_path / "range_angle.png").exists() == bool(there)
@@ -267,7 +268,7 @@ WALK = synthetic_motion("walk", seed=1, duration_s=0.3)
 
 
 def maps(radar: rt.Radar, out: Path, **options: Any) -> dict[str, np.ndarray]:
-    given = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
+    given = {"fidelity": "analytic", "clutter_removal": "mean"}
     rt.run(WALK, radar, out=out, **given, **options)
     with h5py.File(out / "maps.h5") as file:
         stored = [name for name in file if isinstance(file[name], h5py.Dataset)]

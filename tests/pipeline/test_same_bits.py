@@ -82,7 +82,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for way, cache, threads in (("compiled", 1, 1), ("loaded", 1, 3), ("reversed", 2, 3)):
         commands = [
             ["run", "synthetic:kick", "--duration", "0.2", "--radar", str(radar), *words]
-            + ["--out", str(folder / case / way), "--no-pictures"]
+            + ["--out", str(folder / case / way)]
             + (traced if case != "analytic" else [])
             for case, words in CASES.items()
         ]

@@ -29,7 +29,7 @@ def made(
 ) -> Path:
     out = tmp_path_factory.mktemp("made")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
-    options = {"fidelity": "analytic", "clutter_removal": "mean", "pictures": False}
+    options = {"fidelity": "analytic", "clutter_removal": "mean"}
     rt.run(motion, *beside_a_wall, out=out, **options)
     return out
 

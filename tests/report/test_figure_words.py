@@ -28,18 +28,21 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.report import comparison, evaluation, rooms
-from rtradar.report.canvas import FieldUnit, draw_view
+from rtradar.report.canvas import FieldUnit
 from rtradar.report.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
     draw_rdt_clouds,
 )
+from rtradar.report.maps import ShownMap
 from rtradar.report.plots import Plots
 from rtradar.report.rooms import (
     GhostMark,
-    draw_before_after,
-    draw_range_azimuth_with_walls,
+    ShownRoom,
+    azimuth_and_walls,
+    before_after,
+    draw_room_maps,
     draw_room_plan,
 )
 from rtradar.scene import Wall, material
@@ -77,11 +80,11 @@ WATTS = dataclasses.replace(RADAR, transmit_power_dbm=12.0)
 UNIT = FieldUnit("dB re maximum", 1.0)
 MAPS = {"azimuth": (np.ones((16, 8)), np.linspace(-1, 1, 8))}
 ROOMS: dict[str, Callable[[rt.Radar], None]] = {
-    "before_after": lambda radar: draw_before_after(
-        FILE, {"As received": (POWER, MASK)}, [], {}, radar, "run"
+    "before_after": lambda radar: draw_room_maps(
+        FILE, before_after({"As received": (POWER, MASK)}, [], radar), {}, "run"
     ),
-    "walls": lambda radar: draw_range_azimuth_with_walls(
-        FILE, MAPS["azimuth"], rt.Scene(), radar, [], {}, "run"
+    "walls": lambda radar: draw_room_maps(
+        FILE, [azimuth_and_walls(MAPS["azimuth"], rt.Scene(), radar, [])], {}, "run"
     ),
 }
 SAID = {
@@ -108,18 +111,22 @@ WALL = Wall(
 )
 ROOM = rt.Scene(walls=(WALL,))
 GHOST = GhostMark(1, 0.3, 0.0)
+SHOWN = ShownRoom(
+    scene=ROOM,
+    radar=RADAR,
+    tracks={NAME: np.zeros((3, 2))},
+    paths={1: POINTS},
+    key={1: NAME},
+    before_after=before_after({"As received": (POWER, MASK)}, [GHOST], RADAR),
+    azimuth=[azimuth_and_walls(MAPS["azimuth"], ROOM, RADAR, [GHOST])],
+)
 HISTORY = [{f"{side}_{name}": 0.5 for side in ("train", "test") for name in ("loss", "accuracy")}]
 AXES = ("", np.arange(8.0)), ("", np.arange(16.0))
 EVERY: dict[str, Callable[[], None]] = {
-    "before_after": lambda: draw_before_after(
-        FILE, {"As received": (POWER, MASK)}, [GHOST], {1: NAME}, RADAR, NAME
+    "room_maps": lambda: draw_room_maps(
+        FILE, [*SHOWN.before_after, *SHOWN.azimuth], {1: NAME}, NAME
     ),
-    "walls": lambda: draw_range_azimuth_with_walls(
-        FILE, MAPS["azimuth"], ROOM, RADAR, [GHOST], {1: NAME}, NAME
-    ),
-    "room_plan": lambda: draw_room_plan(
-        FILE, ROOM, RADAR, {NAME: np.zeros((3, 2))}, {1: POINTS}, {1: NAME}, NAME
-    ),
+    "room_plan": lambda: draw_room_plan(FILE, SHOWN, NAME),
     "power_over_time": lambda: draw_power_over_time(FILE, np.arange(8.0), ALONE, UNIT, NAME, NAME),
     "part_power": lambda: draw_part_power(FILE, [NAME] * 8, ALONE, ALONE, UNIT, NAME),
     "maps": lambda: draw_maps(
@@ -293,7 +300,8 @@ def test_the_panel_of_detections_names_no_detector_for_it_is_not_told_which(
 def test_ghosts_have_numbers_with_a_key(drawn: list[Figure]) -> None:
     ghosts = [GhostMark(number, 0.3 + 0.01 * number, 0.0) for number in (1, 2, 3)]
     key = {1: "left", 2: "right", 3: "floor > left"}
-    draw_before_after(FILE, {"As received": (POWER, MASK)}, ghosts, key, RADAR, "run")
+    shown = before_after({"As received": (POWER, MASK)}, ghosts, RADAR)
+    draw_room_maps(FILE, shown, key, "run")
     texts = [text.get_text().replace("\n", " ") for text in drawn[0].axes[0].texts]
     assert {"1", "2", "3"} <= set(texts)
     assert any("predicted over: 1 left, 2 right, 3 floor > left." in text for text in texts)
@@ -307,9 +315,7 @@ def test_every_function_that_draws_is_among_those_drawn_below() -> None:
         for name, thing in vars(module).items()
         if name.startswith("draw_") and thing.__module__ == module.__name__
     }
-    assert own == {
-        "draw_range_azimuth_with_walls" if name == "walls" else f"draw_{name}" for name in EVERY
-    }
+    assert own == {f"draw_{name}" for name in EVERY}
 
 
 @pytest.mark.parametrize("name", EVERY)
@@ -349,9 +355,11 @@ def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path
 
 
 def test_a_map_of_cross_sections_says_what_it_does_to_echoes_of_elsewhere() -> None:
-    axes, level = new_figure(3.0).subplots(), np.zeros((3, 4))
+    level = np.zeros((3, 4))
     grid = np.arange(4.0), np.arange(3.0)
     for scale, said in ((1.0, False), (np.ones((3, 1)), True)):
         view = None, (0.0, 2.0)
-        words = draw_view(axes, level, *grid, view, unit=FieldUnit("dBsm", scale))[1]
-        assert ("R^4" in words) == said
+        one = {"unit": FieldUnit("dBsm", scale), "qualifier": "", "view": view}
+        across, up = grid
+        shown = ShownMap(title="", labels=("", ""), level_db=level, across=across, up=up, **one)
+        assert ("R^4" in shown.colours) == said

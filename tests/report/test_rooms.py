@@ -9,7 +9,7 @@ import pytest
 from matplotlib import collections
 
 from rtradar.radar import Radar
-from rtradar.report.rooms import draw_room_plan
+from rtradar.report.rooms import ShownRoom, draw_room_plan
 from rtradar.scene import Furniture, Scene, material
 
 pytestmark = pytest.mark.drawn
@@ -29,7 +29,8 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
     place = {"position_m": (2.0, 0.0, 0.0), "yaw_deg": 30.0}
     chair = Furniture(name="chair", mesh="chair", material=material("wood"), **place)
     scene, tracks = Scene(furniture=(chair,)), {"person": np.zeros((3, 2))}
-    draw_room_plan(tmp_path / "plan.png", scene, Radar(), tracks, {}, {}, "title")
+    given = {"tracks": tracks, "paths": {}, "key": {}, "before_after": [], "azimuth": []}
+    draw_room_plan(tmp_path / "plan.png", ShownRoom(scene=scene, radar=Radar(), **given), "title")
     every = chair.triangles().corners[..., :2]
     (corners,) = drawn
     # Each face takes as long; all of them took most of a run's time in a hall of chairs.

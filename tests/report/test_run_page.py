@@ -8,11 +8,11 @@ import gzip
 import hashlib
 import json
 import re
+import zlib
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import matplotlib.image
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
+from rtradar.report.canvas import FieldUnit
 from rtradar.report.html import InlinePage, grade, quantity
+from rtradar.report.maps import Overlay, ShownMap
 from rtradar.report.run_page import write_report
 from rtradar.report.three_d import (
     MOST_POINTS,
@@ -86,7 +88,7 @@ def summary() -> dict[str, Any]:
 
 
 def write(path: Path, **changes: Any) -> Elements:
-    given: dict[str, Any] = {"summary": summary(), "pictures": {}}
+    given: dict[str, Any] = {"summary": summary(), "maps": []}
     given |= {"rdt_points": np.array([[0.1, 4.0, -1.0]])} | changes
     write_report(path, radar=RADAR, **given)
     return Elements(path.read_text(encoding="utf-8"))
@@ -96,28 +98,27 @@ def floats(text: str) -> NDArray[np.float32]:
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-@pytest.fixture
-def image(tmp_path: Path) -> Path:
-    """A picture."""
-    matplotlib.image.imsave(tmp_path / "map.png", np.zeros((3, 5)))
-    return tmp_path / "map.png"
+def shown(title: str = "A map", note: str = "") -> ShownMap:
+    level = np.linspace(-90.0, -30.0, 12 * 20).reshape(12, 20)
+    ghost = Overlay("ghost", EVIL, np.array([[1.0, 4.0]]))
+    axes = {"across": np.arange(20) / 10, "up": np.arange(12.0)}
+    labels, unit = ("Time [s]", "Range [m]"), FieldUnit("dBsm", 1.0)
+    how = {"unit": unit, "qualifier": "mean", "view": (None, (2.5, 8.5)), "over": (ghost,)}
+    return ShownMap(title=title, labels=labels, level_db=level, note=note, **axes, **how)
 
 
-def test_no_text_from_outside_becomes_markup(tmp_path: Path, image: Path) -> None:
-    page = write(tmp_path / "r.html", pictures={EVIL: image})
+def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html", maps=[shown(EVIL, note=EVIL)])
     tags = [tag for tag, _ in page.elements]
-    # The data, plotly.js and the viewer; the one picture.
-    assert (tags.count("script"), tags.count("img")) == (3, 1)
-    assert next(attributes for tag, attributes in page.elements if tag == "img")["alt"] == EVIL
-    # Title, heading, limit, caption and table of parameters show it as it is.
-    assert page.text.count(EVIL) == 5
+    # The data, plotly.js and the viewer.
+    assert (tags.count("script"), tags.count("img")) == (3, 0)
+    # Title, heading, limit, title and caption of the map, and table of parameters show it as it is.
+    assert page.text.count(EVIL) == 6
     assert "<2.4>" in page.text
 
 
-def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(
-    tmp_path: Path, image: Path
-) -> None:
-    page = write(tmp_path / "r.html", pictures={"A map": image})
+def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html", maps=[shown()])
     policy = ""
     for tag, attributes in page.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
@@ -128,10 +129,6 @@ def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(
             assert (attributes.get(name) or "data:").startswith("data:")
         if attributes.get("http-equiv") == "Content-Security-Policy":
             policy = attributes["content"] or ""
-    shown = next(attributes for tag, attributes in page.elements if tag == "img")
-    content = base64.b64encode(image.read_bytes()).decode()
-    assert shown["src"] == f"data:image/png;base64,{content}"
-    assert (shown["width"], shown["height"]) == ("5", "3")
     rules = {rule.split()[0]: rule.split()[1:] for rule in policy.split(";")}
     assert rules["default-src"] == ["'none'"]
     assert not {"connect-src", "script-src-elem", "frame-src"} & rules.keys()
@@ -245,11 +242,28 @@ def test_refuses_what_is_no_cloud(points: NDArray[np.float64], said: str) -> Non
     assert "\n" not in str(caught.value)
 
 
-def test_refuses_what_is_no_png(tmp_path: Path) -> None:
-    (tmp_path / "x.png").write_bytes(b"GIF89a")
-    for name, said in (("x.png", "no PNG"), ("y.png", "No such file")):
-        with pytest.raises(rt.InputError, match=said):
-            write(tmp_path / "r.html", pictures={"A map": tmp_path / name})
+def test_a_page_has_of_a_map_what_is_in_view(tmp_path: Path) -> None:
+    page = write(tmp_path / "r.html", maps=[shown()])
+    (one,) = json.loads(page.scripts[0])["maps"]
+    assert (one["shape"], one["x"], one["y"]) == ([6, 20], [0.0, 0.1], [3.0, 1.0])
+    assert one["view"] == [pytest.approx([-0.05, 1.95]), [2.5, 8.5]]
+    level = np.frombuffer(zlib.decompress(base64.b64decode(one["levels"])), np.uint8)
+    found = one["low_db"] + one["step_db"] * level.reshape(6, 20)
+    assert np.abs(np.maximum(shown().level_db[3:9], one["low_db"]) - found).max() <= 0.15
+    assert floats(one["over"][0]["xy"]).tolist() == [1.0, 4.0]
+    assert "Colours: ceiling -45 dBsm, the strongest cell; floor" in page.text
+
+
+def test_a_page_has_the_strongest_of_neighbouring_cells_of_a_large_map() -> None:
+    level = np.random.default_rng(0).uniform(-50.0, 0.0, (1300, 40))
+    axes = {"up": np.arange(1300.0), "across": np.arange(40.0)}
+    large = dataclasses.replace(shown(), level_db=level, **axes)
+    one = dataclasses.replace(large, view=(None, (-0.5, 1299.5))).packed()
+    assert (one["shape"], one["y"]) == ([434, 40], [1.0, 3.0])
+    found = np.frombuffer(zlib.decompress(base64.b64decode(one["levels"])), np.uint8)
+    expected = level[:1299].reshape(433, 3, 40).max(axis=1)
+    decibels = one["low_db"] + one["step_db"] * found.reshape(434, 40)[:433]
+    assert np.abs(np.maximum(expected, one["low_db"]) - decibels).max() <= 0.15
 
 
 @pytest.mark.parametrize(
@@ -284,7 +298,7 @@ def test_a_limit_is_a_warning_where_it_matters(share: float | None, kind: str) -
     assert grade({"name": "beyond_range", "share": share, "message": "m"}) == kind
 
 
-def test_sections_come_in_order_and_are_linked(tmp_path: Path, image: Path) -> None:
+def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
     ghost = {"path": "body > left", "range_m": 5.25, "velocity_mps": -1.5, "azimuth_deg": 20.0}
     room = {
         "paths": [
@@ -295,15 +309,15 @@ def test_sections_come_in_order_and_are_linked(tmp_path: Path, image: Path) -> N
         | {"kept": [{"name": "left", "kind": "mirror", "power_m2": 1.0}], "dropped": []},
         "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
     }
-    page = write(tmp_path / "r.html", summary=summary() | {"room": room}, pictures={"A map": image})
+    page = write(tmp_path / "r.html", summary=summary() | {"room": room}, maps=[shown()])
     names = ["rdt", "maps", "room", "limits", "parameters", "cost"]
     assert [a["id"] for tag, a in page.elements if tag == "section"] == names
     assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
     # R^4 times the power is 1 m^2.
     minus = "\N{MINUS SIGN}"
     ghost_row = f"Power [dBsm]Range [m]Velocity [m/s]Azimuth [°]body > left0.05.25{minus}1.50+20.0"
-    shown = (f"{minus}26.9 dB", "\u2265 12.3 dB", ghost_row, "1 of 1 partsweak")
-    for text in shown:
+    texts = (f"{minus}26.9 dB", "\u2265 12.3 dB", ghost_row, "1 of 1 partsweak")
+    for text in texts:
         assert text in page.text, text
     # Keys are in words.
     assert not re.search(r"[a-z]_(db|m2|s|hz|mb)\b", page.text)

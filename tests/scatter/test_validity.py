@@ -174,7 +174,6 @@ def test_the_summary_tells(tmp_path: Path) -> None:
             Scene(name="store", furniture=(box,)),
             out=tmp_path / "out",
             fidelity="analytic",
-            pictures=False,
         )
     limits = {
         limit["name"]: limit

@@ -85,7 +85,7 @@ def test_a_name_needs_a_seed_and_a_table_known_keys() -> None:
 @pytest.mark.filterwarnings("ignore:clutter power is from behind")
 def test_a_walk_in_one_is_simulated_and_repeated(small: rt.Radar, tmp_path: Path) -> None:
     walk = rt.synthetic_motion("walk", duration_s=0.2)
-    first = rt.run(walk, small, "random:3", out=tmp_path / "first", pictures=False)
+    first = rt.run(walk, small, "random:3", out=tmp_path / "first")
     text = (tmp_path / "first" / "run.toml").read_text()
     # The room itself, whatever other versions draw.
     assert "[scene.room.near]" in text

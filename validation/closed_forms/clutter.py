@@ -313,7 +313,7 @@ def map_rows(quick: bool) -> Iterator[Row]:
     for removal in ("none", *removals):
         with tempfile.TemporaryDirectory() as folder:
             radar, scene = Radar.preset("paper-12ghz"), rt.Scene.load("living-room")
-            given = {"fidelity": "analytic", "clutter_removal": removal, "pictures": False}
+            given = {"fidelity": "analytic", "clutter_removal": removal}
             rt.run(motion, radar, scene, out=folder, **given)
             with h5py.File(Path(folder) / "maps.h5") as maps:
                 rest = {

@@ -27,7 +27,7 @@ def measure(quick: bool) -> list[Row]:
         radar = rt.Radar.preset(name)
         with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
             warnings.simplefilter("ignore", rt.ValidityWarning)
-            given = {"fidelity": "analytic", "snr_db": -150.0, "pictures": False}
+            given = {"fidelity": "analytic", "snr_db": -150.0}
             found = rt.run(motion, radar, out=folder, **given).summary
         cells = found["windows"] * radar.samples_per_chirp * radar.cycles_per_frame
         claim = f"{name}, {found['windows']} windows"

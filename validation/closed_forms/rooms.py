@@ -75,7 +75,7 @@ def scene_rows(
     radar = scene.place(radar)
     free, quiet = folder / "free", folder / "quiet"
     alone = rt.run(motion, radar, out=free, heading_deg=scene.heading_deg)
-    silent = {"snr_db": np.inf, "pictures": False}
+    silent = {"snr_db": np.inf}
     rt.run(motion, radar, out=quiet, heading_deg=scene.heading_deg, **silent)
     noise = alone.summary["noise_power_m2"]
     with h5py.File(quiet / "maps.h5") as maps:

@@ -34,7 +34,7 @@ def measure(quick: bool) -> list[Row]:
         for below_db in (chosen,) if quick else (3.0, chosen, 10.0):
             peaks.BELOW_HIGHEST_DB = below_db
             with tempfile.TemporaryDirectory() as folder:
-                rt.run(motion, rt.Radar.preset("paper-12ghz"), out=folder, pictures=False)
+                rt.run(motion, rt.Radar.preset("paper-12ghz"), out=folder)
                 cloud = dict(np.load(Path(folder, "cloud_xyz.npz")))
             distance = np.concatenate(
                 [

@@ -135,7 +135,7 @@ def words_of(case: Case, folder: Path, duration_s: float) -> list[str]:
     scene.write_text((CHECKOUT / "scenes" / f"{case.scene}.toml").read_text() + case.more)
     radar.write_text(case.radar)
     words = [*case.motions, "--scene", str(scene), "--radar", str(radar), *case.flags]
-    return [*words, "--start", "0.2", "--duration", str(duration_s), "--no-pictures", "--quiet"]
+    return [*words, "--start", "0.2", "--duration", str(duration_s), "--quiet"]
 
 
 def run(checkout: Path, words: list[str], out: Path) -> float:

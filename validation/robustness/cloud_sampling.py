@@ -24,10 +24,7 @@ def measure(quick: bool) -> list[Row]:
         for seed in (0, 1):
             with tempfile.TemporaryDirectory() as folder:
                 clouds.append(
-                    rt.run(
-                        motion, radar, out=folder, fidelity="analytic", seed=seed, pictures=False
-                    ).points
-                    / bins
+                    rt.run(motion, radar, out=folder, fidelity="analytic", seed=seed).points / bins
                 )
         there, back = (
             KDTree(other).query(cloud)[0].mean() for cloud, other in (clouds, clouds[::-1])

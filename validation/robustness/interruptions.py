@@ -73,7 +73,8 @@ class Case:
 
 
 def cases(work: Path, quick: bool) -> list[Case]:
-    walk = ("run", "synthetic:walk", "--duration", "0.5", "--save-if", "--out", "{out}")
+    walk = ("run", "synthetic:walk", "--duration", "0.5", "--save-if", "--pictures")
+    walk += ("--out", "{out}")
     run = Case(
         "run",
         walk,

@@ -89,7 +89,7 @@ def _unlike(ours: np.ndarray, theirs: np.ndarray) -> int:  # type: ignore[type-a
 def runs(folder: Path, quick: bool) -> Iterator[Row]:
     walk = folder / "walk.motion"
     save_motion(walk, rt.synthetic_motion("walk", seed=1, duration_s=0.5))
-    words = "--radar", "iwr1443", "--duration", "0.2", "--no-pictures", "--quiet"
+    words = "--radar", "iwr1443", "--duration", "0.2", "--quiet"
     cases = [(level, scene) for level in LEVELS for scene in ("free-space", "living-room")]
     for number, (level, scene) in enumerate(cases[:1] if quick else cases):
         out, again = folder / f"run{number}", folder / f"again{number}"

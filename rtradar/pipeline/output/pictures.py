@@ -1,8 +1,9 @@
-"""Pictures of a run, drawn from its maps and clouds."""
+"""What pictures and the page show of a run, from its maps and clouds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +12,10 @@ from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture, PreparedRoom
 from rtradar.pipeline.output.truth import truth_of
-from rtradar.pipeline.output.writer import read_maps
 from rtradar.pipeline.result import Result
 from rtradar.report import rooms, write_report
 from rtradar.report.plots import Plots
+from rtradar.report.rooms import ShownRoom
 from rtradar.report.run_view import RunView
 from rtradar.scatter.multipath.path_summary import Ghost, ghosts
 from rtradar.system.figure_style import new_figure, save_figure
@@ -25,73 +26,74 @@ if TYPE_CHECKING:
 _TRACK_POINTS = 400
 
 
-def draw_pictures(folder: Path, capture: Capture, result: Result) -> dict[str, Path]:
-    """Draw ``maps.h5`` of this folder, the clouds of its result, and the room if there is one.
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What pictures and the page show of a run: its maps and clouds, and its room if it has one."""
 
-    Returns the PNG files by their titles, in the order in which they are best looked at.
-    """
-    drawn, frame = draw_found(folder, result)
-    if capture.room:
-        with read_maps(folder / "maps.h5") as maps:
-            drawn |= _draw_room(folder, capture, capture.room, maps, frame)
-    return drawn
+    plots: Plots
+    room: ShownRoom | None
+    heading: str
 
-
-def draw_found(folder: Path, result: Result) -> tuple[dict[str, Path], int]:
-    """Draw ``maps.h5`` of this folder and the clouds; also return the frame that was chosen."""
-    drawn: dict[str, Path] = {}
-    with read_maps(folder / "maps.h5") as maps:
+    @classmethod
+    def of(cls, result: Result, maps: Any, capture: Capture | None = None) -> Shown:
+        """Return what is shown of a result and its open maps, with the room of its capture."""
         found = maps, result.points, result.spatial, result.radar, result.summary
         plots = Plots(*found, new_figure=new_figure)
-        angles = [name for name in ("azimuth", "elevation") if name in maps]
-        pictures: dict[str, tuple[str, Callable[[], Axes]]] = {
-            "Range over time": ("range_time.png", plots.range_time)
+        if capture is None or not capture.room:
+            return cls(plots, None, "")
+        frame = plots.frame()[0]
+        if "range_doppler_received" in maps:
+            time_s = float(maps["range_doppler_received"].attrs["time_s"])
+            frame = int(np.abs(maps["time"][:] - time_s).argmin())
+        else:
+            time_s = float(maps["time"][frame])
+        room = _room_of(capture, capture.room, maps, frame, time_s)
+        return cls(plots, room, f"{capture.title}, window at {time_s:.2f} s")
+
+    def draw(self, folder: Path) -> None:
+        """Draw the PNG files of maps, clouds and room into a folder."""
+        plots, maps = self.plots, self.plots.maps
+        pictures: dict[str, Callable[[], Axes]] = {
+            "range_time": plots.range_time,
+            "range_doppler": plots.range_doppler,
+            "cloud_rdt": plots.rdt,
         }
         if len(maps["spectrogram_time"]):
-            pictures["Spectrogram"] = "spectrogram.png", plots.spectrogram
-        name = "Range-Doppler map and detections"
-        pictures[name] = "range_doppler.png", plots.range_doppler
-        if angles:
-            name = " and ".join(f"range-{angle}" for angle in angles).capitalize()
-            pictures[name] = "range_angle.png", plots.range_angle
-        pictures["Range-Doppler-time cloud"] = "cloud_rdt.png", plots.rdt
-        if angles:
-            pictures["Spatial cloud"] = "cloud_xyz.png", plots.spatial
-        for name, (file, draw) in pictures.items():
-            drawn[name] = folder / file
-            save_figure(draw().get_figure(root=True), drawn[name])
-        return drawn, plots.frame()[0]
+            pictures["spectrogram"] = plots.spectrogram
+        if "azimuth" in maps or "elevation" in maps:
+            pictures |= {"range_angle": plots.range_angle, "cloud_xyz": plots.spatial}
+        for name, draw in pictures.items():
+            save_figure(draw().get_figure(root=True), folder / f"{name}.png")
+        if (room := self.room) is not None:
+            maps_of = {"clutter_removal": room.before_after, "range_azimuth_walls": room.azimuth}
+            for name, shown in maps_of.items():
+                if shown:
+                    rooms.draw_room_maps(folder / f"{name}.png", shown, room.key, self.heading)
+            rooms.draw_room_plan(folder / "plan.png", room, self.heading)
+
+    def write_page(self, folder: Path, result: Result, run_view: RunView | None = None) -> None:
+        """Write the report into a folder."""
+        write_report(
+            folder / "report.html",
+            radar=result.radar,
+            summary=result.summary,
+            maps=self.plots.shown,
+            room=self.room,
+            rdt_points=result.points,
+            spatial=result.spatial,
+            run_view=run_view,
+        )
 
 
-def write_page(
-    folder: Path, result: Result, pictures: Mapping[str, Path], run_view: RunView | None = None
-) -> None:
-    """Write the report of what was found into a folder."""
-    write_report(
-        folder / "report.html",
-        radar=result.radar,
-        summary=result.summary,
-        pictures=pictures,
-        rdt_points=result.points,
-        spatial=result.spatial,
-        run_view=run_view,
-    )
+def _room_of(
+    capture: Capture, room: PreparedRoom, maps: Any, frame: int, time_s: float
+) -> ShownRoom:
+    """Return what is shown of a room.
 
-
-def _draw_room(
-    folder: Path, capture: Capture, room: PreparedRoom, maps: Any, frame: int
-) -> dict[str, Path]:
-    """Draw the plan of a room, its walls over range and azimuth, and clutter before and after.
-
-    What was received is shown of the frame kept before clutter removal, or else of this ``frame``.
+    What was received is that of the frame kept before clutter removal, or else of this ``frame``.
     """
     radar, body, scene = capture.radar, capture.body, capture.scene
     suffix = "_received" if "range_doppler_received" in maps else ""
-    if suffix:
-        time_s = float(maps["range_doppler_received"].attrs["time_s"])
-        frame = int(np.abs(maps["time"][:] - time_s).argmin())
-    else:
-        time_s = float(maps["time"][frame])
 
     def received(name: str) -> NDArray[Any]:
         return np.asarray(maps[name + suffix][:] if suffix else maps[name][frame])
@@ -112,20 +114,15 @@ def _draw_room(
         rooms.GhostMark(number, ghost.range_m, ghost.velocity_mps)
         for number, ghost in numbered.items()
     ]
-    heading = f"{capture.title}, window at {time_s:.2f} s"
-    name = f"Range-Doppler{' before and after' if suffix else ''}, and ghosts"
-    drawn = {name: folder / "clutter_removal.png"}
-    rooms.draw_before_after(drawn[name], panels, marked, key, radar, heading)
+    azimuth = []
     if "azimuth" in maps and "range_azimuth" + suffix in maps:
-        name = "Range-azimuth with walls and ghosts"
-        drawn[name] = folder / "range_azimuth_walls.png"
         places = [
             rooms.GhostMark(numbers[_walls(ghost.path)], ghost.range_m, ghost.azimuth_rad)
             for ghost in found
         ]
+        power = received("range_azimuth"), maps["azimuth"][:]
         windows = capture.processing.window_functions
-        axes = (received("range_azimuth"), maps["azimuth"][:]), scene, there
-        rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, key, heading, windows)
+        azimuth = [rooms.azimuth_and_walls(power, scene, there, places, windows)]
     times = np.linspace(0, body.duration_s, _TRACK_POINTS)
     tracks = truth_of(body, times)["person_position"][..., :2]
     named = dict(zip(body.names, np.swapaxes(tracks, 0, 1), strict=True))
@@ -138,9 +135,15 @@ def _draw_room(
             number: room.model.course(ghost.path, middle, there)
             for number, ghost in numbered.items()
         }
-    drawn["Plan of the room, with paths"] = folder / "plan.png"
-    rooms.draw_room_plan(folder / "plan.png", scene, there, named, paths, key, heading)
-    return drawn
+    return ShownRoom(
+        scene=scene,
+        radar=there,
+        tracks=named,
+        paths=paths,
+        key=key,
+        before_after=rooms.before_after(panels, marked, radar),
+        azimuth=azimuth,
+    )
 
 
 def _range(ghost: Ghost) -> float:

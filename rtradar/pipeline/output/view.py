@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,8 @@ from rtradar.process import WindowFunctions
 from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.canvas import FieldUnit, field_unit, thinned
-from rtradar.report.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
+from rtradar.report.maps import Levels, colour_limits, limits_of, spaced, strongest
+from rtradar.report.run_view import COLOURS, RunView, write_view
 from rtradar.report.snapshots import DAMAGE, Snapshots, load_snapshots, refused
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json
@@ -43,7 +44,6 @@ _LARGEST = 1e9
 _MAX_LETTERS = 200
 """Length of a name from the summary that is shown."""
 
-_DYNAMIC_RANGE_DB = 60.0
 _SAMPLED = 16
 """Number of maps whose medians give the noise."""
 
@@ -242,51 +242,27 @@ def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
     return power.astype(np.float64)
 
 
-def _quantised(
-    maps_db: Iterable[NDArray[np.float64]],
-    shape: tuple[int, int, int],
-    top_db: float,
-    noise_db: float,
-    **axes: Any,
-) -> Levels:
-    """Quantise maps [dB] from 3 dB below the noise, or 60 dB below the peak, to the peak.
-
-    ``shape`` is the number of maps, of their rows and of their columns.
-    """
-    low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
-    step = (top_db - low) / MOST_LEVEL
-    level = np.empty(shape, np.uint8)
-    for one, quantised in zip(maps_db, level, strict=True):
-        quantised[:] = np.clip(np.rint((one - low) / step), 0, MOST_LEVEL)
-    return Levels(level=level, low_db=low, step_db=step, **axes)
-
-
 def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
     """Maps of the windows of the snapshots, mean of the channels."""
     power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
     unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
     scale = np.asarray(unit.scale) / radar.n_channels
     windows = snapshots.window.tolist()
-    top = max(float((power[window] * scale).max()) for window in windows)
-    sampled = windows[:: math.ceil(len(windows) / _SAMPLED)]
-    noise = [float(np.median(power[window] * scale)) for window in sampled]
-    scaled = FieldUnit(unit.name, 1.0)
-    top_db, noise_db = scaled.level(_powers(np.array([top, np.median(noise)]))).tolist()
     rows, columns = math.ceil(len(distance) / _MAX_ROWS), math.ceil(len(velocity) / _MAX_COLUMNS)
-
-    def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
-        by_row = np.maximum.reduceat(values, np.arange(0, len(distance), rows), axis=0)
-        return np.asarray(np.maximum.reduceat(by_row, np.arange(0, len(velocity), columns), axis=1))
-
-    def centres(values: NDArray[np.float64], together: int) -> tuple[float, float]:
-        bin_width = float(values[1] - values[0]) if len(values) > 1 else 1.0
-        return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
-
-    maps_db = (scaled.level(_powers(pooled(power[window] * scale))) for window in windows)
     shape = len(windows), math.ceil(len(distance) / rows), math.ceil(len(velocity) / columns)
-    axes = {"across": centres(velocity, columns), "up": centres(distance, rows)}
+    pooled, medians = np.empty(shape, np.float32), []
+    for number, window in enumerate(windows):  # read once, for that takes longest
+        found = power[window] * scale
+        pooled[number] = strongest(found, rows, columns)
+        if number % math.ceil(len(windows) / _SAMPLED) == 0:
+            medians.append(float(np.median(found)))
+    scaled = FieldUnit(unit.name, 1.0)
+    extremes = np.array([pooled.max(), np.median(medians)])
+    limits = limits_of(*scaled.level(_powers(extremes)).tolist())
+    maps_db = (scaled.level(_powers(one)) for one in pooled)
+    axes = {"across": spaced(velocity, columns), "up": spaced(distance, rows)}
     label = unit.label("mean of channels")
-    return _quantised(maps_db, shape, top_db, noise_db, label=label, **axes)
+    return Levels.of(maps_db, shape, limits, label=label, **axes)
 
 
 def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFunctions) -> Levels:
@@ -302,10 +278,9 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
     level_db = unit.level(power)
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
-    top_db, noise_db = float(level_db.max()), float(np.median(level_db))
     axes = {"across": (float(times[0]), step_s), "up": up}
     label, shape = unit.label("one channel"), (1, *level_db.shape)
-    return _quantised([level_db], shape, top_db, noise_db, label=label, **axes)
+    return Levels.of([level_db], shape, colour_limits(level_db), label=label, **axes)
 
 
 def _at_points(

@@ -23,9 +23,7 @@ def test_the_summary_tells_ghosts_and_what_removal_gained(
     radar, room = beside_a_wall
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
     options = {"fidelity": "analytic", "clutter_removal": "mean"}
-    found = rt.run(motion, radar, room, out=tmp_path / "run", pictures=False, **options).summary[
-        "room"
-    ]
+    found = rt.run(motion, radar, room, out=tmp_path / "run", **options).summary["room"]
     ghosts = found["ghosts"]
     assert 0 < ghosts["time_s"] < 0.3
     assert {ghost["path"] for ghost in ghosts["paths"]} <= {p["path"] for p in found["paths"]}

@@ -72,7 +72,7 @@ def test_the_power_is_that_of_the_echoes_then(alone: rt.Result) -> None:
 
 def test_a_folder_holds_the_same_as_memory(alone: rt.Result, tmp_path: Path) -> None:
     settings = {"duration_s": 0.2, "fidelity": "analytic", "snr_db": 60}
-    out = rt.run(WALK, RADAR, out=tmp_path / "run", pictures=False, **settings)
+    out = rt.run(WALK, RADAR, out=tmp_path / "run", **settings)
     assert out.truth.identical(alone.truth)
     with np.load(tmp_path / "run" / "cloud_xyz.npz") as cloud:
         np.testing.assert_array_equal(cloud["part"], alone.spatial.part)
@@ -137,7 +137,6 @@ def test_maps_of_a_run_hold_the_truth(tmp_path: Path) -> None:
         duration_s=0.15,
         fidelity="analytic",
         out=tmp_path,
-        pictures=False,
     )
     with open_maps(tmp_path / "maps.h5") as maps:
         assert maps["joints"].dims == ("time", "person", "joint", "coordinate")
