@@ -33,6 +33,8 @@ hypothesis.settings.load_profile(os.environ.get("RTRADAR_HYPOTHESIS", "rtradar")
 _MORE = float(os.environ.get("RTRADAR_EXAMPLES", "1"))
 
 
+pytest_plugins = ["pytester", "rtradar.testing"]
+
 SMALL = """
 tx_y = 2
 tx_z = 0
