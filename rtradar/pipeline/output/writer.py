@@ -266,8 +266,8 @@ class MapStore:
         self._owned, self._unit = isinstance(file, Path), unit
         self._raw = LastingFile(file.open("w+b") if isinstance(file, Path) else file)
         self._file = h5py.File(self._raw, "w", libver="latest")
-        # HDF5 takes as long to find an array as to write a step of it.
-        self._data: dict[str, h5py.Dataset] = {}
+        # HDF5 takes as long to find an array as to write a step, and an open one holds memory.
+        self._dtypes: dict[str, np.dtype[Any]] = {}
         self._waiting: dict[str, list[NDArray[Any]]] = {}
         self._waiting_bytes = 0
         self._file.attrs.update(attributes)
@@ -308,7 +308,7 @@ class MapStore:
         unit = f"{self._unit}2" if kind.unit == "m2" else kind.unit
         data = netcdf_array(self._file, name, kind.dims, unit, kind.meaning, dtype=dtype, **options)
         data.attrs.update(said)
-        self._data[name] = data
+        self._dtypes[name] = data.dtype
 
     def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
         """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it.
@@ -316,7 +316,7 @@ class MapStore:
         They wait until there are some megabytes, for HDF5 takes as long for one step as for many.
         """
         for name, added in ((axis, values), *maps.items()):
-            steps: NDArray[Any] = np.array(added, dtype=self._data[name].dtype)
+            steps: NDArray[Any] = np.array(added, dtype=self._dtypes[name])
             self._waiting.setdefault(name, []).append(steps)
             self._waiting_bytes += steps.nbytes
         if self._waiting_bytes >= _MOST_WAITING:
@@ -324,7 +324,7 @@ class MapStore:
 
     def _write(self) -> None:
         for name, added in self._waiting.items():
-            steps, data = np.concatenate(added), self._data[name]
+            steps, data = np.concatenate(added), self._file[name]
             data.resize(len(data) + len(steps), axis=0)
             data[len(data) - len(steps) :] = steps
         self._waiting, self._waiting_bytes = {}, 0
