@@ -207,16 +207,21 @@ def test_any_text_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> Non
 @pytest.mark.parametrize("name", BOARDS)
 def test_a_board_has_all_that_is_asked_of_it(name: str) -> None:
     radar = Radar.preset(name)
-    assert radar.n_rx == (3 if name == "iwrl6432" else 4)
-    few = ("iwr1642", "awr1642", "iwrl6432")
-    assert radar.n_tx == (4 if name == "awr2944" else 2 if name in few else 3)
+    few = dict.fromkeys(("iwr1642", "awr1642"), (2, 4)) | {"iwrl6432": (2, 3)}
+    many = {"awr2944": (4, 4), "awr2243-cascade": (12, 16)}
+    assert (radar.n_tx, radar.n_rx) == (few | many).get(name, (3, 4))
     assert radar.transmit_power_dbm is not None
     assert radar.noise_figure_db is not None
     assert radar.tx_antenna is not None
     assert radar.rx_antenna == radar.tx_antenna
-    # Each virtual element is somewhere else, and their centre is the radar's place.
-    places = np.round(radar.virtual_m * 1e6)
-    assert len(np.unique(places, axis=0)) == radar.n_channels
+    # Each virtual element is somewhere else, and their centre is the radar's place. Of the cascade
+    # some are twice, so that its chips can be aligned, and 86 lie side by side.
+    half = 1.9518e-3 if name == "awr2243-cascade" else 1e-6  # of a wavelength at 76.8 GHz [m]
+    places = np.unique(np.round((radar.virtual_m - radar.virtual_m[0]) / half), axis=0)
+    if name == "awr2243-cascade":
+        assert (len(places), (places[:, 2] == places[:, 2].min()).sum()) == (86 + 3 * 16, 86)
+    else:
+        assert len(places) == radar.n_channels
     np.testing.assert_allclose(radar.virtual_m.mean(axis=0), 0, atol=1e-5)
 
 

@@ -28,5 +28,5 @@ def _shipped(name: str) -> Callable[[], Radar]:
 iwr1443, iwr1642, iwr1843 = map(_shipped, ("iwr1443", "iwr1642", "iwr1843"))
 awr1642, awr1843, awr2243, awr2944 = map(_shipped, ("awr1642", "awr1843", "awr2243", "awr2944"))
 iwr6843, iwr6843ods, iwr6843aop = map(_shipped, ("iwr6843", "iwr6843ods", "iwr6843aop"))
-iwrl6432 = _shipped("iwrl6432")
+iwrl6432, awr2243_cascade = map(_shipped, ("iwrl6432", "awr2243-cascade"))
 radhar, mars = map(_shipped, ("radhar", "mars"))

@@ -212,8 +212,8 @@ def _package(entry: EntryPoint) -> str:
 
 
 BOARDS = (
-    "iwr1443", "iwr1642", "awr1642", "iwr1843", "awr1843", "awr2243", "iwr6843", "iwr6843ods",
-    "iwr6843aop", "iwrl6432", "awr2944",
+    "iwr1443", "iwr1642", "awr1642", "iwr1843", "awr1843", "awr2243", "awr2243-cascade", "iwr6843",
+    "iwr6843ods", "iwr6843aop", "iwrl6432", "awr2944",
 )  # fmt: skip
 """Radars that are boards of Texas Instruments."""
 
@@ -223,7 +223,7 @@ RADARS = Registry(
     {
         "paper-12ghz": "rtradar.radar:paper_12ghz",
         "paper-77ghz": "rtradar.radar:paper_77ghz",
-        **{name: f"rtradar.radar:{name}" for name in (*BOARDS, "radhar", "mars")},
+        **{name: f"rtradar.radar:{name.replace('-', '_')}" for name in (*BOARDS, "radhar", "mars")},
     },
 )
 """Radars that have a name: each is made by a function without arguments."""

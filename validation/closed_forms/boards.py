@@ -60,6 +60,7 @@ DATASHEETS = {
     "iwr1843": Datasheet("SWRS228B", (77, 81), 100, 12.5, 15, 15),
     "awr1843": Datasheet("SWRS228B", (77, 81), 100, 12.5, 15, 15),
     "awr2243": Datasheet("SWRS223D", (76, 81), 266, 22.5, None, 15),
+    "awr2243-cascade": Datasheet("SWRS223D", (76, 81), 266, 22.5, None, None),
     "iwr6843": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, 15),
     "iwr6843ods": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, None),
     "iwr6843aop": Datasheet("SWRS219F", (60, 64), 250, 12.5, 13, None),
