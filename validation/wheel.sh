@@ -1,34 +1,42 @@
 #!/bin/sh
-# The built wheel in an empty environment, outside the checkout: it runs, and carries scenes, meshes and validation scripts along.
+# Source distribution and wheel, built and tried as a stranger would: in an empty environment, outside the checkout.
 #
-#     sh validation/wheel.sh [PYTHON]
+#     sh validation/wheel.sh [PYTHON ...]       # of each Python (default: python3)
 #
-# PYTHON has the packages that rtradar needs; the environment sees those, but not the checkout.
+# The wheel is built from the source distribution, so that both are tried. The versions of all packages are the pinned
+# ones. In the end it says how many megabytes were installed, by package.
 set -eu
 checkout=$(cd "$(dirname "$0")/.." && pwd)
-python=${1:-$checkout/.venv/bin/python}
-python=$(command -v "$python")
+[ $# -gt 0 ] || set -- python3
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT INT TERM
-cp -r "$checkout" "$work/source"   # building leaves files beside the sources
-"$python" -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$work" "$work/source"
-rm -rf "$work/source"
-"$python" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$work"/rtradar-*.whl
-"$python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))' > "$work/path"
-cp "$work/path" "$("$work/venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/shared.pth"
+pip() { "$1/bin/python" -m pip --quiet --disable-pip-version-check "$2" "$3" "$4" "$5"; }
+git -C "$checkout" archive --prefix source/ HEAD | tar -x -C "$work"   # building leaves files beside the sources
+"$1" -m venv "$work/builder"
+pip "$work/builder" install --constraint "$checkout/constraints.txt" build
+"$work/builder/bin/python" -m build --outdir "$work/dist" "$work/source" >/dev/null
+rm -rf "$work/source" "$work/builder"
 cd "$work"
 unset PYTHONPATH || true
-"$work/venv/bin/python" - <<'PROBE'
+for python; do
+  "$python" -m venv venv
+  pip venv install --constraint "$checkout/constraints.txt" "$(ls dist/*.whl)"
+  venv/bin/python - <<'PROBE'
 import rtradar
 from rtradar.scene import Scene
-from rtradar.scene.mesh_files import mesh_names, meshes_folder
+from rtradar.scene.mesh_files import mesh_names
+from rtradar.system.files import shipped_folder
 from rtradar.validate import claims, validation_folder
 
 assert "/venv/" in rtradar.__file__, rtradar.__file__
 assert len(Scene.load("living-room").furniture) > 0
-print(f"{len(mesh_names())} meshes in {meshes_folder().name}/, {len(claims(validation_folder()))} claims, scenes found")
+print(f"{len(mesh_names())} meshes in {shipped_folder('meshes').name}/, {len(claims(validation_folder()))} claims, scenes found")
 PROBE
-"$work/venv/bin/rtradar" run synthetic:walk --duration 0.3 --out "$work/out"
-"$work/venv/bin/rtradar" run synthetic:walk --duration 0.2 --scene bedroom --fidelity analytic --out "$work/room"
-test -s "$work/out/report.html" && test -s "$work/room/maps.h5" && echo "the wheel works"
+  venv/bin/rtradar run synthetic:walk --duration 0.3 --out out --overwrite
+  venv/bin/rtradar run synthetic:walk --duration 0.2 --scene bedroom --fidelity analytic --out room --overwrite
+  test -s out/report.html
+  test -s room/maps.h5
+  du -sm venv | cut -f1 | xargs echo "$python: the wheel works; megabytes installed:"
+  du -sm venv/lib/python*/site-packages/* | sort -rn | head -12 | sed 's,\t.*/,  ,'
+  rm -rf venv
+done
