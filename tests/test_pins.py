@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+import rtradar
+
 CONSTRAINTS = Path(__file__).resolve().parents[1] / "constraints.txt"
 
 
@@ -59,3 +61,11 @@ def test_the_search_follows_what_needs_what() -> None:
     if not installed("rtradar"):
         pytest.skip("rtradar runs from its source, and is not installed")
     assert {"numpy", "mitsuba", "drjit", "llvmlite"} <= needed()
+
+
+def test_what_is_cited_is_this_version() -> None:
+    root = CONSTRAINTS.parent
+    cited = re.search(r"^version: (\S+)$", (root / "CITATION.cff").read_text(), re.MULTILINE)
+    assert cited
+    assert cited[1] == rtradar.__version__
+    assert f"version = {{{cited[1]}}}" in (root / "docs" / "citing.md").read_text()
