@@ -2,7 +2,7 @@
 
 The texts are those of the classes' docstrings: the summary, what follows it, and a paragraph that
 begins with "Occlusion:". ``python docs/level_tables.py`` writes the same words into the table of
-README.md, whose figures it leaves as they are.
+README.md, whose last column it leaves as it is.
 """
 
 from __future__ import annotations
@@ -137,14 +137,14 @@ def readme(text: str) -> str:
     """Return the text of the README with the levels' own words in its table."""
     table = re.search(r"^\| level \| what it computes .*\n\|.*\n((?:\|.*\n)+)", text, re.M)
     assert table, "README.md has no table of levels"
-    figures = {}
+    when = {}
     for row in table[1].splitlines():
-        level, _, _, *others = row.split(" | ")
-        figures[level.strip("| `")] = others
+        level, _, *others = row.split(" | ")
+        when[level.strip("| `")] = others
     lines = []
     for level in MODELS.built_in:
-        own, others = said(level), figures.get(level, ["", "", "|"])
-        lines.append(" | ".join([f"| `{level}`", own.computes, own.occlusion, *others]) + "\n")
+        others = when.get(level, ["|"])
+        lines.append(" | ".join([f"| `{level}`", said(level).computes, *others]) + "\n")
     return text[: table.start(1)] + "".join(lines) + text[table.end(1) :]
 
 
