@@ -31,7 +31,6 @@ from rtradar.pipeline.compared import (
     unit_of,
     write_figures,
 )
-from rtradar.pipeline.output.pictures import removed
 from rtradar.pipeline.output.view import load_run_view, read_result, run_maps
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
@@ -41,6 +40,7 @@ from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bi
 from rtradar.radar import Radar
 from rtradar.report import comparison
 from rtradar.report.canvas import FieldUnit, field_unit
+from rtradar.report.plots import how_made
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
@@ -351,11 +351,10 @@ def _draw(
     frame = best_frame(results[reference])
     with open_run_maps(results[reference]) as maps:
         at = f"window at {maps['time'][frame]:.2f} s"
-        titles = (
-            f"{title}{removed(maps['range_doppler'])}, {at}",
-            title + removed(maps["spectrogram"]),
-            title,
+        of_frame, of_columns = (
+            f"{title}\n{how_made(maps[name])}".rstrip() for name in ("range_doppler", "spectrogram")
         )
+    titles = f"{of_frame}, {at}", of_columns, title
     frames, levels = [frame] * len(results), (map_levels, column_levels)
     drawn = draw_maps_and_clouds(folder, results, frames, levels, titles)
     return dict(zip(_PICTURES, (power, parts), strict=False)) | drawn, part_unit

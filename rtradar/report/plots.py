@@ -225,7 +225,7 @@ class Plots:
         title = f"Range-Doppler-time cloud, {len(points)} points"
         if not shown.all():
             title += f" ({int(shown.sum())} of them within the axes)"
-        dress(axes, title=self._title(title, _made(self.maps["range_doppler"])))
+        dress(axes, title=self._title(title, how_made(self.maps["range_doppler"])))
         add_colour_bar(dots, [axes], VELOCITY_LABEL, shrink=0.7, pad=0.12)
         return cast("Axes", axes)
 
@@ -299,7 +299,7 @@ class Plots:
             dress(axes)
         lowest = [axes.get_position(original=True).y0 for axes in panels]
         beside = len(panels) if lowest[0] == lowest[-1] else 1
-        title = self._title(heading, _made(self.maps["range_doppler"]))
+        title = self._title(heading, how_made(self.maps["range_doppler"]))
         dress(panels[0], title=title, across=0.92 * beside)
         add_colour_bar(dots, panels, VELOCITY_LABEL)
         return panels[0]
@@ -351,7 +351,7 @@ class Plots:
         unit, view = self._unit(range_m=self.radar.range_m), (None, self._range_limits)
         return ShownMap(
             title="Range over time",
-            made=_made(self.maps["range_time"]),
+            made=how_made(self.maps["range_time"]),
             labels=("Time [s]", "Range [m]"),
             level_db=unit.level(power).T,
             across=times,
@@ -374,7 +374,7 @@ class Plots:
         seen = self._velocity_limits if self._found.by_velocity.any() else fitted
         return ShownMap(
             title="Spectrogram",
-            made=_made(self.maps["spectrogram"]),
+            made=how_made(self.maps["spectrogram"]),
             labels=("Time [s]", VELOCITY_LABEL),
             level_db=unit.level(power).T,
             across=times,
@@ -395,7 +395,7 @@ class Plots:
         masked = self._parameters.get("detector") != "ti-oob"
         return ShownMap(
             title=f"Range-Doppler map,\n{when}",
-            made=_made(self.maps["range_doppler"]),
+            made=how_made(self.maps["range_doppler"]),
             labels=(VELOCITY_LABEL, "Range [m]"),
             level_db=unit.level(power / self.radar.n_channels),
             across=velocity,
@@ -426,7 +426,7 @@ class Plots:
         unit = self._unit(range_m=self.radar.range_m[:, None])
         return ShownMap(
             title=f"Range-{name}, {when}",
-            made=_made(self.maps[f"range_{name}"]),
+            made=how_made(self.maps[f"range_{name}"]),
             labels=(angle_label(name, self.radar), "Range [m]"),
             level_db=unit.level(power),
             across=angles,
@@ -548,7 +548,7 @@ class Plots:
         return max(HANDFUL, 2 * self._parameters.get("pfa", 0.0) * cells)
 
 
-def _made(data: Any) -> str:
+def how_made(data: Any) -> str:
     """Return lines that say how static clutter was removed from a map, and where it has gaps."""
     how = str(data.attrs.get("clutter_removal", "none"))
     lines = ["" if how == "none" else f"static clutter removed: {how}"]

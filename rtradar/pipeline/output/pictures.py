@@ -14,7 +14,7 @@ from rtradar.pipeline.capture import Capture, PreparedRoom
 from rtradar.pipeline.output.truth import truth_of
 from rtradar.pipeline.result import Result
 from rtradar.report import rooms, write_report
-from rtradar.report.plots import Plots
+from rtradar.report.plots import Plots, how_made
 from rtradar.report.rooms import ShownRoom
 from rtradar.report.run_view import RunView
 from rtradar.scatter.multipath.path_summary import Ghost, ghosts
@@ -100,7 +100,7 @@ def _room_of(
 
     panels = {"As received": (received("range_doppler"), received("detections").astype(bool))}
     if suffix:
-        after = removed(maps["range_doppler"]).strip().capitalize()
+        after = how_made(maps["range_doppler"]).partition("\n")[0].capitalize()
         panels[after] = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
     there = radar.at(time_s)
     found = [
@@ -152,9 +152,3 @@ def _range(ghost: Ghost) -> float:
 
 def _walls(path: str) -> str:
     return " > ".join(sorted(name for name in path.split(" > ") if name != "body"))
-
-
-def removed(data: Any) -> str:
-    """Return a second line of a title for an open dataset whose static clutter was removed."""
-    how = data.attrs["clutter_removal"]
-    return "" if how == "none" else f"\nstatic clutter removed: {how}"
