@@ -99,7 +99,11 @@ def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     from rtradar.pipeline.timing import lines_shown
 
     capture.pop("fidelity")
-    capture |= {"fidelities": fidelities, "pictures": options.pictures}
+    capture["fidelities"] = fidelities
+    if options.plan or options.advise is not None:
+        yield from _plan(options, capture)
+        return
+    capture["pictures"] = options.pictures
     with lines_shown():
         if several:
             found = pipeline.compare_recordings(capture.pop("motion"), **capture)
@@ -115,6 +119,25 @@ def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
         say(options, f"the table is {options.out / 'compare.csv'}, each recording in its folder")
     else:
         _show(options, "compare.html")
+
+
+def _plan(options: argparse.Namespace, capture: dict[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """Say what a run by each level will take, and which level to take."""
+    from rtradar.cards import text_table
+    from rtradar.pipeline import plan_levels
+
+    for name in ("out", "overwrite"):
+        capture.pop(name)
+    found = plan_levels(**capture, tolerance_db=options.advise)
+    yield found
+    rows = [("", "Run [s]", "Memory [MB]")]
+    rows += [
+        (name, f"{one['wall_s']:.3g}", f"{one['peak_memory_mb']:.0f}")
+        for name, one in found["levels"].items()
+    ]
+    say(options, text_table(rows))
+    if advice := found["advice"]:
+        say(options, f"take {advice['level']}: {advice['why']}")
 
 
 def _compare_folders(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:

@@ -1,6 +1,6 @@
 """The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.compare import compare, compare_folders, compare_recordings
+from rtradar.pipeline.compare import compare, compare_folders, compare_recordings, plan_levels
 from rtradar.pipeline.compared import Comparison
 from rtradar.pipeline.experiment import Experiment, Sweep, sweep
 from rtradar.pipeline.processing import MEMORY_LIMIT_BYTES
@@ -18,6 +18,7 @@ __all__ = [
     "compare",
     "compare_folders",
     "compare_recordings",
+    "plan_levels",
     "process_samples",
     "run",
     "simulate",

@@ -35,7 +35,7 @@ from rtradar.pipeline.output.view import load_run_view, read_result, run_maps
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.run import run_into
+from rtradar.pipeline.run import run, run_into
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report import comparison
@@ -43,6 +43,7 @@ from rtradar.report.canvas import FieldUnit, field_unit
 from rtradar.report.plots import how_made
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
+from rtradar.scatter.models.auto import choose_level
 from rtradar.scene import Scene
 from rtradar.settings import (
     RunOptions,
@@ -228,6 +229,77 @@ def compare_recordings(
     with atomic_folder(place, _SEVERAL, overwrite=overwrite) as folder:
         write_figures(folder, summary, _SEVERAL)
     return Comparison(summary, place)
+
+
+_SHORT_STEPS = 8
+"""Steps from frame to frame by which the second of two short runs is longer than the first."""
+
+_PATIENCE_S = 5.0
+"""Time of the first short run from which on there is no second [s]."""
+
+
+def plan_levels(
+    motion: Moving,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None = None,
+    *,
+    fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
+    tolerance_db: float | None = None,
+    **options: Any,
+) -> dict[str, Any]:
+    """Estimate what a run by each level will take, and which level keeps a tolerance.
+
+    Each level runs in memory for a few frames, and again for eight more; what both take is drawn on
+    to the whole capture. A level whose first run takes seconds is drawn on from that alone, which
+    is too much rather than too little.
+
+    Parameters
+    ----------
+    motion, radar, scene, fidelities
+        The same as for `compare`; one level will do.
+    tolerance_db : float, optional
+        Largest error of the power of a frame [dB], for which the level ``auto`` is asked.
+    **options
+        Settings of all runs: fields of `rtradar.RunSettings`.
+
+    Returns
+    -------
+    dict
+        ``levels``: of each its ``wall_s`` [s], without compiling and files, and ``peak_memory_mb``
+        [MB]; ``capture_s`` [s]; and ``advice``, the ``level`` and ``why``, if it is asked for.
+
+    Raises
+    ------
+    InputError, BackendError
+        As by `compare`.
+    """
+    settings = settings_of("plan_levels", RunOptions, options)
+    parts = given_parts(motion, radar, scene, settings)
+    whole = prepare(*parts, replace(settings, fidelity="analytic"))
+    radar, capture_s = whole.radar, whole.radar.duration_of(whole.n_chirps)
+    advice = None
+    if tolerance_db is not None:
+        level, why = choose_level(radar, whole.body, tolerance_db, None)
+        advice = {"level": level, "why": why}
+        fidelities = [level, *(name for name in fidelities if name != level)]
+    first_s = min(radar.frame_duration_s + radar.frame_hop_s, capture_s)
+    levels = {}
+    for name in fidelities:
+
+        def took(duration_s: float, name: str = name) -> Mapping[str, float]:
+            own = replace(settings, fidelity=name, duration_s=duration_s)
+            return run(*parts, **vars(own)).summary
+
+        found = took(first_s)
+        rate = found["wall_s"] / first_s
+        if found["wall_s"] < _PATIENCE_S and first_s < capture_s:
+            found = took(first_s)  # without what the first run of a process loads
+            second_s = min(first_s + _SHORT_STEPS * radar.frame_hop_s, capture_s)
+            longer = took(second_s)
+            rate = max(longer["wall_s"] - found["wall_s"], 0.0) / (second_s - first_s)
+        wall_s = found["wall_s"] + rate * (capture_s - first_s)
+        levels[name] = {"wall_s": wall_s, "peak_memory_mb": found["peak_memory_mb"]}
+    return {"capture_s": capture_s, "levels": levels, "advice": advice}
 
 
 def _file_name(motion: Moving) -> str:

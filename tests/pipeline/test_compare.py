@@ -8,6 +8,7 @@ import dataclasses
 import json
 import math
 import re
+import sys
 from pathlib import Path
 
 import h5py
@@ -19,7 +20,7 @@ from hypothesis import strategies as st
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.pipeline import compare_folders
+from rtradar.pipeline import compare_folders, plan_levels
 from rtradar.pipeline.compared import above_noise, chamfer, chamfer_bins, level_agreement
 from rtradar.report.comparison import _spread
 
@@ -349,3 +350,42 @@ def test_chamfer_of_nothing() -> None:
     nothing = np.zeros((0, 3))
     assert chamfer(nothing, nothing, (1, 1, 1)) == 0
     assert chamfer(nothing, np.zeros((1, 3)), (1, 1, 1)) == math.inf
+
+
+# -- what a level will take, and which to take -----------------------------------------------------
+
+
+def test_a_plan_draws_short_runs_on_to_the_whole(
+    kick: rt.Motion, small: rt.Radar, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that takes 1 s and 2 s for a second, and one whose first frames take 6 s."""
+    asked: list[tuple[str, float]] = []
+
+    def timed(*_: object, fidelity: str, duration_s: float, **__: object) -> rt.Result:
+        asked.append((fidelity, duration_s))
+        wall_s = 1 + 2 * duration_s if fidelity == "analytic" else 80 * duration_s
+        summary = {"wall_s": wall_s, "peak_memory_mb": 100.0}
+        return rt.Result(np.zeros((0, 3)), None, summary, small)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(sys.modules["rtradar.pipeline.compare"], "run", timed)
+    levels = ["analytic", "reference"]
+    found = plan_levels(kick, small, fidelities=levels, duration_s=0.5, tolerance_db=0.5)
+    capture_s, first_s = found["capture_s"], small.frame_duration_s + small.frame_hop_s
+    assert capture_s == pytest.approx(0.5, abs=0.001)
+    assert found["advice"]["level"] == "specular"
+    assert "0.163 is allowed" in found["advice"]["why"]
+    assert [*found["levels"]] == ["specular", *levels]
+    assert found["levels"]["analytic"]["wall_s"] == pytest.approx(1 + 2 * capture_s)
+    assert found["levels"]["reference"]["wall_s"] == pytest.approx(80 * capture_s)
+    assert asked.count(("reference", pytest.approx(first_s))) == 1
+
+
+def test_a_plan_is_printed_and_nothing_is_written(
+    small_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compare", "synthetic:kick", "--duration", "0.2", "--radar", str(small_file)]
+    words += ["--fidelities", "analytic,analytic-paper", "--out", str(tmp_path / "out")]
+    assert main([*words, "--plan"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in said] == ["Run", "analytic", "analytic-paper"]
+    assert not (tmp_path / "out").exists()
