@@ -86,6 +86,7 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
         fidelity="analytic",
         clutter_removal="mean",
         pfa=1e-4,
+        pictures=True,
     )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["parameters"]["scene"] == "room"
