@@ -15,10 +15,11 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from unittest import mock
 
 import numpy as np
@@ -565,27 +566,28 @@ def tolerance_rows(quick: bool) -> Iterator[Row]:
     Without a tolerance ghosts are found at every chirp, and so is the shadow in the clutter.
     """
     duration_s = 0.2 if quick else 1.0
-    radar, room = rt.Radar.preset("paper-12ghz"), Scene.load("living-room")
+    paper, room = rt.Radar.preset("paper-12ghz"), Scene.load("living-room")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2 if quick else 3.0)
+    radars = {"": paper} | ({} if quick else {", two Rx": replace(paper, rx_y=1, rx_z=1)})
+    for which, radar in radars.items():
 
-    def samples(scene: Scene, **options: float | None) -> NDArray[np.complex64]:
-        simulated = rt.simulate(
-            motion, radar, scene, snr_db=math.inf, duration_s=duration_s, **options
-        )
-        return np.asarray(simulated.samples.values)
+        def samples(scene: Scene, radar: rt.Radar = radar, **options: Any) -> Array:
+            given = {"snr_db": math.inf, "duration_s": duration_s} | options
+            return np.asarray(rt.simulate(motion, radar, scene, **given).samples.values)
 
-    exact = samples(room, path_tolerance_db=None)
-    error = samples(room, path_tolerance_db=TOLERANCE_DB) - exact
-    person = samples(Scene())
-    error_db = power_db((np.abs(error) ** 2).mean() / (np.abs(person) ** 2).mean())
-    claim = f"living room, {duration_s:g} s of a walk"
-    says = "ghosts of a furnished room at anchors: power of the error over the tolerance"
-    yield reported(claim, "error of ghosts over the person's power", "dB", error_db)
-    yield judged(
-        claim, "error of ghosts over what is tolerated", "1",
-        10 ** ((error_db - TOLERANCE_DB) / 10), 1.0,
-        says=says,
-    )  # fmt: skip
+        exact = samples(room, path_tolerance_db=None)
+        error = samples(room, path_tolerance_db=TOLERANCE_DB) - exact
+        person = samples(Scene())
+        error_db = power_db((np.abs(error) ** 2).mean() / (np.abs(person) ** 2).mean())
+        claim = f"living room, {duration_s:g} s of a walk{which}"
+        says = "ghosts of a furnished room at anchors: power of the error over the tolerance"
+        yield reported(claim, "error of ghosts over the person's power", "dB", error_db)
+        if not which:
+            yield judged(
+                claim, "error of ghosts over what is tolerated", "1",
+                10 ** ((error_db - TOLERANCE_DB) / 10), 1.0,
+                says=says,
+            )  # fmt: skip
 
 
 def measure(quick: bool) -> list[Row]:
