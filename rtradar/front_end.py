@@ -118,7 +118,7 @@ class Antenna:
         (...) float64
             Ratio of powers, 0 to 1.
         """
-        unit = directions / np.sqrt(np.vecdot(directions, directions))[..., None]
+        unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
         if self.exponent is not None:
             ahead = unit[..., 0]
             return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)

@@ -45,7 +45,7 @@ _FROM_REFERENCE = {
 
 
 def tolerance(fidelity: str) -> Tolerance:
-    """Return how far a level may be from the level ``reference`` for a walking person.
+    """Return how far a level may be from the level ``reference`` for a person who moves.
 
     Parameters
     ----------

@@ -198,6 +198,7 @@ def test_words_of_the_levels_in_the_readme_are_their_own(
     write = import_module("level_tables").readme
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert write(text) == text, "write them anew: python docs/level_tables.py"
+    assert "with bounces" in text
     assert write(text.replace("with bounces", "with jumps")) == text
 
 

@@ -39,6 +39,8 @@ def test_a_suite_of_somebody_else_runs_on_each_backend(pytester: pytest.Pytester
 def test_the_backends_agree_as_it_says(rtradar_radar: rt.Radar, rtradar_scene: rt.Scene) -> None:
     from rtradar.trace.backend import available
 
+    if len(available()) < 2:
+        pytest.skip("one backend alone works on this machine")
     motion = rt.synthetic_motion("kick", duration_s=0.2)
     found = [
         rt.run(motion, rtradar_radar, rtradar_scene, variant=variant, duration_s=0.06).maps

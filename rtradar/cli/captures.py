@@ -86,21 +86,25 @@ def _show(options: argparse.Namespace, page: str) -> None:
 
 def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar compare``."""
-    if any(map(os.path.isdir, options.motion)):
+    folders = any(map(os.path.isdir, options.motion))
+    several = len(options.motion) > 1 and not options.at
+    planned = options.plan or options.advise is not None
+    if planned and (folders or several):
+        raise InputError("--plan and --advise are of one recording; give one, or people with --at")
+    if folders:
         yield from _compare_folders(options)
         return
     from rtradar.settings import check_fidelities
 
     fidelities = [name.strip() for name in options.fidelities.split(",")]
     check_fidelities(fidelities)
-    several = len(options.motion) > 1 and not options.at
     capture = _capture(options, alone=several)
     from rtradar import pipeline
     from rtradar.pipeline.timing import lines_shown
 
     capture.pop("fidelity")
     capture["fidelities"] = fidelities
-    if options.plan or options.advise is not None:
+    if planned:
         yield from _plan(options, capture)
         return
     capture["pictures"] = options.pictures

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Person
+from rtradar.body.people import body_of_people
 from rtradar.description import Movers, Moving, given_parts
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
@@ -35,7 +36,7 @@ from rtradar.pipeline.output.view import load_run_view, read_result, run_maps
 from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
-from rtradar.pipeline.run import run, run_into
+from rtradar.pipeline.run import run_into
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report import comparison
@@ -118,15 +119,8 @@ def compare(
     """
     names = list(fidelities)
     check_fidelities(names)
-    if "fidelity" in options:
-        raise InputError("compare has no option 'fidelity'; name the models in fidelities")
-    asked = settings = settings_of("compare", RunOptions, options)
-    parts = moving, _, there = given_parts(motion, radar, scene, settings)
-    if not people_in(there, moving)[1]:
-        raise InputError(
-            f"compare: nobody is in scene '{there.name}', and it is people's echoes that levels "
-            "differ in; give a motion"
-        )
+    asked, parts = _given("compare", motion, radar, scene, options)
+    settings = asked
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     place = check_path("out", out)
     with atomic_folder(place, kind, overwrite=overwrite) as folder:
@@ -155,6 +149,26 @@ def compare(
         return prepare(*parts, replace(asked, fidelity=name))
 
     return Comparison(summary, Path(out), _captures=lambda: {name: capture(name) for name in names})
+
+
+def _given(
+    caller: str,
+    motion: Moving,
+    radar: Radar | str | Path,
+    scene: Scene | str | Path | None,
+    options: Mapping[str, Any],
+) -> tuple[RunSettings, tuple[Movers, Radar, Scene]]:
+    """Return settings, and who moves, radar and scene; InputError where levels have nobody."""
+    if "fidelity" in options:
+        raise InputError(f"{caller} has no option 'fidelity'; name the models in fidelities")
+    settings = settings_of(caller, RunOptions, options)
+    parts = moving, _, there = given_parts(motion, radar, scene, settings)
+    if not people_in(there, moving)[1]:
+        raise InputError(
+            f"{caller}: nobody is in scene '{there.name}', and it is people's echoes that levels "
+            "differ in; give a motion"
+        )
+    return settings, parts
 
 
 @takes_settings
@@ -231,13 +245,12 @@ def compare_recordings(
     return Comparison(summary, place)
 
 
-_SHORT_STEPS = 8
-"""Steps from frame to frame by which the second of two short runs is longer than the first."""
-
-_PATIENCE_S = 5.0
-"""Time of the first short run from which on there is no second [s]."""
+_LONGER_STEPS, _PATIENCE_S = (24, 1), 20.0
+"""Steps from frame to frame by which the second of two short runs is longer than the first, and the
+fewer where the first took more than a time [s]."""
 
 
+@takes_settings
 def plan_levels(
     motion: Moving,
     radar: Radar | str | Path,
@@ -245,13 +258,12 @@ def plan_levels(
     *,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
     tolerance_db: float | None = None,
-    **options: Any,
+    **options: Unpack[RunOptions],
 ) -> dict[str, Any]:
     """Estimate what a run by each level will take, and which level keeps a tolerance.
 
-    Each level runs in memory for a few frames, and again for eight more; what both take is drawn on
-    to the whole capture. A level whose first run takes seconds is drawn on from that alone, which
-    is too much rather than too little.
+    Each level runs for two frames, into a folder that goes again, and for a few frames more; what
+    the longer run adds is drawn on to the whole capture.
 
     Parameters
     ----------
@@ -265,39 +277,42 @@ def plan_levels(
     Returns
     -------
     dict
-        ``levels``: of each its ``wall_s`` [s], without compiling and files, and ``peak_memory_mb``
-        [MB]; ``capture_s`` [s]; and ``advice``, the ``level`` and ``why``, if it is asked for.
+        ``levels``: of each its ``wall_s`` [s], without compiling, and ``peak_memory_mb`` [MB];
+        ``capture_s`` [s]; and ``advice``, the ``level`` and ``why``, if it is asked for.
 
     Raises
     ------
     InputError, BackendError
         As by `compare`.
     """
-    settings = settings_of("plan_levels", RunOptions, options)
-    parts = given_parts(motion, radar, scene, settings)
-    whole = prepare(*parts, replace(settings, fidelity="analytic"))
-    radar, capture_s = whole.radar, whole.radar.duration_of(whole.n_chirps)
+    settings, parts = _given("plan_levels", motion, radar, scene, options)
+    moving, before, there = parts
+    there, everyone = people_in(there, moving)
+    body, placed = body_of_people(everyone, settings), there.place(before)
+    capture_s = placed.duration_of(placed.chirps_in(body.duration_s))
     advice = None
     if tolerance_db is not None:
-        level, why = choose_level(radar, whole.body, tolerance_db, None)
+        level, why = choose_level(placed, body, tolerance_db, None)
         advice = {"level": level, "why": why}
         fidelities = [level, *(name for name in fidelities if name != level)]
-    first_s = min(radar.frame_duration_s + radar.frame_hop_s, capture_s)
+    first_s = min(placed.frame_duration_s + placed.frame_hop_s, capture_s)
     levels = {}
     for name in fidelities:
 
         def took(duration_s: float, name: str = name) -> Mapping[str, float]:
             own = replace(settings, fidelity=name, duration_s=duration_s)
-            return run(*parts, **vars(own)).summary
+            with TemporaryDirectory() as place:
+                return run_into(Path(place, "short"), *parts, own).summary
 
         found = took(first_s)
-        rate = found["wall_s"] / first_s
-        if found["wall_s"] < _PATIENCE_S and first_s < capture_s:
+        steps = _LONGER_STEPS[found["wall_s"] > _PATIENCE_S]
+        if steps > 1:
             found = took(first_s)  # without what the first run of a process loads
-            second_s = min(first_s + _SHORT_STEPS * radar.frame_hop_s, capture_s)
-            longer = took(second_s)
-            rate = max(longer["wall_s"] - found["wall_s"], 0.0) / (second_s - first_s)
-        wall_s = found["wall_s"] + rate * (capture_s - first_s)
+        longer_s = min(first_s + steps * placed.frame_hop_s, capture_s)
+        wall_s = found["wall_s"]
+        if longer_s > first_s:
+            added_s = max(took(longer_s)["wall_s"] - wall_s, 0.0)
+            wall_s += added_s * (capture_s - first_s) / (longer_s - first_s)
         levels[name] = {"wall_s": wall_s, "peak_memory_mb": found["peak_memory_mb"]}
     return {"capture_s": capture_s, "levels": levels, "advice": advice}
 

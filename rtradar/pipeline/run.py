@@ -181,7 +181,7 @@ def run_into(
                 save_snapshots(folder / "view.npz", moments)
                 summary |= room_findings(capture, maps)
                 run_view = run_view_of(result, maps, moments.every(moments.stride(*_MOMENTS)))
-            shown = Shown.of(result, maps, capture)
+                shown = Shown.of(result, maps, capture)
             if pictures:
                 with capture.stages.time("pictures"):
                     shown.draw(folder)

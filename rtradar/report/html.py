@@ -167,7 +167,6 @@ class InlinePage:
 
 
 _PREFIXED = {"Hz", "s", "W"}  # shown as 12 GHz or 62.5 µs
-_PREFIXES = ("a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P")
 
 
 @cache
@@ -217,9 +216,10 @@ def with_unit(value: object, unit: str) -> str:
     if isinstance(value, int) and not unit:
         return grouped(value)
     if isinstance(value, int | float):
-        if unit in _PREFIXED and value and math.isfinite(value):
-            power = min(max(math.floor(math.log10(abs(value)) / 3), -6), 5)
-            return minus(f"{value / 1000.0**power:.6g} {_PREFIXES[power + 6]}{unit}")
+        if unit in _PREFIXED and value:
+            from matplotlib.ticker import EngFormatter
+
+            return EngFormatter(unit=unit, places=None)(value)
         shown = f"{value:.5g}"
     else:
         shown = str(value)

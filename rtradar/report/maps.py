@@ -7,6 +7,7 @@ import math
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -74,6 +75,12 @@ class ShownMap:
         return self.view[0] or bin_edges(self.across), self.view[1]
 
     @property
+    def heading(self) -> str:
+        """The title, with the number of detections where there are any over a map."""
+        found = [one.name for one in self.over if one.kind == "detection"]
+        return self.title.replace("map,", f"map and {found[0]},") if found else self.title
+
+    @cached_property
     def limits_db(self) -> _Limits:
         """Floor and ceiling of the colours [dB], as `colour_limits` sets them for the view."""
         if self.colours_db is not None:

@@ -111,16 +111,15 @@ class Plots:
         else:
             left, right = ax, None
         image = shown.draw(left)
-        axes, title = [left], shown.title
+        axes = [left]
         if right is not None:
-            title = title.replace("map", f"map and {shown.over[0].name}")
             style: dict[str, Any] = {"s": 3, "color": theme_of(right).detection, "linewidths": 0}
             right.scatter(*shown.over[0].xy.T, **style)
             left.set_xlabel(_TWO_LINES)
             right.set_xlabel(_TWO_LINES)
             dress(right)
             axes.append(right)
-        self._dress(left, shown, image, axes, title)
+        self._dress(left, shown, image, axes, shown.title if right is None else shown.heading)
         return left
 
     def range_time(self, ax: Axes | None = None) -> Axes:
@@ -345,7 +344,7 @@ class Plots:
         found.append(self._range_doppler(None))
         return found + [self._range_angle(name) for name in self._angles]
 
-    @property
+    @cached_property
     def _range_time(self) -> ShownMap:
         power, times = thinned(self.maps["range_time"], self._axis("slow_time"))
         unit, view = self._unit(range_m=self.radar.range_m), (None, self._range_limits)
@@ -361,7 +360,7 @@ class Plots:
             qualifier="mean of channels",
         )
 
-    @property
+    @cached_property
     def _spectrogram(self) -> ShownMap:
         power, times = thinned(self.maps["spectrogram"], self._axis("spectrogram_time"))
         velocity = self._axis("spectrogram_velocity")

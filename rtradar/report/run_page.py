@@ -136,9 +136,7 @@ def _captioned(shown: ShownMap, note: str = "") -> dict[str, Any]:
     """Return a map as plain values, with what is to be read below it."""
     made = shown.made.replace("\n", "; ")
     said = (made and f"{made[0].upper()}{made[1:]}.", shown.colours, note, shown.note)
-    title = shown.title.replace("\n", " ")
-    if detected := [one.name for one in shown.over if one.kind == "detection"]:
-        title = title.replace("map,", f"map and {detected[0]},")
+    title = shown.heading.replace("\n", " ")
     return shown.packed() | {"title": title, "note": " ".join(filter(None, said))}
 
 

@@ -10,6 +10,7 @@ import math
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -358,26 +359,30 @@ def test_chamfer_of_nothing() -> None:
 def test_a_plan_draws_short_runs_on_to_the_whole(
     kick: rt.Motion, small: rt.Radar, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run that takes 1 s and 2 s for a second, and one whose first frames take 6 s."""
+    """A level with 1 s for all and 2 s a second, and one whose two frames take 30 s."""
     asked: list[tuple[str, float]] = []
 
-    def timed(*_: object, fidelity: str, duration_s: float, **__: object) -> rt.Result:
-        asked.append((fidelity, duration_s))
-        wall_s = 1 + 2 * duration_s if fidelity == "analytic" else 80 * duration_s
+    def timed(out: Path, *given: Any) -> rt.Result:
+        (*_, settings), duration_s = given, given[-1].duration_s
+        asked.append((settings.fidelity, duration_s))
+        wall_s = 1 + 2 * duration_s if settings.fidelity == "analytic" else 400 * duration_s
         summary = {"wall_s": wall_s, "peak_memory_mb": 100.0}
         return rt.Result(np.zeros((0, 3)), None, summary, small)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(sys.modules["rtradar.pipeline.compare"], "run", timed)
+    monkeypatch.setattr(sys.modules["rtradar.pipeline.compare"], "run_into", timed)
     levels = ["analytic", "reference"]
     found = plan_levels(kick, small, fidelities=levels, duration_s=0.5, tolerance_db=0.5)
-    capture_s, first_s = found["capture_s"], small.frame_duration_s + small.frame_hop_s
+    capture_s = found["capture_s"]
     assert capture_s == pytest.approx(0.5, abs=0.001)
     assert found["advice"]["level"] == "specular"
     assert "0.163 is allowed" in found["advice"]["why"]
     assert [*found["levels"]] == ["specular", *levels]
     assert found["levels"]["analytic"]["wall_s"] == pytest.approx(1 + 2 * capture_s)
-    assert found["levels"]["reference"]["wall_s"] == pytest.approx(80 * capture_s)
-    assert asked.count(("reference", pytest.approx(first_s))) == 1
+    assert found["levels"]["reference"]["wall_s"] == pytest.approx(400 * capture_s)
+    # A slow level is run twice, and the second time for one step more.
+    first_s = small.frame_duration_s + small.frame_hop_s
+    slow = [duration_s for level, duration_s in asked if level == "reference"]
+    assert slow == pytest.approx([first_s, first_s + small.frame_hop_s])
 
 
 def test_a_plan_is_printed_and_nothing_is_written(
@@ -389,3 +394,21 @@ def test_a_plan_is_printed_and_nothing_is_written(
     said = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in said] == ["Run", "analytic", "analytic-paper"]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["synthetic:kick", "synthetic:walk", "--plan"], "of one recording"),
+        ([".", "synthetic:walk", "--plan"], "of one recording"),
+        (["synthetic:kick", "--advise", "-1"], "tolerance_db = -1"),
+        (["--scene", "living-room", "--duration", "0.2", "--plan"], "nobody is in scene"),
+    ],
+)
+def test_a_plan_that_has_no_meaning_is_refused_in_one_line(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *words, "--out", str(tmp_path / "out")]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert said in lines[0]

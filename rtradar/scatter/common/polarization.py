@@ -38,11 +38,8 @@ _NORMAL_INCIDENCE = 1e-9
 
 def unit(vectors: Array) -> Array:
     """Return unit vectors (..., 3); 0 for no direction."""
-    # NumPy adds along an axis of three a tenth as quickly.
-    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    size = np.sqrt(x * x + y * y + z * z)
-    scale = np.where(size > 1e-12, 1 / np.maximum(size, 1e-12), 0.0)
-    return np.asarray(vectors * scale[..., None])
+    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.where(size > 1e-12, vectors / np.where(size > 1e-12, size, 1.0), 0.0))
 
 
 class Polarization(NamedTuple):
@@ -313,11 +310,10 @@ def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
     tx, rx = (
         unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None])
     )
-    frames = at.frames[:, None]
-    normal = ((tx + rx)[..., None, :] @ frames)[..., 0, :] * at.semi_axes
+    normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
     # A normal of a unit sphere that is stretched to the ellipsoid.
     local = at.semi_axes * unit(normal)
-    return np.asarray(at.centres[:, None] + (frames @ local[..., None])[..., 0])
+    return np.asarray(at.centres[:, None] + np.einsum("tpij,trpj->trpi", at.frames, local))
 
 
 def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:

@@ -74,7 +74,7 @@ def choose_level(
     """
     if not (math.isfinite(tolerance_db) and tolerance_db > 0):
         raise InputError(
-            f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db)"
+            f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db, --advise)"
         )
     if tolerance_complex is not None and not (
         math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX
