@@ -351,7 +351,6 @@ MAXIMUM_SUBDIVISIONS = 8
 """20 x 4^8 is 1.3 million triangles a part: more is a mistake."""
 
 
-@lru_cache(maxsize=4)
 def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Make an icosphere of 20 x 4^subdivisions triangles, closed, with the mean radius 1.
 
@@ -379,11 +378,43 @@ def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int6
         raise InputError(
             f"unit_sphere: subdivisions = {subdivisions}; allowed are 0 to {MAXIMUM_SUBDIVISIONS}"
         )
+    return geodesic_sphere(2**subdivisions)
+
+
+@lru_cache(maxsize=16)
+def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Make the `unit_sphere` of 20 frequency^2 triangles: an icosahedron with its edges so divided.
+
+    Parameters
+    ----------
+    frequency : int
+        Parts of each edge, 1 or more.
+
+    Returns
+    -------
+    vertices : (10 frequency^2 + 2, 3) float64
+        Read-only, for they are kept.
+    faces : (20 frequency^2, 3) int64
+        Anticlockwise seen from outside; read-only.
+    """
     import trimesh  # slow to import
 
-    sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
-    vertices, faces = np.array(sphere.vertices, np.float64), np.array(sphere.faces, np.int64)
-    vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
+    solid = trimesh.creation.icosahedron()
+    rows, places = np.tril_indices(frequency + 1)
+    weights = np.stack([frequency - rows, rows - places, places], axis=1) / frequency
+    points = (weights @ solid.vertices[solid.faces]).reshape(-1, 3)
+    # Below each point but the last row's a triangle, and beside it one that stands on its head.
+    first = np.flatnonzero(rows < frequency)
+    below = first + rows[first] + 1
+    upright = np.stack([first, below, below + 1], axis=1)
+    inner = first[places[first] < rows[first]]
+    turned = np.stack([inner, inner + rows[inner] + 2, inner + 1], axis=1)
+    faces = np.concatenate([upright, turned])
+    faces = faces + len(weights) * np.arange(20)[:, None, None]
+    # Neighbouring faces of the icosahedron have the points of their edge in common.
+    chosen, number = trimesh.grouping.unique_rows(points, digits=9)
+    vertices, faces = points[chosen], number[faces.reshape(-1, 3)].astype(np.int64)
+    vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     # Mean of |x|^2 over a triangle: (|a|^2 + |b|^2 + |c|^2 + |a + b + c|^2) / 12.

@@ -117,21 +117,22 @@ class BodyTracer:
         antennas: Array,
         parts: Indices,
         vertices: Array,
+        first: Indices,
         margin: float,
     ) -> NDArray[np.int16]:
-        """Part that occludes each vertex, as each antenna sees it, (antenna, n, vertex) int16.
+        """Part that occludes each vertex, as each antenna sees it, (antenna, vertex) int16.
 
         It is another part that is nearer to the antenna on the same line, else -1. ``centres`` and
         ``frames`` are the pose of the body, ``antennas (antenna, 3)`` places, world [m]. Asked
         about are the vertices of ``parts (n,)``, but not those that face away by more than the sine
-        ``margin``; ``vertices (part, 3, vertex)`` are those of every part, on its ellipsoid, in its
-        own axes [m].
+        ``margin``; ``vertices (3, vertex)`` are those of every part, from ``first (part + 1,)`` on,
+        on its ellipsoid, in its own axes [m].
         """
-        found = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
+        found = np.full((len(antennas), vertices.shape[1]), -1, dtype=np.int16)
         floats = (antennas, centres, frames, self._semi_axes, self._longest)
         places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
         asked = np.ascontiguousarray(parts, dtype=np.int64)
-        rays, whose = facet_rays(places, asked, *body, vertices, float(margin))
+        rays, whose = facet_rays(places, asked, *body, vertices, first, float(margin))
         first_occluders(self._sphere.meets(rays[:7]), rays[7], whose, found.ravel())
         return found
 

@@ -1,9 +1,9 @@
 """Fractions of facets that an antenna sees past other parts, exact at edges of shadows.
 
 A tracer says which part occludes which vertex. Where it occludes some vertices of a facet and not
-others, the edge of the shadow runs through that facet, and the fraction that it leaves is taken
-from how far the rays to its vertices pass outside the occluding ellipsoids, in float64, as linear
-over the facet. So a shadow moves over the body without jumps.
+others, the edge of the shadow runs through that facet, where what the rays to its vertices pass
+outside the occluding ellipsoids, in float64, is 0 as a linear function over the facet. So a shadow
+moves over the body without jumps.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def _clearance(ball, vertex):
 
 
 @inlined()
-def _cut(occluders, corner, antenna, part, pose, vertices, balls):
-    """Fraction of a facet, with these corners, that occluders of some of them leave.
+def _clearances(occluders, corner, antenna, part, pose, vertices, balls):
+    """How far outside of all occluders of some of its corners the ways to those of a facet pass.
 
     ``balls (part, 5, 3)`` are from the part's axes to those in which another one is the unit ball,
     and the antenna in these; NaN where they are not known yet.
@@ -62,36 +62,37 @@ def _cut(occluders, corner, antenna, part, pose, vertices, balls):
         v0 = min(v0, _clearance(ball, vertices[corner[0]]))
         v1 = min(v1, _clearance(ball, vertices[corner[1]]))
         v2 = min(v2, _clearance(ball, vertices[corner[2]]))
-    return positive_fraction(v0, v1, v2)
+    return v0, v1, v2
 
 
 @compiled()
-def shade(hidden_by, antennas, parts, pose, vertices, corners, row, out):
-    """Fill in what antennas see of the facets of some parts; return the number of rows filled.
+def shade(hidden_by, antennas, parts, pose, vertices, corners, ends, start, out, edge):
+    """Fill in what antennas see of the facets of some parts.
 
-    ``hidden_by (antenna, n, vertex)`` is the part that occludes a vertex, or -1; ``antennas
-    (antenna, 3)`` world [m]; ``parts (n,)``; ``pose`` centres, frames and semi-axes of the body;
-    ``vertices (part, vertex, 3)`` in the axes of the parts; ``corners (3, facet)`` uint32. Filled
-    are ``out (row, facet)`` float32, its first row for parts in full view, and ``row (antenna,
-    n)``, which of them is whose.
+    ``hidden_by (antenna, vertex)`` is the part that occludes a vertex, or -1; ``antennas (antenna,
+    3)`` world [m]; ``parts (n,)``; ``pose`` centres, frames and semi-axes of the body; ``vertices
+    (vertex, 3)`` of all parts in their axes; ``corners (3, facet)`` uint32; ``ends (part + 1, 2)``
+    as those of `Facets`. Filled are ``out (antenna, facet)`` float32, but for parts in full view,
+    and of facets that are cut ``edge (antenna, facet, 3)`` float32, as `Views` has them; those of
+    each part from ``start (n,)`` on.
     """
-    out[0] = 1.0
-    count, (first, second, third) = 1, corners
+    first, second, third = corners
     balls = np.empty((len(pose[0]), 5, 3))
     for a in range(len(antennas)):
+        occluder, own = hidden_by[a], out[a]
         for n in range(len(parts)):
-            row[a, n], occluder, part = 0, hidden_by[a, n], parts[n]
-            if not (occluder >= 0).any():
+            part = parts[n]
+            (vertex, begin), (last, end) = ends[part], ends[part + 1]
+            if not (occluder[vertex:last] >= 0).any():
                 continue
             balls[:] = math.nan
-            own = out[count]
-            for f in range(len(own)):
+            for f in range(begin, end):
                 corner = first[f], second[f], third[f]
                 by = occluder[corner[0]], occluder[corner[1]], occluder[corner[2]]
                 hidden = (by[0] >= 0) + (by[1] >= 0) + (by[2] >= 0)
-                own[f] = 1.0 if hidden == 0 else 0.0
+                place = start[n] + f - begin
+                own[place] = 1.0 if hidden == 0 else 0.0
                 if hidden == 1 or hidden == 2:
-                    own[f] = _cut(by, corner, antennas[a], part, pose, vertices[part], balls)
-            row[a, n] = count
-            count += 1
-    return count
+                    u, v, w = _clearances(by, corner, antennas[a], part, pose, vertices, balls)
+                    own[place] = positive_fraction(u, v, w)
+                    edge[a, place, 0], edge[a, place, 1], edge[a, place, 2] = u, v, w

@@ -27,7 +27,7 @@ from rtradar.kernels.scatter.triangles import (
     FAST,
     SERIES,
     excess_paths,
-    largest_spread,
+    steep_last,
     sum_large,
     sum_small,
 )
@@ -36,13 +36,15 @@ Array = NDArray[np.float64]
 
 
 class Facets(NamedTuple):
-    """Triangles of one or more parts, all with the same faces; each part in its own axes.
+    """Triangles of one or more parts, one part after the other; each in its own axes.
 
-    ``vertices (part, vertex, 3)`` float64 [m]; ``faces (facet, 3)`` int32, anticlockwise seen from
-    outside; ``normals (part, facet, 3)``, outward; ``areas (part, facet)`` [m^2]. ``bend (part,
-    facet)`` is how far n.s swings to either side of its mean over the curved surface that a facet
-    represents, 0 where it is flat: the terminator is softened over it. With ``both_sides`` they are
-    a thin sheet, lit from either side.
+    ``vertices (vertex, 3)`` float64 [m]; ``faces (facet, 3)`` int32, anticlockwise seen from
+    outside; ``normals (facet, 3)``, outward; ``areas (facet,)`` [m^2]. ``bend (facet,)`` is how far
+    n.s swings to either side of its mean over the curved surface that a facet represents, 0 where
+    it is flat: the terminator is softened over it. ``rise (facet,)`` is how far that surface stands
+    out of the facet in the mean [m]. ``ends (part + 1, 2)`` int64 are the first
+    vertex and the first facet of each part, and the numbers of all. With ``both_sides`` they are a
+    thin sheet, lit from either side.
     """
 
     vertices: Array
@@ -50,6 +52,8 @@ class Facets(NamedTuple):
     normals: Array
     areas: Array
     bend: Array
+    rise: Array
+    ends: NDArray[np.int64]
     both_sides: bool = False
 
 
@@ -57,14 +61,19 @@ class Views(NamedTuple):
     """Tasks, each of which is one part in one pose, and what the antennas see of it.
 
     ``part (task,)`` int64; ``antennas (task, antenna, 3)`` float64 in the axes of that part [m];
-    ``seen (row, facet)`` float32, the fraction of each facet that is not occluded; ``row (task,
-    antenna)`` int64, which of them is whose.
+    ``seen (row, facet)`` float32, the fraction of each facet that is not occluded, those of the
+    part from ``first (task,)`` int64 on; ``row (task, antenna)`` int64, which of them is whose. Of
+    facets that are seen in part ``edge (row, facet, 3)`` float32 are values at the corners of a
+    linear function that is positive where they are seen; without it, (0, 0, 3), they radiate by
+    that fraction.
     """
 
     part: NDArray[np.int64]
     antennas: Array
     row: NDArray[np.int64]
+    first: NDArray[np.int64]
     seen: NDArray[np.float32]
+    edge: NDArray[np.float32] = np.empty((0, 0, 3), dtype=np.float32)
 
 
 class Waves(NamedTuple):
@@ -86,13 +95,17 @@ class Waves(NamedTuple):
 
 
 class _Chosen(NamedTuple):
-    """Facets (n,) that may be lit: ``corners (3, n)``, normals and planes ``facing (4, n)``."""
+    """Facets (n,) that may be lit: ``corners (3, n)``, normals and planes ``facing (4, n)``.
+
+    ``facet (n,)`` is which of those that are seen, ``corners`` are numbers of vertices of the part.
+    """
 
     facet: NDArray[np.uint32]
     corners: NDArray[np.uint32]
     facing: Array
     areas: Array
     bend: Array
+    rise: Array
 
 
 class _Terms(NamedTuple):
@@ -105,8 +118,11 @@ class _Terms(NamedTuple):
 
 
 @inlined()
-def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
-    """Facets that any of the antennas may light, by the ball round them all; their count."""
+def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, start, chosen):
+    """Facets that any of the antennas may light, by the ball round them all; their count.
+
+    What is seen of the first of them is at ``start``.
+    """
     count_antennas = len(antennas)
     x, y, z = antennas[:, 0].mean(), antennas[:, 1].mean(), antennas[:, 2].mean()
     spread = 0.0
@@ -120,7 +136,7 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
         height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z - planes[f]
         if both or height > -spread - bend[f] * farthest:
             for antenna in range(count_antennas):
-                if seen[row[antenna], f] > 0:
+                if seen[row[antenna], start + f] > 0:
                     chosen[count] = f
                     count += 1
                     break
@@ -128,31 +144,34 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
 
 
 @inlined()
-def _choose(facets, own, antennas, row, seen, x, y, z):
+def _choose(facets, own, antennas, row, start, seen, x, y, z):
     """Facets of a part that may be lit; its vertices' coordinates are filled in."""
-    n_facets, size = len(facets.faces), 0.0
-    vertices, normals = facets.vertices[own], facets.normals[own]
-    for i in range(len(x)):
+    (first, begin), (last, end) = facets.ends[own], facets.ends[own + 1]
+    vertices, faces = facets.vertices[first:last], facets.faces[begin:end]
+    normals, every_bend = facets.normals[begin:end], facets.bend[begin:end]
+    n_facets, size = len(faces), 0.0
+    for i in range(len(vertices)):
         x[i], y[i], z[i] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
     planes = np.empty(n_facets)
     for f in range(n_facets):
-        i = facets.faces[f, 0]
+        i = faces[f, 0] - first
         planes[f] = normals[f, 0] * x[i] + normals[f, 1] * y[i] + normals[f, 2] * z[i]
     lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
     reach = math.sqrt(size)
-    count = _may_be_lit(antennas, planes, normals, facets.bend[own], both, reach, seen, row, lit)
+    count = _may_be_lit(antennas, planes, normals, every_bend, both, reach, seen, row, start, lit)
     # Side by side, and without a sign: what may be counted from an array's end keeps a loop from
     # vector lanes.
     corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
-    areas, bend = np.empty(count), np.empty(count)
+    areas, bend, rise = np.empty(count), np.empty(count), np.empty(count)
     for i in range(count):
         f = lit[i]
         for axis in range(3):
-            corners[axis, i], facing[axis, i] = facets.faces[f, axis], normals[f, axis]
+            corners[axis, i], facing[axis, i] = faces[f, axis] - first, normals[f, axis]
         facing[3, i] = planes[f]
-        areas[i], bend[i] = facets.areas[own, f], facets.bend[own, f]
-    return _Chosen(lit[:count], corners, facing, areas, bend)
+        areas[i], bend[i], rise[i] = facets.areas[begin + f], every_bend[f], facets.rise[begin + f]
+        lit[i] = start + f
+    return _Chosen(lit[:count], corners, facing, areas, bend, rise)
 
 
 @inlined(fastmath=FAST)
@@ -162,7 +181,7 @@ def _see(antenna, distance, excess, chosen, seen, view):
     first_of, second_of, third_of = chosen.corners[0], chosen.corners[1], chosen.corners[2]
     n0, n1, n2, plane = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.facing[3]
     means, first_less, second_less, along, open_ = view[0], view[1], view[2], view[3], view[4]
-    facet = chosen.facet
+    facet, rise = chosen.facet, chosen.rise
     for i in range(len(facet)):
         first, second, third = excess[first_of[i]], excess[second_of[i]], excess[third_of[i]]
         mean = (first + second + third) / 3
@@ -171,6 +190,7 @@ def _see(antenna, distance, excess, chosen, seen, view):
     # Apart from what is picked here and there, in vector lanes.
     for i in range(len(facet)):
         along[i] = (n0[i] * a + n1[i] * b + n2[i] * c - plane[i]) / (distance + means[i])
+        means[i] -= rise[i] * along[i]
 
 
 @inlined(fastmath=FAST)
@@ -218,16 +238,52 @@ def _light(tx, rx, chosen, far_t, far_r, carrier, spreading, terms):
         strength[i] = size
 
 
+@inlined()
+def _cut(tx, rx, tx_edge, rx_edge, facet, terms):
+    """Put the triangles that are lit in the place of facets on the edge of a shadow.
+
+    Those of which a corner is not lit become themselves, less that corner, which comes after all
+    ``facet (n,)``. Returned is how many terms there are.
+    """
+    mean, u, v, strength = terms
+    count = len(facet)
+    for i in range(len(facet)):
+        fraction = min(tx[4, i], rx[4, i])
+        if fraction <= 0 or fraction >= 1:
+            continue
+        edge = tx_edge[facet[i]] if tx[4, i] <= rx[4, i] else rx_edge[facet[i]]
+        a, b, c = edge[0], edge[1], edge[2]
+        first, second, third = mean[i] + u[i], mean[i] + v[i], mean[i] - u[i] - v[i]
+        # The corner on one side of the edge, with the two on the other.
+        lit = (a > 0) + (b > 0) + (c > 0) == 1
+        if (b > 0) == lit and (a > 0) != lit:
+            a, b, c, first, second, third = b, c, a, second, third, first
+        elif (a > 0) != lit:
+            a, b, c, first, second, third = c, a, b, third, first, second
+        along, beside = a / (a - b), a / (a - c)
+        second, third = along * (second - first), beside * (third - first)
+        place, whole = i, strength[i] / fraction
+        size = whole * along * beside
+        if not lit:
+            place, strength[i], size, count = count, whole, -size, count + 1
+        middle = first + (second + third) / 3
+        mean[place], strength[place] = middle, size
+        u[place], v[place] = first - middle, first + second - middle
+    return count
+
+
 @compiled()
 def integrate(begin, end, facets, views, waves, out):
     """Fill ``out (task, pair, node)`` with F [m] for the tasks from begin to end."""
-    count_antennas, count_vertices = views.antennas.shape[1], facets.vertices.shape[1]
-    # Coordinate by coordinate: loops over vertices run in vector lanes.
-    x, y, z = np.empty(count_vertices), np.empty(count_vertices), np.empty(count_vertices)
-    excess, far = np.empty(count_vertices), np.empty(count_antennas)
+    count_antennas = views.antennas.shape[1]
+    far = np.empty(count_antennas)
     for task in range(begin, end):
-        antennas, row = views.antennas[task], views.row[task]
-        chosen = _choose(facets, views.part[task], antennas, row, views.seen, x, y, z)
+        antennas, row, own = views.antennas[task], views.row[task], views.part[task]
+        # Coordinate by coordinate: loops over vertices run in vector lanes.
+        count_vertices = facets.ends[own + 1, 0] - facets.ends[own, 0]
+        x, y, z = np.empty(count_vertices), np.empty(count_vertices), np.empty(count_vertices)
+        excess = np.empty(count_vertices)
+        chosen = _choose(facets, own, antennas, row, views.first[task], views.seen, x, y, z)
         count = len(chosen.facet)
         # What each antenna sees of them.
         view = np.empty((count_antennas, 5, count))
@@ -236,24 +292,28 @@ def integrate(begin, end, facets, views, waves, out):
             seen = views.seen[row[antenna]]
             _see(antennas[antenna], far[antenna], excess, chosen, seen, view[antenna])
         # Pair by pair, the sum over facets at each frequency.
-        terms = _Terms(np.empty(count), np.empty(count), np.empty(count), np.empty(count))
-        room = np.empty(count + 1)
+        rows, edges = np.empty((4, 2 * count)), len(views.edge) > 0
         for pair in range(len(waves.pairs)):
             t, r = waves.pairs[pair, 0], waves.pairs[pair, 1]
             offset = waves.carrier[task, pair] - far[t] - far[r]
-            mean, u, v, strength = terms
+            terms = _Terms(rows[0, :count], rows[1, :count], rows[2, :count], rows[3, :count])
+            strength = terms.strength
             both, facing = facets.both_sides, view[t][3]
             _facing_both(facing, view[r][3], chosen.bend, both, strength)
             if len(waves.currents) > 0:
                 _lit_by_tx(facing, chosen, both, waves.currents[task, pair], strength)
             _light(view[t], view[r], chosen, far[t], far[r], offset, waves.spreading, terms)
-            largest = largest_spread(u, v, room)
+            pieces = count
+            if edges:
+                tx_edge, rx_edge = views.edge[row[t]], views.edge[row[r]]
+                pieces = _cut(view[t], view[r], tx_edge, rx_edge, chosen.facet, rows)
+            mean, u, v = rows[0, :pieces], rows[1, :pieces], rows[2, :pieces]
+            strength = rows[3, :pieces]
+            calm = steep_last(mean, u, v, strength, SERIES / waves.wavenumber[task].max() ** 2)
             for node in range(waves.wavenumber.shape[1]):
                 k = waves.wavenumber[task, node]
-                if largest * k**2 <= SERIES:
-                    total = sum_small(mean, u, v, strength, k)
-                else:
-                    total = sum_large(mean, u, v, strength, k)
+                total = sum_small(mean[:calm], u[:calm], v[:calm], strength[:calm], k)
+                total += sum_large(mean[calm:], u[calm:], v[calm:], strength[calm:], k)
                 out[task, pair, node] = total * complex(0.0, k / math.sqrt(math.pi))
 
 

@@ -179,18 +179,19 @@ def _write_rays(lines, axes, out):
 
 
 @compiled()
-def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, margin):
+def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, first, margin):
     """Return the rays that decide which part occludes which vertex, as `BodyTracer.occluders` asks.
 
     ``rays (8, ray)`` float32: start, direction and length in axes where the part that it may meet
     is the unit sphere, and the fraction of the line of sight at which it comes nearest to it.
-    ``whose (2, ray)``: the place of the vertex in (antenna, n, vertex), and that part.
+    ``whose (2, ray)``: the place of the vertex in (antenna, vertex), and that part. ``vertices (3,
+    vertex)`` are those of all parts, of each from ``first (part + 1,)`` on.
     """
-    every, n_vertices = len(centres), vertices.shape[2]
+    every, most = len(centres), np.diff(first).max()
     turn, shift, start = np.empty((3, 3)), np.empty(3), np.empty(3)
-    chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
-    faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
-    nearest, near = np.empty(n_vertices), np.empty(n_vertices, dtype=np.int64)
+    chosen, places = np.empty(most, dtype=np.int64), np.empty((3, most))
+    faces, begins, begin = np.empty(most), np.empty(most), np.empty(most)
+    nearest, near = np.empty(most), np.empty(most, dtype=np.int64)
     rays, whose = np.empty((8, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
     count = 0
     for a in range(len(antennas)):
@@ -198,9 +199,10 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, m
             part = parts[n]
             facing = np.uint64(0)
             checked = False
-            all_x, all_y, all_z = vertices[part, 0], vertices[part, 1], vertices[part, 2]
+            own = slice(first[part], first[part + 1])
+            all_x, all_y, all_z = vertices[0, own], vertices[1, own], vertices[2, own]
             x, y, z = places[0], places[1], places[2]
-            slot = (a * len(parts) + n) * n_vertices
+            slot = a * vertices.shape[1] + first[part]
             for other in range(every):
                 if other == part:
                     continue
@@ -211,7 +213,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, m
                     checked = True
                     local = turned_back(frames[part], minus(antennas[a], centres[part]))
                     _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
-                    for vertex in range(n_vertices):
+                    for vertex in range(len(all_x)):
                         # The next one takes its place where this one is not wanted: no branch.
                         chosen[facing], begin[facing] = vertex, begins[vertex]
                         x[facing], y[facing] = all_x[vertex], all_y[vertex]

@@ -138,20 +138,21 @@ def sum_large(mean, u, v, strength, k):
     return complex(real, imaginary)
 
 
-@inlined(fastmath=FAST)
-def largest_spread(u, v, room):
-    """The largest p, for k = 1; ``room`` is longer by one.
+@inlined()
+def steep_last(mean, u, v, strength, limit):
+    """Put terms whose p, for k = 1, exceeds the limit after the others; return how many these are.
 
-    Numbers from 0 on are in the order of their bits, and the largest of integers is found in vector
-    lanes.
+    In place: terms are added up, in any order.
     """
-    for i in range(len(u)):
-        room[i] = max(u[i] * u[i] + u[i] * v[i] + v[i] * v[i], 0.0)
-    bits, largest = room.view(np.int64), 0
-    for i in range(len(u)):
-        largest = max(largest, bits[i])
-    bits[len(u)] = largest
-    return room[len(u)]
+    calm = 0
+    for i in range(len(mean)):
+        if u[i] * u[i] + u[i] * v[i] + v[i] * v[i] <= limit:
+            mean[calm], mean[i] = mean[i], mean[calm]
+            u[calm], u[i] = u[i], u[calm]
+            v[calm], v[i] = v[i], v[calm]
+            strength[calm], strength[i] = strength[i], strength[calm]
+            calm += 1
+    return calm
 
 
 _STEEP = 1e-9

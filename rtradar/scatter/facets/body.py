@@ -23,7 +23,6 @@ from rtradar.scatter.facets.radiation import (
     directions_apart,
     ellipsoid_facets,
     radiated,
-    subdivisions_for,
     visible,
 )
 from rtradar.scatter.specular_points import solve_specular_points
@@ -37,15 +36,17 @@ Indices = NDArray[np.int64]
 class FacetShadows:
     """The facets of posed ellipsoids, and the fractions of these that antennas see.
 
-    ``count`` is the least number of facets for each of the ellipsoids, ``semi_axes (part, 3)`` [m].
+    ``counts (part,)``, or one for all, are the least numbers of facets of the ellipsoids,
+    ``semi_axes (part, 3)`` [m].
     """
 
-    def __init__(self, backend: Backend, semi_axes: Array, count: int) -> None:
+    def __init__(self, backend: Backend, semi_axes: Array, counts: Indices | int) -> None:
         self._tracer = BodyTracer(use(backend), semi_axes)
-        self.facets = facets = ellipsoid_facets(semi_axes, subdivisions_for(count))
+        self.facets = facets = ellipsoid_facets(semi_axes, counts)
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         # Coordinate by coordinate, as the tracer takes them.
-        self._places = np.ascontiguousarray(np.swapaxes(facets.vertices, 1, 2))
+        self._places = np.ascontiguousarray(facets.vertices.T)
+        self._first = np.ascontiguousarray(facets.ends[:, 0])
         # Without a sign: what may be counted from an array's end keeps a loop from vector lanes.
         self._corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
         # A facet is lit while its middle faces away by less than its bend; its corners by no more
@@ -60,32 +61,35 @@ class FacetShadows:
         parts: Indices,
         apart: float = 0.0,
     ) -> Seen:
-        """Fraction of each facet of some parts (n,) that antennas (antenna, 3) see past the others.
+        """What antennas (antenna, 3) see of the facets of some parts (n,) past the others.
 
-        ``centres (part, 3)`` and ``frames (part, 3, 3)`` are the pose of the whole body, world [m].
-        Facets that face an antenna away, by a cosine of more than ``apart``, are not looked at.
+        ``centres (part, 3)`` and ``frames
+        (part, 3, 3)`` are the pose of the whole body, world [m]. Facets that face an antenna away,
+        by a cosine of more than ``apart``, are not looked at.
         """
-        facets, row = self.facets, np.zeros((len(antennas), len(parts)), dtype=np.int64)
+        facets = self.facets
+        first = np.cumsum([0, *np.diff(facets.ends[:, 1])[parts]])
+        fraction = np.ones((len(antennas), first[-1]), dtype=np.float32)
         if len(centres) == 1:
-            return Seen(np.ones((1, len(facets.faces)), dtype=np.float32), row)
+            return Seen(first[:-1], fraction)
         hidden_by = self._tracer.occluders(
-            centres, frames, antennas, parts, self._places, self._margin + apart
+            centres, frames, antennas, parts, self._places, self._first, self._margin + apart
         )
-        fraction = np.empty((1 + row.size, len(facets.faces)), dtype=np.float32)
         given = (
             hidden_by,
             np.ascontiguousarray(antennas),
             np.ascontiguousarray(parts),
             (np.ascontiguousarray(centres), np.ascontiguousarray(frames), self._semi_axes),
         )
-        count = shade(*given, facets.vertices, self._corners, row, fraction)
-        return Seen(fraction[:count], row)
+        edge = np.empty((*fraction.shape, 3), dtype=np.float32)
+        shade(*given, facets.vertices, self._corners, facets.ends, first, fraction, edge)
+        return Seen(first[:-1], fraction, edge)
 
 
 class FacetBody:
     """The facets of a moving body, which several models share.
 
-    ``facets`` is the least number per part, None for `body_facets`; ``nodes`` the number of
+    ``facets`` are the least numbers of the parts, None for `body_facets`; ``nodes`` the number of
     frequencies over the sweep, ``frequency (node,)`` [Hz]; ``variant`` the backend in use.
     """
 
@@ -96,15 +100,17 @@ class FacetBody:
         *,
         variant: str,
         spreading: bool,
-        facets: int | None,
+        facets: Indices | int | None,
         nodes: int,
     ) -> None:
         self._radar, self._body, self._spreading = radar, body, spreading
-        count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
+        if facets is None:
+            wavenumber = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
+            facets = body_facets(body.semi_axes, wavenumber)
         self.frequency = sweep_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind
-        self._shadows = FacetShadows(backend, body.semi_axes, count)
+        self._shadows = FacetShadows(backend, body.semi_axes, facets)
 
     def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
         """Path [m] and strength of each part (chirp, rx, part) by its specular point.

@@ -20,14 +20,12 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
-from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facets import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, owners_of
 from rtradar.scatter.facets.body import FacetBody
-from rtradar.scatter.facets.radiation import edge_facets
 from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.system.threads import thread_map
 
@@ -343,13 +341,12 @@ def visible_fractions_of(
     without them, at three frequencies where the sweep is wide, else at one. ``variant`` and
     ``spreading`` are those of a model.
     """
-    wavenumber = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
     surface = FacetBody(
         radar,
         body,
         variant=variant,
         spreading=spreading,
-        facets=edge_facets(body.semi_axes, wavenumber),
+        facets=None,
         nodes=3 if radar.bandwidth_hz > _WIDE * radar.centre_frequency_hz else 1,
     )
     return ArrayEnvelope(

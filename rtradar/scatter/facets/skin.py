@@ -9,6 +9,7 @@ is behind them, if Tx and Rx are far apart.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -36,6 +37,8 @@ from rtradar.scatter.facets.radiation import (
     body_facets,
     directions_apart,
     facet_normals,
+    joined,
+    one_after_the_other,
     radiated,
     smooth_bend,
 )
@@ -72,7 +75,7 @@ class _Piece(NamedTuple):
 
     facets: slice
     vertices: Indices
-    faces: NDArray[np.int32]
+    faces: Indices
 
 
 def skin_of(person: Body, frequency_hz: float) -> Skin:
@@ -92,7 +95,9 @@ def skin_of(person: Body, frequency_hz: float) -> Skin:
 
 
 def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
-    levels = round(np.log(body_facets(person.semi_axes, frequency_hz) / 20) / np.log(4))
+    wavenumber = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
+    facets = int(body_facets(person.semi_axes, wavenumber).max())
+    levels = math.ceil(math.log(facets / 20, 4))
     sphere, faces = unit_sphere(levels - 1)
     smooth, finer = loop_subdivision(faces, len(sphere))
     fine = smooth @ sphere
@@ -112,12 +117,6 @@ def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
         for own, points in ((faces, sphere), (finer, fine))
     )
     return Skin(everywhere, everywhere_fine, np.repeat(np.arange(parts), len(faces)), posed)
-
-
-def one_after_the_other(several: Sequence[Indices], counts: Sequence[int]) -> Indices:
-    """Put indices into arrays of these lengths together as those into one array of all."""
-    firsts = np.cumsum([0, *counts[:-1]])
-    return np.concatenate([own + first for own, first in zip(several, firsts, strict=True)])
 
 
 class SkinFacets:
@@ -203,26 +202,23 @@ class SkinFacets:
         seen, radar = self._seen(time), self._radar.at(time)
         polarization = Polarization(radar.polarization, radar.axes)
         apart = np.linalg.norm(antennas[:, None] - shadow_nodes(radar)[0], axis=2)
-        eyes, index = np.arange(len(seen))[:, None], np.argmin(apart, axis=1)[None]
+        index = np.argmin(apart, axis=1)[None]
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
         to_tx, to_rx = (antennas[pairs[:, side]] - centres[parts, None] for side in (0, 1))
         wide = bool((directions_apart(to_tx, to_rx) > NEAR).any())
         given = k, polarization, self._spreading
-        fields = []
-        for place, part in enumerate(parts):
-            piece = self._pieces[part]
-            own = (vertices[piece.vertices] - centres[part])[None]
-            normals, areas = facet_normals(own, piece.faces)
-            bend = np.zeros_like(areas)
-            if wide:
-                # The current does not fall to nothing at the edge of the lit side.
-                bend[0] = smooth_bend(own[0], piece.faces)
-            facets = Facets(own, piece.faces, normals, areas, bend)
-            pose = centres[part][None, None], np.eye(3)[None, None]
-            links = Links(antennas[None], pairs, length[None, :, [place]], *given, shadow=False)
-            lit = Seen(seen[:, piece.facets], eyes)
-            fields.append(radiated(facets, np.array([0]), pose, links, lit, index))
-        return as_amplitude(np.concatenate(fields, axis=1))[:, 0]
+        pieces = [self._pieces[part] for part in parts]
+        faces, ends = joined([(piece.vertices, piece.faces) for piece in pieces])
+        own = vertices[np.concatenate([piece.vertices for piece in pieces])]
+        own -= np.repeat(centres[parts], np.diff(ends[:, 0]), axis=0)
+        normals, areas = facet_normals(own, faces)
+        # The current does not fall to nothing at the edge of the lit side.
+        bend = smooth_bend(own, faces) if wide else np.zeros_like(areas)
+        facets = Facets(own, faces, normals, areas, bend, np.zeros_like(areas), ends)
+        pose = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
+        links = Links(antennas[None], pairs, length[None], *given, shadow=False)
+        lit = Seen(np.array([piece.facets.start for piece in pieces]), seen)
+        return as_amplitude(radiated(facets, np.arange(len(parts)), pose, links, lit, index))[:, 0]
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""
@@ -254,7 +250,7 @@ class SkinFacets:
         found = []
         for skin, vertices, own in zip(self._skins, posed, scenes, strict=True):
             corners = vertices[skin.coarse]
-            normals = facet_normals(vertices[None], skin.coarse.astype(np.int32))[0][0]
+            normals, _ = facet_normals(vertices, skin.coarse)
             # Those at the corners, in their order, then the one between.
             middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
             seen = np.zeros((len(eyes), len(corners), 4), dtype=bool)
@@ -286,7 +282,7 @@ def _piece(fine: Indices, part: Indices, own: int) -> _Piece:
     first, last = np.searchsorted(part, [own, own + 1])
     facets = slice(4 * int(first), 4 * int(last))
     vertices, faces = np.unique(fine[facets], return_inverse=True)
-    return _Piece(facets, vertices, np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int32))
+    return _Piece(facets, vertices, faces.reshape(-1, 3))
 
 
 def facets_of_people(

@@ -28,13 +28,14 @@ from rtradar.scatter.facets.radiation import (
     NEAR,
     Links,
     Seen,
+    body_facets,
+    check_count,
     directions_apart,
-    edge_facets,
     facet_normals,
+    hidden_parts,
     mesh_facets,
     radiated,
     smooth_bend,
-    subdivisions_for,
     visible,
 )
 from rtradar.scatter.target import in_four, target_mesh
@@ -94,9 +95,8 @@ def mesh_scattering(
         ranges = np.linalg.norm(antennas, axis=1)
         path, k_there = np.full((1, 1, 1), ranges.sum()), np.full((1, 1), k)
         links = Links(antennas[None], one_pair, path, k_there, polarization, True, shadow=True)
-        row = np.arange(2)[:, None]
         given = np.array([0]), (middle[None, None], np.eye(3)[None, None]), links
-        value = radiated(facets, *given, Seen(seen, row), row.T)
+        value = radiated(facets, *given, Seen(given[0], seen), np.array([[0, 1]]))
         field[pair] = value.item() * ranges.prod()
     return field
 
@@ -213,8 +213,7 @@ class _Some(NamedTuple):
 
     @classmethod
     def of(cls, corners: Array, face: Indices) -> _Some:
-        whole = np.ascontiguousarray(corners.reshape(1, -1, 3))
-        (normals,), _ = facet_normals(whole, _own_faces(len(corners)).astype(np.int32))
+        normals, _ = facet_normals(corners.reshape(-1, 3), _own_faces(len(corners)))
         return cls(corners, face, normals)
 
     def facing(self, antenna: Array) -> Array:
@@ -331,18 +330,16 @@ def visible_fractions(
 
     It is the sum over the facets of a part with shadows over that without, in the forms of
     `facet_scattering` but for forward scatter: 1 in full view, 0 where a part is hidden. Facets are
-    four times as many as a moving body has, by the thickest of those parts that others cut, as a
-    look at few facets tells.
+    four times as many as a moving body has, if a look at few facets tells that parts are cut.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     given = target, (tx, rx, wavenumber), Polarization(polarization), variant
     few = _block_by_block(*given, lambda *_: _FEW_FACETS, _hidden)
-    cut = few.any(axis=0)
-    if not cut.any():
+    if not few.any():
         return np.ones_like(few)
 
-    def count(largest: float, wide: bool) -> int:
-        return _for_directions(4 * edge_facets(target.semi_axes[cut], largest), wide)
+    def count(wavenumber: float, wide: bool) -> Indices:
+        return _for_directions(4 * body_facets(target.semi_axes, wavenumber), wide)
 
     return _block_by_block(*given, count, visible)
 
@@ -350,7 +347,7 @@ def visible_fractions(
 def _hidden(*given: Any) -> NDArray[np.bool_]:
     """Whether parts are cut or hidden (pose, part, 1, 1), for what `visible` takes."""
     seen, index = given[-2:]
-    return np.asarray(seen.row[index].any(axis=1)[..., None, None])
+    return np.asarray(hidden_parts(seen)[index].any(axis=1)[..., None, None])
 
 
 def _block_by_block(
@@ -358,13 +355,13 @@ def _block_by_block(
     pairs: tuple[Array, Array, Array],
     polarization: Polarization,
     variant: str,
-    count: Callable[[float, bool], int],
+    count: Callable[[float, bool], Indices | int],
     find: Callable[..., NDArray[Any]],
 ) -> NDArray[np.complex128]:
     """What `radiated` or `visible` finds of each part (n, part), for pairs near and far apart.
 
     ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber, wide)`` is
-    the number of facets per part that either need.
+    the numbers of facets of the parts (part,), or one for all, that either need.
     """
     tx, rx, wavenumber = pairs
     parts = np.arange(len(target.centres))
@@ -378,7 +375,7 @@ def _block_by_block(
         enough = count(float(wavenumber[some].max()), wide)
         shadows = FacetShadows(select(variant), target.semi_axes, enough)
         facets = shadows.facets
-        block = max(1, _VIEWS_AT_ONCE // (8 * len(parts) * len(facets.faces)))
+        block = max(1, _VIEWS_AT_ONCE // (8 * len(facets.faces)))
         for first in range(0, len(some), block):
             own = some[first : first + block]
             ends = np.stack([tx[own], rx[own]], axis=1)
@@ -398,17 +395,19 @@ def _block_by_block(
     return found
 
 
-def _for_directions(enough: int, wide: bool) -> int:
+def _for_directions(enough: Indices | int, wide: bool) -> Indices:
     """Facets of pairs far apart: the current does not fall to nothing at the edge of the light."""
-    return min(4 * enough if wide else enough, MAXIMUM_FACETS)
+    return np.minimum(4 * enough if wide else enough, MAXIMUM_FACETS)
 
 
-def _enough_facets(target: Ellipsoids, facets: int | None, wavenumber: float, wide: bool) -> int:
+def _enough_facets(
+    target: Ellipsoids, facets: int | None, wavenumber: float, wide: bool
+) -> Indices | int:
     """Facets per part: those asked for, or as many as the thickest part takes."""
     ka = wavenumber * float(np.median(target.semi_axes, axis=1).max())
     needed = max(_FEW_FACETS, math.ceil(FACETS_PER_SQUARE_KA * ka**2))
     if facets is not None:
-        subdivisions_for(facets)
+        check_count(facets)
     if ka > LARGEST_KA and (facets is None or facets < needed):
         cure = (
             f"set facets={needed}"

@@ -27,7 +27,8 @@ from rtradar.scatter.common.poses import (
     keyframe_before,
     keyframe_time,
 )
-from rtradar.scatter.facets.skin import Skin, one_after_the_other, skin_of
+from rtradar.scatter.facets.radiation import one_after_the_other
+from rtradar.scatter.facets.skin import Skin, skin_of
 from rtradar.scatter.ray_tubes import Shooter, exits, radiate
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scatter.target import EllipsoidGrid, Grid, MeshGrid, target_mesh

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -33,14 +34,15 @@ def midpoints(cuts):
 
 def integrate_reference(facets, views, waves):
     """`integrate` without currents over facets that are lit, by middles of small triangles."""
-    corners = facets.vertices[:, facets.faces]
+    corners = facets.vertices[facets.faces] + (facets.rise[:, None] * facets.normals)[:, None]
     out = np.empty((*waves.carrier.shape, waves.wavenumber.shape[1]), dtype=complex)
     for task, part in enumerate(views.part):
-        away = views.antennas[task][:, None, None] - corners[part]
+        own = slice(*facets.ends[part : part + 2, 1])
+        away = views.antennas[task][:, None, None] - corners[own]
         ranges = np.linalg.norm(away, axis=-1)
         middle = ranges.mean(axis=2)
-        facing = np.einsum("afx,fx->af", away[:, :, 0], facets.normals[part]) / middle
-        size = views.seen[views.row[task]] * facets.areas[part]
+        facing = np.einsum("afx,fx->af", away[:, :, 0], facets.normals[own]) / middle
+        size = views.seen[views.row[task], own] * facets.areas[own]
         for pair, (t, r) in enumerate(waves.pairs):
             strength = (facing[t] + facing[r]) / 2 * np.minimum(size[t], size[r])
             strength /= middle[t] * middle[r] if waves.spreading else 1.0
@@ -54,15 +56,19 @@ def integrate_reference(facets, views, waves):
 
 def _views(parts: int) -> tuple[Facets, Views, Waves]:
     at = geometry(1, 2, parts)
-    facets, rows = ellipsoid_facets(at.semi_axes, 3), np.arange(2 * parts).reshape(parts, 2)
+    # Of each part as many as it takes.
+    facets, rows = ellipsoid_facets(at.semi_axes, 1280 >> np.arange(parts)), np.array([[0, 1]])
     local = np.einsum("pji,paj->pai", at.frames[0], at.rx[0] - at.centres[0][:, None])
     # Facets that both antennas see by a margin.
-    height = np.einsum("pfi,pai->paf", facets.normals, local)
-    plane = np.einsum("pfi,pfi->pf", facets.normals, facets.vertices[:, facets.faces[:, 0]])
-    seen = np.repeat((height > plane[:, None] + 0.5).all(axis=1), 2, axis=0).astype(np.float32)
+    whose = np.repeat(np.arange(parts), np.diff(facets.ends[:, 1]))
+    height = np.einsum("fi,fai->af", facets.normals, local[whose])
+    plane = np.einsum("fi,fi->f", facets.normals, facets.vertices[facets.faces[:, 0]])
+    seen = np.tile((height > plane + 0.5).all(axis=0).astype(np.float32), (2, 1))
+    rows = np.repeat(rows, parts, axis=0)
     pair, k = np.array([[0, 1]]), np.full((parts, 1), 250.0)
     carrier = np.linalg.norm(local, axis=2).sum(axis=1)[:, None]
-    return facets, Views(np.arange(parts), local, rows, seen), Waves(pair, carrier, k, True)
+    views = Views(np.arange(parts), local, rows, facets.ends[:-1, 1].copy(), seen)
+    return facets, views, Waves(pair, carrier, k, True)
 
 
 @kernel_case(integrate, 1e-3)
@@ -71,21 +77,22 @@ def _integrate() -> Pair:
     return filled(integrate, 0, 2, *given, out=out), integrate_reference(*given)
 
 
-def shade_reference(hidden_by, antennas, parts, pose, vertices, corners):
-    """Fractions (antenna, n, facet) of `shade`, by many points of each facet."""
-    (centres, frames, axes), faces = pose, corners.T
-    out = np.empty((*hidden_by.shape[:2], len(faces)))
-    for a, n in np.ndindex(hidden_by.shape[:2]):
-        occluder = hidden_by[a, n][faces]
-        world = centres[parts[n]] + vertices[parts[n]] @ frames[parts[n]].T
+def shade_reference(hidden_by, antennas, parts, pose, vertices, corners, ends):
+    """Fractions (antenna, facet) of `shade`, by many points of each facet."""
+    (centres, frames, axes), out = pose, np.empty((len(antennas), corners.shape[1]))
+    for a, part in product(range(len(antennas)), parts):
+        (first, begin), (_, end) = ends[part : part + 2]
+        faces, fraction = corners.T[begin:end] - first, out[a, begin:end]
+        occluder = hidden_by[a][corners.T[begin:end]]
+        world = centres[part] + vertices[first : ends[part + 1, 0]] @ frames[part].T
         least = np.full(faces.shape, np.inf)
         for other in set(occluder.ravel()) - {-1}:
             clear = _clearance(antennas[a], world, centres[other], frames[other], axes[other])
             own = (occluder == other).any(axis=1)
             least[own] = np.minimum(least[own], clear[faces[own]])
-        out[a, n] = (occluder < 0).any(axis=1)
-        some = (least[:, 0] < np.inf) & (out[a, n] > 0)
-        out[a, n, some] = (least[some] @ midpoints(40).T > 0).mean(axis=1)
+        fraction[:] = (occluder < 0).any(axis=1)
+        some = (least[:, 0] < np.inf) & (fraction > 0)
+        fraction[some] = (least[some] @ midpoints(40).T > 0).mean(axis=1)
     return out
 
 
@@ -102,20 +109,22 @@ def _shade() -> Pair:
     # Each part but the last has the next one beside the lines of sight to it.
     centres = np.array([[4.0, 0.1, 1.0], [3.5, 0.0, 0.9], [3.0, 0.1, 0.7]])
     (frames,), axes, antennas = at.frames, at.semi_axes, at.rx[0].copy()
-    facets, parts = ellipsoid_facets(axes, 3), np.arange(3)
-    hidden_by = np.full((2, 3, facets.vertices.shape[1]), -1)
+    facets, parts = ellipsoid_facets(axes, np.array([1280, 980, 500])), np.arange(3)
+    hidden_by = np.full((2, len(facets.vertices)), -1)
     for a, n in np.ndindex(2, 2):
-        world = centres[n] + facets.vertices[n] @ frames[n].T
+        first, last = facets.ends[n : n + 2, 0]
+        world = centres[n] + facets.vertices[first:last] @ frames[n].T
         clear = _clearance(antennas[a], world, centres[n + 1], frames[n + 1], axes[n + 1])
         # A tracer in float32 takes some vertices for occluded that are not.
-        hidden_by[a, n, clear < 0.02] = n + 1
+        hidden_by[a, first:last][clear < 0.02] = n + 1
     corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
     given = hidden_by, antennas, parts, (centres, frames, axes), facets.vertices, corners
-    row, out = np.empty((2, 3), dtype=np.int64), np.empty((7, 1280), dtype=np.float32)
-    shade(*given, row, out)
+    given = *given, facets.ends
+    out = np.ones((2, len(facets.faces)), dtype=np.float32)
+    shade(*given, facets.ends[:-1, 1].copy(), out, np.empty((*out.shape, 3), dtype=np.float32))
     expected = shade_reference(*given)
     assert ((expected > 0) & (expected < 1)).sum() > 100
-    return out[row], expected
+    return out, expected
 
 
 def facets_by_length_reference(facets, views, grid, spreading):

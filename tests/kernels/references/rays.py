@@ -54,33 +54,37 @@ def _near_rays(poses: int, seed: int) -> Pair:
     return found, expected
 
 
-def facet_rays_reference(antennas, parts, centres, frames, semi_axes, vertices):
-    """Number of rays (antenna, n, vertex) of `facet_rays` to vertices on ellipsoids, margin 0."""
-    out = np.empty((len(antennas), len(parts), vertices.shape[2]), dtype=np.int64)
+def facet_rays_reference(antennas, parts, centres, frames, semi_axes, vertices, first):
+    """Number of rays (antenna, vertex) of `facet_rays` to vertices on ellipsoids, margin 0."""
+    out = np.zeros((len(antennas), vertices.shape[1]), dtype=np.int64)
     for a, antenna in enumerate(antennas):
-        for n, part in enumerate(parts):
-            local = vertices[part].T
+        for part in parts:
+            own = slice(first[part], first[part + 1])
+            local = vertices[:, own].T
             world = centres[part] + local @ frames[part].T
             normals = local / semi_axes[part] ** 2 @ frames[part].T
             lines = np.broadcast_to(antenna, world.shape), world, np.full(len(world), part)
             near = near_lines_reference(*lines, centres, frames, semi_axes)
             facing = np.einsum("vi,vi->v", normals, antenna - world) >= 0
-            out[a, n] = near.sum(axis=1) * facing
+            out[a, own] = near.sum(axis=1) * facing
     return out
 
 
 @kernel_case(facet_rays, 0)
 def _facet_rays() -> Pair:
     rng, parts, antennas = np.random.default_rng(0), np.array([4, 1, 2]), 2
-    u = rng.normal(size=(6, 3, 300))
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    u = rng.normal(size=(3, 1800))
+    u /= np.linalg.norm(u, axis=0)
+    # Of each part as many as it takes.
+    first = np.array([0, 300, 500, 900, 1200, 1500, 1800])
     axes, centres = rng.uniform(0.05, 0.25, (6, 3)), rng.uniform(-0.4, 0.4, (6, 3))
     frames = np.linalg.qr(rng.normal(size=(6, 3, 3)))[0]
     places = np.array([-4.0, 0, 0]) + rng.normal(0, 0.3, (antennas, 3))
-    posed, vertices = (places, parts, centres, frames, axes), u * axes[:, :, None]
-    slots = facet_rays(*posed, axes.max(axis=1), vertices, 0.0)[1][0]
-    count = np.bincount(slots, minlength=antennas * 900).reshape(antennas, 3, 300)
-    return count, facet_rays_reference(*posed, vertices)
+    vertices = np.ascontiguousarray(u * np.repeat(axes, np.diff(first), axis=0).T)
+    posed = places, parts, centres, frames, axes
+    slots = facet_rays(*posed, axes.max(axis=1), vertices, first, 0.0)[1][0]
+    count = np.bincount(slots, minlength=antennas * 1800).reshape(antennas, 1800)
+    return count, facet_rays_reference(*posed, vertices, first)
 
 
 def first_occluders_reference(met, fraction, whose, vertices):

@@ -14,10 +14,10 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.scatter.common.polarization import Polarization, copolar
 from rtradar.scatter.facets.radiation import (
+    body_facets,
     ellipsoid_facets,
     facet_integral,
     mesh_facets,
-    subdivisions_for,
 )
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backend import use
@@ -92,24 +92,24 @@ def test_linear_phase_is_integrated_exactly(seed: int, size: float) -> None:
         np.zeros(1, dtype=int),
         np.array([[antenna, antenna]]),
         np.array([[0, 0]]),
+        np.zeros(1, dtype=int),
         np.ones((1, 1), np.float32),
     )
     carrier = np.array([[2 * np.linalg.norm(antenna)]])
     waves = Waves(np.array([[0, 1]]), carrier, np.array([[k]]), spreading=False)
     got = facet_integral(facets, views, waves)[0, 0, 0]
-    facing = abs(facets.normals[0, 0] @ antenna) / np.linalg.norm(antenna)
-    expected = 1j * k / np.sqrt(np.pi) * facing * facets.areas[0, 0] * mean_over_triangle(-k * path)
+    facing = abs(facets.normals[0] @ antenna) / np.linalg.norm(antenna)
+    expected = 1j * k / np.sqrt(np.pi) * facing * facets.areas[0] * mean_over_triangle(-k * path)
     # The midpoint sum is within (50 / 400)^2 / 24 of the exact mean; paths of 1e9 m have 1e-7 m of
     # rounding.
-    scale = k / np.sqrt(np.pi) * facing * facets.areas[0, 0]
+    scale = k / np.sqrt(np.pi) * facing * facets.areas[0]
     assert abs(got - expected) < 1e-3 * scale
 
 
 @settings(max_examples=20)
 @given(seeds)
 def test_flat_and_steep_facets_of_one_mesh_add_up(seed: int) -> None:
-    # Where any facet is steep all are summed by differences, and flat ones must still agree with
-    # their series.
+    # Flat facets are summed by series and steep ones by differences, whichever stand beside them.
     rng = np.random.default_rng(seed)
     sizes = 10 ** rng.uniform(-4, 0, 12)
     corners = rng.normal(size=(12, 3, 3)) * sizes[:, None, None]
@@ -120,7 +120,7 @@ def test_flat_and_steep_facets_of_one_mesh_add_up(seed: int) -> None:
         facets = mesh_facets(
             some.reshape(-1, 3), np.arange(3 * len(some)).reshape(-1, 3), both_sides=True
         )
-        shape = np.zeros((1, 2), dtype=int), np.ones((1, len(some)), np.float32)
+        shape = np.zeros((1, 2), int), np.zeros(1, int), np.ones((1, len(some)), np.float32)
         waves = Waves(np.array([[0, 1]]), np.array([[100.0]]), k, spreading=True)
         views = Views(np.zeros(1, int), antennas, *shape)
         return complex(facet_integral(facets, views, waves)[0, 0, 0])
@@ -246,7 +246,9 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
     rng = np.random.default_rng(0)
     tracer_axes = rng.uniform(0.05, 0.25, (6, 3))
     tracer = BodyTracer(use(backend), tracer_axes)  # type: ignore[arg-type]
-    vertices = ellipsoid_facets(tracer_axes, 2).vertices
+    # Of each part as many as it takes.
+    facets = ellipsoid_facets(tracer_axes, np.array([320, 80, 320, 500, 320, 20]))
+    every, first = facets.vertices, facets.ends[:, 0].copy()
     near, outlines, asked = 0, 0, 0
     for _ in range(3):
         centres, frames = (
@@ -255,13 +257,13 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
         )
         antennas = np.array([-4.0, 0, 0]) + rng.normal(size=(3, 3)) * 0.3
         parts = np.array([4, 1, 2])
-        hidden = tracer.occluders(
-            centres, frames, antennas, parts, np.swapaxes(vertices, 1, 2).copy(), 0.0
-        )
+        given = centres, frames, antennas, parts
+        hidden = tracer.occluders(*given, every.T.copy(), first, 0.0)
         for a, antenna in enumerate(antennas):
-            for n, part in enumerate(parts):
-                world = vertices[part] @ frames[part].T + centres[part]
-                normals = (vertices[part] / tracer_axes[part] ** 2) @ frames[part].T
+            for part in parts:
+                vertices = every[first[part] : first[part + 1]]
+                world = vertices @ frames[part].T + centres[part]
+                normals = (vertices / tracer_axes[part] ** 2) @ frames[part].T
                 for vertex in np.flatnonzero(np.sum(normals * (antenna - world), axis=1) > 0):
                     gaps = np.array(
                         [
@@ -281,7 +283,7 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
                     outlines += abs(gaps.min()) < 0.01
                     # Triangles stand out of the unit ball by 0.07 % and sag into it by 0.03 %.
                     if abs(gaps.min()) > 1e-3:
-                        found = hidden[a, n, vertex]
+                        found = hidden[a, first[part] + vertex]
                         assert (found >= 0) == (gaps.min() < 0)
                         assert found < 0 or gaps[found] < 1e-3
                     else:
@@ -320,9 +322,21 @@ def test_facets_must_be_a_count(facets: object) -> None:
         field(ellipsoid(0.1, 0.1, 0.1), np.ones(3), np.ones(3), 1e9, facets=facets)
 
 
-def test_subdivisions_give_at_least_what_is_asked() -> None:
-    assert [subdivisions_for(n) for n in (20, 21, 80, 5120, 5121)] == [0, 1, 1, 4, 5]
-    assert len(ellipsoid_facets(np.array([[1.0, 1.0, 1.0]]), 2).faces) == 320
+def test_parts_have_at_least_the_facets_that_they_are_asked_for() -> None:
+    facets = ellipsoid_facets(np.ones((5, 3)), np.array([20, 21, 80, 5120, 5121]))
+    assert np.diff(facets.ends[:, 1]).tolist() == [20, 80, 80, 5120, 5780]
+    assert facets.ends[-1].tolist() == [len(facets.vertices), len(facets.faces)]
+
+
+@pytest.mark.parametrize("ka", [8.0, 20.0, 60.0, 150.0])
+def test_a_sphere_of_the_facets_of_a_body_has_the_closed_form(ka: float) -> None:
+    frequency = ka * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
+    tx = 1e6 * directions(np.random.default_rng(1), 4)
+    (facets,) = body_facets(np.full((1, 3), 0.1), frequency).tolist()
+    found = field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency, facets=facets)
+    decibel = 20 * np.log10(np.abs(found / rt.rcs.sphere(0.1, frequency, "po")))
+    # A sag of 0.1 rad, at which the terminator is not smooth any more.
+    np.testing.assert_allclose(decibel, 0, atol=0.25)
 
 
 def test_a_mesh_takes_no_number_of_facets() -> None:
