@@ -11,7 +11,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.facet_shadows import shade
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import ArrayNodes, sweep_nodes
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.facets.radiation import (
@@ -128,37 +128,12 @@ class FacetBody:
             centres, frames, antennas, parts, apart=apart if apart > NEAR else 0.0
         )
 
-    def at_chirps(self, chirps: Indices, at: ChirpPoses, length: Array) -> NDArray[np.complex128]:
-        """Amplitude (node, chirp, rx, part) at every chirp, for paths (chirp, rx, part) [m].
-
-        What is seen is asked in the middle of each TDM cycle.
-        """
-        radar, parts = self._radar, np.arange(length.shape[2])
-        amplitude = np.empty((len(self.frequency), *length.shape), dtype=np.complex128)
-        pairs = np.stack([np.zeros(radar.n_rx, dtype=np.int64), 1 + np.arange(radar.n_rx)], axis=1)
-        cycles = chirps // radar.n_tx
-        for cycle in np.unique(cycles):
-            inside = np.flatnonzero(cycles == cycle)
-            # Tx and Rx of these chirps, each once.
-            rx_index = radar.rx_of_tx[at.tx_index[inside]] + radar.n_tx
-            named = np.concatenate([at.tx_index[inside, None], rx_index], axis=1)
-            views, index = np.unique(named, return_inverse=True)
-            time = min(float(radar.cycle_times(cycle + 0.5)), self._body.duration_s)
-            middle, there = self._body.at([time]), radar.at(time)
-            antennas = np.concatenate([there.tx, there.rx])[views]
-            ends = np.concatenate([at.tx[inside, None], at.rx[inside]], axis=1)
-            links = self._links(ends, pairs, length[inside], at.axes[inside])
-            seen = self.seen(middle.centres[0], middle.frames[0], antennas, parts)
-            pose, index = (at.centres[inside], at.frames[inside]), index.reshape(named.shape)
-            field = radiated(self._shadows.facets, parts, pose, links, seen, index)
-            amplitude[:, inside] = as_amplitude(field)
-        return amplitude
-
     def field(
         self,
         time: float,
         pose: Poses,
-        nodes: ArrayNodes,
+        antennas: Array,
+        pairs: Indices,
         length: Array,
         parts: Indices,
         *,
@@ -166,17 +141,14 @@ class FacetBody:
     ) -> NDArray[np.complex128]:
         """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m].
 
-        With ``left`` it is what shadows leave of these amplitudes, 1 in full view.
+        ``pairs (pair, 2)`` are Tx and Rx among the ``antennas (antenna, 3)``, world [m]. With
+        ``left`` it is what shadows leave of these amplitudes, 1 in full view.
         """
-        antennas, find = nodes.antennas, visible if left else radiated
+        find = visible if left else radiated
         seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
-        links = self._links(antennas[None], nodes.pairs, length[None], self._radar.at(time).axes)
+        k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
+        sent = Polarization(self._radar.polarization, self._radar.at(time).axes)
+        links = Links(antennas[None], pairs, length[None], k, sent, self._spreading, shadow=False)
         own = pose.centres[:, parts], pose.frames[:, parts]
         index = np.arange(len(antennas))[None]
         return as_amplitude(find(self._shadows.facets, parts, own, links, seen, index))[:, 0]
-
-    def _links(self, antennas: Array, pairs: Indices, length: Array, axes: Array) -> Links:
-        """Links of these antennas, whose ``axes`` are (pose, 3, 3) or one for all poses."""
-        k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
-        sent = Polarization(self._radar.polarization, axes)
-        return Links(antennas, pairs, length, k, sent, self._spreading, shadow=False)

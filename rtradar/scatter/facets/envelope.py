@@ -295,7 +295,7 @@ class ArrayEnvelope:
         ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
         carriers = self._surface.carriers(Geometry(*ends, centres, frames, pose.semi_axes[parts]))
         length, strength = (values[:, 0] for values in carriers)
-        given = time, pose, nodes, length, parts
+        given = time, pose, antennas, pairs, length, parts
         if self._gradual:
             assert isinstance(self._surface, FacetBody)  # a skin has no fraction that is seen
             return Sample(self._surface.field(*given, left=True), np.abs(strength))

@@ -25,7 +25,7 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import ArrayNodes, shadow_nodes, sweep_nodes
+from rtradar.scatter.common.interpolation import shadow_nodes, sweep_nodes
 from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import ChirpPoses, KeyframeCache, has_mesh
 from rtradar.scatter.facets.body import FacetBody
@@ -165,39 +165,20 @@ class SkinFacets:
         )
         return length, 1 / (to_tx * to_rx)
 
-    def at_chirps(self, chirps: Indices, at: ChirpPoses, length: Array) -> NDArray[np.complex128]:
-        """Amplitude (node, chirp, rx, part) at every chirp, for paths (chirp, rx, part) [m]."""
-        receivers, parts = np.arange(1, 1 + at.rx.shape[1]), np.arange(length.shape[2])
-        pairs = np.stack([np.zeros_like(receivers), receivers], axis=1)
-        antennas = np.concatenate([at.tx[:, None], at.rx], axis=1)
-        given = zip(self._radar.centres_of(chirps), at.centres, antennas, length, strict=True)
-        found = [
-            self.amplitude(float(time), centres, own, pairs, lengths, parts)
-            for time, centres, own, lengths in given
-        ]
-        return np.stack(found, axis=1)
-
     def field(
-        self, time: float, pose: Poses, nodes: ArrayNodes, length: Array, parts: Indices
-    ) -> NDArray[np.complex128]:
-        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m]."""
-        return self.amplitude(time, pose.centres[0], nodes.antennas, nodes.pairs, length, parts)
-
-    def amplitude(
         self,
         time: float,
-        centres: Array,
+        pose: Poses,
         antennas: Array,
         pairs: Indices,
         length: Array,
         parts: Indices,
     ) -> NDArray[np.complex128]:
-        """Amplitude (node, pair, n) of `Echoes` of the parts (n,) at a time [s].
+        """Amplitude (node, pair, n) of parts (n,) in one pose, for paths (pair, n) [m].
 
-        ``antennas (antenna, 3)`` [m], of which ``pairs (pair, 2)`` are Tx and Rx; ``length (pair,
-        n)`` are the carriers [m], and ``centres (part, 3)`` the middles of all parts, about which
-        lengths are reckoned.
+        See `FacetBody.field`; lengths are reckoned about the middles of the ``pose``.
         """
+        centres = pose.centres[0]
         vertices = np.concatenate([skin.posed(time)[1] for skin in self._skins])
         seen, radar = self._seen(time), self._radar.at(time)
         polarization = Polarization(radar.polarization, radar.axes)
@@ -215,10 +196,12 @@ class SkinFacets:
         # The current does not fall to nothing at the edge of the lit side.
         bend = smooth_bend(own, faces) if wide else np.zeros_like(areas)
         facets = Facets(own, faces, normals, areas, bend, np.zeros_like(areas), ends)
-        pose = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
+        own_axes = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
         links = Links(antennas[None], pairs, length[None], *given, shadow=False)
         lit = Seen(np.array([piece.facets.start for piece in pieces]), seen)
-        return as_amplitude(radiated(facets, np.arange(len(parts)), pose, links, lit, index))[:, 0]
+        return as_amplitude(radiated(facets, np.arange(len(parts)), own_axes, links, lit, index))[
+            :, 0
+        ]
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""
