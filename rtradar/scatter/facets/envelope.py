@@ -10,7 +10,6 @@ side of each.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from itertools import groupby
 from typing import NamedTuple
@@ -79,9 +78,8 @@ class Envelope:
     ``sample(place, parts, whole)`` returns the `Sample` of parts (n,) at a place in time, counted
     in keyframes from the start; ``whole (part,)`` is `whole_echo` near by, or None where all parts
     are asked for. Several threads call it at once. ``tolerance`` is the second difference of a
-    part's echo over the root of the power of the whole person that halves an interval, ``end`` the
-    keyframe from which on nothing moves, ``places`` the parts, a power of two, into which an
-    interval is divided at most.
+    part's echo over the root of the power of the whole person that halves an interval, ``places``
+    the parts, a power of two, into which an interval is divided at most.
     """
 
     def __init__(
@@ -89,18 +87,16 @@ class Envelope:
         sample: Callable[[float, Indices, Scale | None], Sample],
         owner: Indices,
         tolerance: float,
-        end: int,
         places: int,
     ) -> None:
         self._sample, self._owner, self._parts = sample, owner, np.arange(len(owner))
-        self._tolerance, self._end, self._places = tolerance, end, places
+        self._tolerance, self._places = tolerance, places
         self._keyframes: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
         self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _KEPT_INTERVALS)
 
     def prepare_keyframes(self, indices: Iterable[int]) -> None:
         """Find these keyframes, of `TOGETHER` intervals at most, with all cores."""
-        wanted = sorted({min(index, self._end) for index in indices})
-        missing = [index for index in wanted if index not in self._keyframes]
+        missing = [index for index in sorted(set(indices)) if index not in self._keyframes]
         found = thread_map(
             lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing))
         )
@@ -126,7 +122,6 @@ class Envelope:
 
     def keyframe(self, index: int) -> Sample:
         """All parts at one keyframe."""
-        index = min(index, self._end)
         return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> tuple[Field, Field, NDArray[np.bool_]]:
@@ -157,14 +152,7 @@ class Envelope:
         whole = np.maximum(*(whole_echo(end, self._owner) for end in (first, last)))
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
         interval = _Interval(ratio, known)
-        if index < self._end:
-            self._divide(index, interval, 0, self._places, bent, whole)
-        else:
-            # Half-way it is as at the beginning, and does not bend there.
-            ratio[self._places // 2][:, :, bent], known[self._places // 2, bent] = (
-                first.ratio[:, :, bent],
-                True,
-            )
+        self._divide(index, interval, 0, self._places, bent, whole)
         return interval
 
     def _divide(
@@ -267,8 +255,7 @@ class ArrayEnvelope:
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
-        end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
-        self._envelope = Envelope(self._sample, owners_of(body), tolerance, end, places)
+        self._envelope = Envelope(self._sample, owners_of(body), tolerance, places)
 
     def _sample(self, place: float, parts: Indices, whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""

@@ -259,7 +259,7 @@ def test_coarse_nodes_spread_to_fine_ones() -> None:
 
 
 def envelope_of(
-    law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100
+    law: Callable[[float], complex], tolerance: float = 0.05
 ) -> tuple[Envelope, list[float]]:
     """An envelope of two parts, one by the law, the other 1; and the places where it was asked."""
     asked: list[float] = []
@@ -269,7 +269,7 @@ def envelope_of(
         ratio = np.array([law(place), 1.0 + 0j])[parts]
         return Sample(np.tile(ratio, (3, 2, 1)), np.ones((2, len(parts))))
 
-    return Envelope(sample, np.zeros(2, dtype=np.int64), tolerance, end, PLACES), asked
+    return Envelope(sample, np.zeros(2, dtype=np.int64), tolerance, PLACES), asked
 
 
 def between(envelope: Envelope, index: int, fraction: Array) -> NDArray[np.complex128]:
@@ -322,29 +322,14 @@ def test_where_it_bends_keyframes_come_closer_and_the_error_falls() -> None:
     assert errors[1] < 0.05
 
 
-def test_after_the_end_nothing_is_computed_again() -> None:
-    def law(t: float) -> complex:
-        return complex(np.exp(2j * min(t, 5.0)))
-
-    fraction = np.linspace(0, 1, 9, endpoint=False)
-    ended, asked = envelope_of(law, end=5)
-    plain, more_asked = envelope_of(law)
-    for index in range(7):
-        np.testing.assert_array_equal(
-            between(ended, index, fraction), between(plain, index, fraction)
-        )
-    assert max(asked) == 5 < max(more_asked)
-    assert len(asked) == len(set(asked))
-
-
 @pytest.mark.parametrize("step", [1, 3, 5])
 def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
     def law(t: float) -> complex:
         return complex(np.exp(3j * np.sin(t)))  # bends in every interval
 
     fraction = np.linspace(0, 1, 9, endpoint=False)
-    prepared, asked = envelope_of(law, end=20)
-    plain, _ = envelope_of(law, end=20)
+    prepared, asked = envelope_of(law)
+    plain, _ = envelope_of(law)
     for first in range(0, 32, TOGETHER):
         courses = range(first, first + TOGETHER, step)
         prepared.prepare_courses(courses)
