@@ -39,7 +39,8 @@ class Facets(NamedTuple):
     """Triangles of one or more parts, one part after the other; each in its own axes.
 
     ``vertices (vertex, 3)`` float64 [m]; ``faces (facet, 3)`` int32, anticlockwise seen from
-    outside; ``normals (facet, 3)``, outward; ``areas (facet,)`` [m^2]. ``bend (facet,)`` is how far
+    outside; ``normals (facet, 3)``, outward, and ``planes (facet,)`` how far along these they lie
+    [m]; ``areas (facet,)`` [m^2]. ``bend (facet,)`` is how far
     n.s swings to either side of its mean over the curved surface that a facet represents, 0 where
     it is flat: the terminator is softened over it. ``rise (facet,)`` is how far that surface stands
     out of the facet in the mean [m]. ``ends (part + 1, 2)`` int64 are the first
@@ -50,6 +51,7 @@ class Facets(NamedTuple):
     vertices: Array
     faces: NDArray[np.int32]
     normals: Array
+    planes: Array
     areas: Array
     bend: Array
     rise: Array
@@ -148,15 +150,12 @@ def _choose(facets, own, antennas, row, start, seen, x, y, z):
     """Facets of a part that may be lit; its vertices' coordinates are filled in."""
     (first, begin), (last, end) = facets.ends[own], facets.ends[own + 1]
     vertices, faces = facets.vertices[first:last], facets.faces[begin:end]
-    normals, every_bend = facets.normals[begin:end], facets.bend[begin:end]
+    normals, planes = facets.normals[begin:end], facets.planes[begin:end]
+    every_bend = facets.bend[begin:end]
     n_facets, size = len(faces), 0.0
     for i in range(len(vertices)):
         x[i], y[i], z[i] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
-    planes = np.empty(n_facets)
-    for f in range(n_facets):
-        i = faces[f, 0] - first
-        planes[f] = normals[f, 0] * x[i] + normals[f, 1] * y[i] + normals[f, 2] * z[i]
     lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
     reach = math.sqrt(size)
     count = _may_be_lit(antennas, planes, normals, every_bend, both, reach, seen, row, start, lit)

@@ -90,7 +90,8 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], counts: Indices | int) -> F
     square = (points[faces] ** 2).sum(axis=(1, 2)) + (points[faces].sum(axis=1) ** 2).sum(axis=1)
     stretched = np.linalg.norm(normals * axes[faces[:, 0]], axis=1)
     rise = (1 - square / 12) / 2 * stretched
-    return Facets(vertices, faces, normals, areas, np.sqrt(swing / 8), rise, ends)
+    planes = np.sum(normals * vertices[faces[:, 0]], axis=1)
+    return Facets(vertices, faces, normals, planes, areas, np.sqrt(swing / 8), rise, ends)
 
 
 def joined(parts: Sequence[tuple[Sized, Indices]]) -> tuple[NDArray[np.int32], Indices]:
@@ -122,8 +123,9 @@ def mesh_facets(
     solid = areas > 0
     swing = (np.zeros(len(chosen)) if bend is None else bend)[solid]
     ends = np.array([(0, 0), (len(whole), len(swing))])
-    rise = np.zeros_like(swing)
-    return Facets(whole, chosen[solid], normals[solid], areas[solid], swing, rise, ends, both_sides)
+    chosen, normals, rise = chosen[solid], normals[solid], np.zeros_like(swing)
+    planes = np.sum(normals * whole[chosen[:, 0]], axis=1)
+    return Facets(whole, chosen, normals, planes, areas[solid], swing, rise, ends, both_sides)
 
 
 def smooth_bend(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.float64]:

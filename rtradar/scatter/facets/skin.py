@@ -195,7 +195,8 @@ class SkinFacets:
         normals, areas = facet_normals(own, faces)
         # The current does not fall to nothing at the edge of the lit side.
         bend = smooth_bend(own, faces) if wide else np.zeros_like(areas)
-        facets = Facets(own, faces, normals, areas, bend, np.zeros_like(areas), ends)
+        planes = np.sum(normals * own[faces[:, 0]], axis=1)
+        facets = Facets(own, faces, normals, planes, areas, bend, np.zeros_like(areas), ends)
         own_axes = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
         links = Links(antennas[None], pairs, length[None], *given, shadow=False)
         lit = Seen(np.array([piece.facets.start for piece in pieces]), seen)

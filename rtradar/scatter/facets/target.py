@@ -375,7 +375,7 @@ def _block_by_block(
         enough = count(float(wavenumber[some].max()), wide)
         shadows = FacetShadows(select(variant), target.semi_axes, enough)
         facets = shadows.facets
-        block = max(1, _VIEWS_AT_ONCE // (8 * len(facets.faces)))
+        block = max(1, _VIEWS_AT_ONCE // (32 * len(facets.faces)))
         for first in range(0, len(some), block):
             own = some[first : first + block]
             ends = np.stack([tx[own], rx[own]], axis=1)
