@@ -14,7 +14,6 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import over_legs
 from rtradar.scatter.common.poses import EchoModel, account_of, has_mesh
 from rtradar.scene import Scene
 from rtradar.system.registries import MODELS
@@ -93,10 +92,10 @@ def build_model(
             return model
         return _Checked(fidelity, model, before, body)
 
-    if room is None:
-        return over_legs(conductor(radar), radar, body, materials)
-    from rtradar.scatter.multipath.room_model import RoomModel  # which takes long to import
+    from rtradar.scatter.multipath.room_model import RoomModel, in_free_space  # slow to import
 
+    if room is None:
+        return in_free_space(conductor, radar, body, materials)
     return RoomModel(conductor, room, radar, body, materials, order=order, **backend)
 
 

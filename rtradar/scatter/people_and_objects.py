@@ -71,7 +71,8 @@ class PeopleAndObjects:
     ) -> None:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
         self.limits, self.variant = tuple(limits), person.variant
-        self.room = person if isinstance(person, RoomModel) else None
+        room = person if isinstance(person, RoomModel) else None
+        self.room = None if room is None or room.in_free_space else room
         self.people_alone = person if self.room is None else self.room.person
         self.paths = (DIRECT,) if self.room is None else self.room.paths
 

@@ -62,40 +62,6 @@ class Images(NamedTuple):
     part: NDArray[np.int64]
 
 
-class Nearby(NamedTuple):
-    """Expected specular points, in the axes of their parts [m]; they need not lie on the surface.
-
-    ``before, after (interval, line, 2, echo, 3)`` are those for the ends of the lines of
-    transmitters, at the ends of intervals; ``wanted (interval, line, echo)`` are the echoes to be
-    computed. Each chirp has an ``interval``, a ``line``, the ``fraction`` of the interval that is
-    over, and the weights ``tx_weight (chirp, 2)`` of both ends of the line.
-    """
-
-    before: NDArray[np.float32]
-    after: NDArray[np.float32]
-    wanted: NDArray[np.bool_]
-    interval: NDArray[np.int64]
-    line: NDArray[np.int64]
-    fraction: Array
-    tx_weight: Array
-
-    def take(self, echoes: slice) -> Nearby:
-        """Return the points of some of the echoes."""
-        return self._replace(
-            before=np.ascontiguousarray(self.before[..., echoes, :]),
-            after=np.ascontiguousarray(self.after[..., echoes, :]),
-            wanted=np.ascontiguousarray(self.wanted[..., echoes]),
-        )
-
-    def places(self) -> Array:
-        """Return the points of each chirp, (chirp, echo, 3)."""
-        before, after = (
-            np.einsum("cs,cs...->c...", self.tx_weight, at[self.interval, self.line])
-            for at in (self.before, self.after)
-        )
-        return np.asarray(before + self.fraction[:, None, None] * (after - before), np.float64)
-
-
 @inlined()
 def _plane_in_world(plane, frame):
     normal, e, f = plane.normal, plane.e, plane.f
@@ -155,23 +121,22 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
 
     Chirps ``start`` to ``stop`` are computed. Filled are ``length`` and ``amplitude (chirp, rx,
     echo)``: path lengths, and the returns of a perfect conductor over R1 R2 without regard to
-    polarisation [m]. ``tx_index (chirp,)`` is the transmitter of each chirp. Echoes that are not
-    wanted get the path over the part's centre and no return. Returned is the number of echoes, over
-    all chirps, that had to be searched for as by `solve`: where the steps do not settle on the side
-    that both antennas see, or lengths may be off by 1 um. That is near forward scattering, where a
-    small step of an antenna moves the specular point far.
+    polarisation [m]. ``tx_index (chirp,)`` is the transmitter of each chirp, ``near (chirp, echo,
+    3)`` are expected specular points, in the axes of the parts [m], which need not lie on the
+    surface. Echoes that have 0 there get the path over the part's centre and no return. Returned is
+    the number of echoes, over all chirps, that had to be searched for as by `solve`: where the
+    steps do not settle on the side that both antennas see, or lengths may be off by 1 um. That is
+    near forward scattering, where a small step of an antenna moves the specular point far.
     """
     # Unpacked here, as in `solve`.
     images_tx, images_rx, images_middle, out_leg, back_leg, part_of = images
     centres, frames, semi_axes = ellipsoids
-    befores, afters, wanted, intervals, lines, fractions, tx_weights = near
     _, receivers, echoes = length.shape
     searched = 0
     for chirp in range(start, stop):
         room, one, guess = np.empty((6, receivers)), np.empty(5), np.empty(3)
         local = np.empty((3, receivers))
-        transmitter, which, line = tx_index[chirp], intervals[chirp], lines[chirp]
-        fraction, ends = fractions[chirp], tx_weights[chirp]
+        transmitter = tx_index[chirp]
         for echo in range(echoes):
             part = part_of[echo]
             axes, frame = semi_axes[part], frames[chirp, part]
@@ -179,20 +144,13 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
             rx = images_rx[back_leg[echo], transmitter]
             tx = turned_back(frame, minus(images_tx[out_leg[echo], transmitter], centre))
             middle = turned_back(frame, minus(images_middle[back_leg[echo], transmitter], centre))
-            if not wanted[which, line, echo]:
+            for k in range(3):
+                guess[k] = near[chirp, echo, k]
+            if guess[0] == 0 and guess[1] == 0 and guess[2] == 0:
                 over_centre = math.sqrt(dot(tx, tx)) + math.sqrt(dot(middle, middle))
                 for i in range(receivers):
                     length[chirp, i, echo], amplitude[chirp, i, echo] = over_centre, 0.0
                 continue
-            # Interpolate the expected point over the interval and along the line of transmitters.
-            for k in range(3):
-                guess[k] = 0.0
-                for end in range(2):
-                    first, last = (
-                        befores[which, line, end, echo, k],
-                        afters[which, line, end, echo, k],
-                    )
-                    guess[k] += ends[end] * ((1 - fraction) * first + fraction * last)
             # Find the point for the middle of the receivers, and correct it for each of them.
             good, point, plane, out = _settle(tx, middle, axes, guess)
             place = plus(turned(frame, point), centre)

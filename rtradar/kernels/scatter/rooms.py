@@ -18,8 +18,8 @@ Indices = NDArray[np.int64]
 class PathFactors(NamedTuple):
     """What walls, the body's surface and occluders leave of echoes at one end of each interval.
 
-    ``factor (interval, node, line, 2, rx_end, echo)`` complex64 and ``seen (interval, line, 2,
-    rx_end, echo)`` bool, for the ends of lines of antennas.
+    ``factor (interval, node, line, tx_end, rx_end, echo)`` complex64 and ``seen (interval, line,
+    tx_end, rx_end, echo)`` bool, for the ends of lines of antennas.
     """
 
     factor: NDArray[np.complex64]
@@ -30,7 +30,7 @@ class Blend(NamedTuple):
     """Where chirps are between keyframes and between the ends of lines of antennas.
 
     Each chirp has an ``interval``, the ``fraction`` of it that is over, and a ``line``;
-    ``tx_weight (chirp, 2)`` and ``rx_weight (chirp, rx, rx_end)`` are the weights of the ends.
+    ``tx_weight (chirp, tx_end)`` and ``rx_weight (chirp, rx, rx_end)`` are the weights of the ends.
     """
 
     interval: Indices
@@ -59,8 +59,10 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
         fade = np.empty(echoes, dtype=np.float32)
         # Interpolate over time and along the line of Tx, for each end of the lines of Rx.
         for end in range(ends):
-            for side in range(2):
+            for side in range(at.tx_weight.shape[1]):
                 weight = at.tx_weight[chirp, side]
+                if weight == 0:
+                    continue
                 old, new = np.float32(weight * (1 - smooth)), np.float32(weight * smooth)
                 first_seen = before.seen[which, line, side, end]
                 last_seen = after.seen[which, line, side, end]

@@ -68,10 +68,10 @@ def _evenly(count: int) -> Array:
     return np.linspace(0, 1, count) if count > 1 else np.array([0.5])
 
 
-def _straight(count: int) -> Array:
-    """Weights (antenna, 2) of both ends of a line in each of its antennas."""
-    fraction = np.linspace(0.0, 1.0, count)
-    return np.column_stack([1 - fraction, fraction])
+def _straight(count: int, places: int = 2) -> Array:
+    """Weights (antenna, place) of places spread evenly along a line in each of its antennas."""
+    fraction = np.linspace(0.0, places - 1.0, count)
+    return np.maximum(1 - np.abs(fraction[:, None] - np.arange(places)), 0.0)
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class ArrayEnds:
     """Ends of the lines of a radar, for linear interpolation in between.
 
     A line is a line of Tx with the Rx that are kept with it; ``line_of_tx (tx,)`` is that of each
-    Tx. ``tx (line, 2, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m], two of the Tx and two for
-    each line of Rx; ``tx_middle`` and ``rx_middle (line, 3)`` are mean positions [m]. ``tx_weight
-    (tx, 2)`` and ``rx_weight (tx, rx, rx_end)`` are the weights of the ends in each Tx and each Rx
-    kept with it.
+    Tx. ``tx (line, tx_end, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m], two for each line of
+    Rx, and of the Tx two or more places; ``tx_middle`` and ``rx_middle (line, 3)`` are mean
+    positions [m]. ``tx_weight (tx, tx_end)`` and ``rx_weight (tx, rx, rx_end)`` are the weights of
+    the ends in each Tx and each Rx kept with it.
     """
 
     line_of_tx: Indices
@@ -94,12 +94,12 @@ class ArrayEnds:
     rx_weight: Array
 
     @classmethod
-    def of(cls, radar: Radar) -> ArrayEnds:
-        """Return the ends of the lines of this radar at rest."""
+    def of(cls, radar: Radar, places: int = 2) -> ArrayEnds:
+        """Return the ends of the lines of this radar at rest, for so many places along its Tx."""
         lines = _tx_lines(radar)
-        line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, 2))
+        line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, places))
         for number, (line, _) in enumerate(lines):
-            line_of_tx[line], tx_weight[line] = number, _straight(len(line))
+            line_of_tx[line], tx_weight[line] = number, _straight(len(line), places)
         rx = [radar.rx[radar.rx_of_tx[line[0]]] for line, _ in lines]
         weights = np.zeros((len(lines), radar.n_rx, 2 * len(lines[0][1])))
         for weight, (_, groups) in zip(weights, lines, strict=True):
@@ -111,7 +111,9 @@ class ArrayEnds:
         ]
         return cls(
             line_of_tx,
-            tx=np.array([radar.tx[line[[0, -1]]] for line, _ in lines]),
+            tx=np.array(
+                [np.linspace(radar.tx[line[0]], radar.tx[line[-1]], places) for line, _ in lines]
+            ),
             rx=np.array(ends),
             tx_middle=np.array([radar.tx[line].mean(axis=0) for line, _ in lines]),
             rx_middle=np.array([kept.mean(axis=0) for kept in rx]),

@@ -1,25 +1,20 @@
 """Polarisation and patterns: what antennas send and receive, and what surfaces do to it.
 
 A surface multiplies the TE and the TM part of a field by one coefficient each. The body's surface
-is a perfect conductor, or a half-space such as skin. In free space the echoes of any model go over
-legs that have these patterns, and reflect off these materials.
+is a perfect conductor, or a half-space such as skin.
 """
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
-from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.front_end import Antenna
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 from rtradar.scene import Material, material, reflection
 
 Array = NDArray[np.float64]
@@ -217,20 +212,6 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     return apply_te_tm(field, directions, onward, normals, te, tm)
 
 
-def material_factor(to_tx: Array, to_rx: Array, eta: Field, polarization: Polarization) -> Field:
-    """Compute the co-polar echo over that of a perfect conductor of the same shape.
-
-    ``to_tx`` and ``to_rx (..., 3)`` are vectors from the specular point to the antennas, of any
-    length; ``eta (node,)`` is the relative permittivity of the body. The factor (node, ...) is for
-    exp(+j omega t); amplitudes of `Echoes` take its conjugate.
-    """
-    tx, rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in (to_tx, to_rx))
-    sent, received = antenna_field(-tx, polarization), antenna_field(-rx, polarization)
-    field = np.broadcast_to(sent.astype(np.complex128), (len(eta), *sent.shape))
-    back = -np.sum(received * body_reflection(field, -tx, bisector(tx, rx), eta), axis=-1)
-    return over_copolar(back, tx, rx, polarization)
-
-
 def over_copolar(field: Field, to_tx: Array, to_rx: Array, polarization: Polarization) -> Field:
     """Divide a co-polar field (node, ...) by that of a conductor; 1 where that has none."""
     own = copolar(to_tx, to_rx, polarization)
@@ -241,8 +222,9 @@ def over_copolar(field: Field, to_tx: Array, to_rx: Array, polarization: Polariz
 class Surfaces:
     """The surfaces of parts, each a perfect conductor or skin.
 
-    ``materials (part,)`` are their names. An `InputError` is raised for other names, and if a
-    material is not known over the radar's sweep.
+    ``materials (part,)`` are their names; ``straight (part,)`` are amplitudes of `Echoes` at normal
+    incidence over those of conductors, at the middle of the sweep. An `InputError` is raised for
+    other names, and if a material is not known over the radar's sweep.
     """
 
     def __init__(self, materials: Sequence[str], radar: Radar) -> None:
@@ -250,9 +232,9 @@ class Surfaces:
         self._of_part = np.array(materials)
         self._kinds = {name: body_material(name, ends) for name in dict.fromkeys(materials)}
         # Over a sweep the reflection of skin changes by a few hundredths: that at its middle
-        # serves for all of it.
-        self._centre_hz = np.array([radar.centre_frequency_hz])
-        self._kind = radar.polarization
+        # serves for all of it. At normal incidence a conductor counts as +1.
+        eta = [self._kinds[name].eta(np.array(radar.centre_frequency_hz)) for name in materials]
+        self.straight = reflection(np.array(eta), 1.0, "tm").conj()
 
     @property
     def conduct(self) -> bool:
@@ -278,96 +260,3 @@ class Surfaces:
             arriving, ways = field[..., own, :], directions[..., own, :]
             out[..., own, :] = body_reflection(arriving, ways, normals[..., own, :], eta)
         return out
-
-    def factor(self, at: ChirpPoses) -> NDArray[np.complex128]:
-        """Compute amplitudes (chirp, part) of `Echoes` over those of conductors.
-
-        The angle of incidence is that at the centre of each part, for the middle of the receivers:
-        a line of them is short, and so near the normal a degree changes the reflection by less than
-        0.1 %.
-        """
-        to_tx = at.tx[:, None] - at.centres
-        to_rx = at.rx.mean(axis=1)[:, None] - at.centres
-        out = np.ones(to_tx.shape[:2], dtype=np.complex128)
-        for name, kind in self._kinds.items():
-            if not kind.conducts:
-                own = np.flatnonzero(self._of_part == name)
-                ways, eta = (to_tx[:, own], to_rx[:, own]), kind.eta(self._centre_hz)
-                sent = Polarization(self._kind, at.axes)
-                out[:, own] = material_factor(*ways, eta, sent)[0].conj()
-        return out
-
-
-# -- legs in free space ----------------------------------------------------------------------------
-
-
-def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
-    """Points (chirp, rx, part, 3) whose normals bisect Tx and Rx, as seen from the centres [m].
-
-    The specular point but for terms of the part's size over its distance, and what is seen of a
-    part lies about it.
-    """
-    tx, rx = (
-        unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None])
-    )
-    normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
-    # A normal of a unit sphere that is stretched to the ellipsoid.
-    local = at.semi_axes * unit(normal)
-    return np.asarray(at.centres[:, None] + np.einsum("tpij,trpj->trpi", at.frames, local))
-
-
-def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
-    """Amplitude (chirp, rx, part) that both antennas leave, relative to their patterns' peaks.
-
-    The square root of the power pattern of the Tx in the direction of the part, times that of the
-    Rx.
-    """
-    points, polarization = specular_points(at), Polarization(radar.polarization, at.axes)
-    sent = pattern_of(radar.tx_antenna, points - at.tx[:, None, None], polarization)
-    return sent * pattern_of(radar.rx_antenna, points - at.rx[:, :, None], polarization)
-
-
-def over_legs(
-    model: EchoModel, radar: Radar, body: Body, materials: Sequence[str] = ()
-) -> EchoModel:
-    """Wrap the model of a conductor before isotropic antennas by what legs in free space do.
-
-    These are the patterns of the antennas, and the reflection of the body's ``materials (part,)``,
-    which are perfect conductors if they are left out.
-    """
-    surfaces = Surfaces(materials or (CONDUCTOR,) * len(body.part_names), radar)
-    plain = not (is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna))
-    return model if plain and surfaces.conduct else _OverLegs(model, radar, body, surfaces)
-
-
-class _OverLegs:
-    """Echoes of several bounces are given the directions of the part they bounce off last.
-
-    Each part reflects with one coefficient, that of the angle at its specular point: what comes
-    from far beside it, and bounces at other angles, are approximated so.
-    """
-
-    def __init__(self, model: EchoModel, radar: Radar, body: Body, surfaces: Surfaces) -> None:
-        self._model, self._radar, self._body, self._surfaces = model, radar, body, surfaces
-        self.traces = bool(getattr(model, "traces", False))
-
-    @property
-    def variant(self) -> str | None:
-        """Backend that traced, or None."""
-        return self._model.variant
-
-    def account(self) -> dict[str, Any] | None:
-        """Report what the model did."""
-        return account_of(self._model)
-
-    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps."""
-        echoes = self._model.echoes(chirps)
-        at = chirp_poses(self._radar, self._body, chirps)
-        amplitude = echoes.amplitude
-        if is_shaped(self._radar.tx_antenna) or is_shaped(self._radar.rx_antenna):
-            amplitude = amplitude * leg_gain(self._radar, at)[..., echoes.part]
-        if not self._surfaces.conduct:
-            factor = self._surfaces.factor(at)[:, echoes.part] ** echoes.bounces
-            amplitude = amplitude * factor[:, None]
-        return dataclasses.replace(echoes, amplitude=amplitude)

@@ -19,7 +19,7 @@ and 0.59 of these estimates by `specular` at 12 and 77 GHz, and by 0.47 by `phys
 from __future__ import annotations
 
 import math
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, owners_of
+from rtradar.scatter.common.poses import BuiltInModel, owners_of
 from rtradar.scatter.models.physical_optics import PhysicalOptics, Reference
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.target import ellipsoid_areas
@@ -135,12 +135,6 @@ class Auto(BuiltInModel):
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps: those of the level that was taken."""
         return self._model.echoes(chirps)
-
-    def specular_echo(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, start: Array | None = None
-    ) -> tuple[Array, Array]:
-        """Compute the echoes of a conductor by `specular`; see `Specular.specular_echo`."""
-        return cast(Specular, self._model).specular_echo(chirps, at, start)
 
     def account(self) -> dict[str, Any]:
         """Which level was taken, and why, as fractions of all parts and time, for JSON."""

@@ -13,7 +13,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
     DoubleReflections,
     TwoBounceModel,
@@ -144,53 +144,26 @@ class Specular(TwoBounceModel):
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
-        at = chirp_poses(self._radar, self._body, chirps)
-        length, amplitude, points = self._solved(chirps, at, points=self._terms == 2)
+        at, visibility = chirp_poses(self._radar, self._body, chirps), self._visibility
+        weight, start = (
+            visibility.at(chirps) if isinstance(visibility, SpecularVisibility) else (1.0, None)
+        )
+        sent = Polarization(self._radar.polarization, at.axes)
+        length, amplitude, points = solve_specular_points(
+            at,
+            start=start,
+            polarization=sent,
+            spreading=self._spreading,
+            points=self._terms == 2,
+        )
         frequency = np.array([self._radar.centre_frequency_hz])
-        if isinstance(self._visibility, ArrayEnvelope):
-            echo = self._visibility.times(chirps, at.tx_index, amplitude)
-            frequency = self._visibility.frequency
-        else:
-            echo = amplitude[None].astype(np.complex128)
+        echo = (amplitude * weight)[None].astype(np.complex128)
+        if isinstance(visibility, ArrayEnvelope):
+            echo = visibility.times(chirps, at.tx_index, amplitude)
+            frequency = visibility.frequency
         if self._terms == 2:
             k = np.array(2 * np.pi * self._radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
             # The amplitude of an echo is the conjugate of the scattering length.
-            sent = Polarization(self._radar.polarization, at.axes)
             echo *= with_second_term(at, points, sent, k).conj()
         single = one_echo_a_part(at.tx_index, length, echo, frequency)
         return self._with_doubles(single, chirps)
-
-    def specular_echo(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute direct echoes at some chirps as if the body were a conductor.
-
-        Points ``start (chirp, part, 3)`` near the specular points, in the axes of the parts [m],
-        save steps. Returned are lengths and co-polar amplitudes, with occlusion (chirp, rx, part)
-        [m].
-        """
-        length, amplitude, _ = self._solved(chirps, at, start)
-        return length, amplitude
-
-    def _solved(
-        self,
-        chirps: NDArray[np.int64],
-        at: ChirpPoses,
-        start: NDArray[np.float64] | None = None,
-        *,
-        points: bool = False,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Lengths, amplitudes of what is visible, and specular points if they are wanted."""
-        weight, known = (
-            self._visibility.at(chirps)
-            if isinstance(self._visibility, SpecularVisibility)
-            else (1.0, None)
-        )
-        length, amplitude, found = solve_specular_points(
-            at,
-            start=known if start is None else start,
-            polarization=Polarization(self._radar.polarization, at.axes),
-            spreading=self._spreading,
-            points=points,
-        )
-        return length, amplitude * weight, found

@@ -12,18 +12,17 @@ Keyframes are computed many at a time, kept, and found again.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise, product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
-from rtradar.front_end import Antenna
-from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, received_from_conductors
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
@@ -33,11 +32,12 @@ from rtradar.scatter.common.polarization import (
     over_copolar,
 )
 from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, keyframe_step
-from rtradar.scatter.multipath.image_paths import Leg, SolidFace, WallPath
-from rtradar.scatter.multipath.path_echoes import NO_DELAYS, DelayingPassages, EchoColumns
-from rtradar.scatter.multipath.slabs import Passages, WallResponse
+from rtradar.scatter.multipath.image_paths import SolidFace, WallPath, images
+from rtradar.scatter.multipath.path_echoes import DelayingPassages, EchoColumns
+from rtradar.scatter.multipath.slabs import WallResponse
 from rtradar.scatter.multipath.solid_edges import SolidEdges
-from rtradar.system.threads import in_threads, thread_map
+from rtradar.scatter.specular_points import solve_specular_points
+from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
@@ -56,10 +56,11 @@ _FAINT = 2e-3
 class PathKeyframes(NamedTuple):
     """What is left of the echoes at keyframes.
 
-    ``factor (keyframe, node, line, 2, rx_end, column)`` complex64 is the co-polar field over that
-    of the bare return, for exp(+j omega t); for a direct echo, and any of a ``whole_level``, over
-    that of a conductor. ``seen (keyframe, line, 2, rx_end, echo)`` bool. ``start (keyframe, line,
-    2, echo, 3)`` are specular points for both ends of the lines of Tx in the axes of the parts [m].
+    ``factor (keyframe, node, line, tx_end, rx_end, column)`` complex64 is the co-polar field over
+    that of the bare return, for exp(+j omega t); for a direct echo, and any of a ``whole_level``,
+    over that of a conductor. ``seen (keyframe, line, tx_end, rx_end, echo)`` bool. ``start
+    (keyframe, line, tx_end, echo, 3)`` are specular points for the ends of the lines of Tx, in the
+    axes of the parts [m].
     """
 
     factor: NDArray[np.complex64]
@@ -98,222 +99,244 @@ def path_keyframes(
     Columns that are met for the first time are added. Whether other parts occlude a direct echo,
     and any of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
-    points, start, exists = columns.specular_points(around.ends, poses)
-    radar, ends = around.radar, around.ends
-    ways = [path.out for path in around.paths], [path.back for path in around.paths]
-    antennas = (ends.tx, radar.tx_antenna), (ends.rx, radar.rx_antenna)
-    legs = thread_map(
-        lambda side: _carry(around, ways[side], columns.path, points, *antennas[side]), range(2)
+    numbers = np.unique(columns.path).tolist()
+    paths = thread_map(
+        lambda place: _over(around, columns, numbers[place], poses), range(len(numbers))
     )
-    # Echoes of which the model itself knows how the last sections end.
-    known = np.flatnonzero(columns.direct | around.whole_level)
-    factors = [
-        (chosen, met, _left(around, legs, known, columns.part[chosen], chosen, *fields))
-        for chosen, met, fields in _pairs(around.paths, columns.path, legs)
-    ]
+    shape = len(times), *around.ends.tx.shape[:2], around.ends.rx.shape[1], len(columns.path)
+    keyframes, lines, tx_ends, rx_ends, echoes = shape
+    free = np.zeros((keyframes, lines, tx_ends + rx_ends, echoes), dtype=bool)
+    start = np.empty((keyframes, lines, tx_ends, echoes, 3), dtype=np.float32)
+    for own in paths:
+        free[..., own.echo], start[..., own.echo, :] = own.free, own.start
+    sections = [section for own in paths for section in own.sections]
+    left = free.astype(np.complex128)
     if around.occluders is not None:
-        out, back = (_past_solids(around.occluders[1], leg, exists, times) for leg in legs)
-        for chosen, _, found in factors:
-            found *= out[:, :, :, None, chosen] * back[:, :, None, :, chosen]
-    strength = np.zeros((*exists.shape[:2], 2, around.ends.rx.shape[1], len(columns.path)))
-    for chosen, _, found in factors:
-        strength[..., chosen] = np.maximum(strength[..., chosen], np.abs(found).max(axis=0))
-    seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & (strength > 0)
-    seen &= exists[:, :, None, None]
+        _past_solids(around.occluders[1], sections, free, times, left)
+    of_pairs = _both(left, tx_ends)
+    strength = np.zeros(shape)
+    for own in paths:
+        for found in own.fields.values():
+            found *= of_pairs[..., own.echo]
+            size = np.abs(found).max(axis=0)
+            strength[..., own.echo] = np.maximum(strength[..., own.echo], size)
+    seen = strength > 0
     if around.occluders is not None:
-        seen &= _not_occluded(around.occluders[0], legs, seen, poses, columns.part, known)
-    factor = _in_columns(columns, factors, strength)
+        asked = np.concatenate([seen.any(axis=3), seen.any(axis=2)], axis=2)
+        clear = _past_body(around.occluders[0], sections, asked, poses, columns.part)
+        seen &= _both(clear, tx_ends)
+    factor = _in_columns(columns, paths, strength, len(around.walls.frequency))
     middle = factor[len(factor) // 2]
     change = np.abs(factor - middle) <= _FLAT * np.abs(middle)
     flat = np.all(change, axis=(0, 2, 3, 4), keepdims=True)
     factor = np.moveaxis(np.where(flat, middle, factor), 0, 1)
-    return PathKeyframes(factor.astype(np.complex64), seen, start.astype(np.float32))
+    return PathKeyframes(factor.astype(np.complex64), seen, start)
 
 
-def _in_columns(
-    columns: EchoColumns,
-    factors: Sequence[tuple[NDArray[np.int64], DelayingPassages, Field]],
-    strength: Array,
-) -> Field:
-    """Factors (node, keyframe, line, 2, rx_end, column), without terms that are faint anywhere."""
+def _both(of_legs: NDArray[Any], tx_ends: int) -> NDArray[Any]:
+    """Product of both legs (keyframe, line, tx_end, rx_end, echo), of those from all ends."""
+    return np.asarray(of_legs[:, :, :tx_ends, None] * of_legs[:, :, None, tx_ends:])
+
+
+def _in_columns(columns: EchoColumns, paths: Sequence[_Over], strength: Array, nodes: int) -> Field:
+    """Factors (node, keyframe, line, tx_end, rx_end, column), without terms faint everywhere."""
     parts = []
-    for chosen, met, found in factors:
-        size = np.abs(found).max(axis=0)
-        counts = ((size > _FAINT * strength[..., chosen]) & (size > 0)).any(axis=(0, 1, 2, 3))
-        column = np.full(len(chosen), -1)
-        column[counts] = [columns.column(echo, met) for echo in chosen[counts].tolist()]
-        parts.append((column[column >= 0], found[..., column >= 0]))
-    out = np.zeros((len(parts[0][1]), *strength.shape[:-1], len(columns)), dtype=np.complex128)
+    for own in paths:
+        for met, found in own.fields.items():
+            size = np.abs(found).max(axis=0)
+            counts = (size > _FAINT * strength[..., own.echo]) & (size > 0)
+            chosen = np.flatnonzero(counts.any(axis=(0, 1, 2, 3)))
+            column = np.array([columns.column(echo, met) for echo in own.echo[chosen]], dtype=int)
+            known = np.flatnonzero(column >= 0)
+            parts.append((column[known], found[..., chosen[known]]))
+    out = np.zeros((nodes, *strength.shape[:-1], len(columns)), dtype=np.complex128)
     for column, found in parts:
         out[..., column] = found
     return out
 
 
-# -- fields ----------------------------------------------------------------------------------------
-
-
-class _Carried(NamedTuple):
-    """Legs from the ends of the lines to the specular points.
-
-    ``field (node, keyframe, line, end, echo, 3)`` arrives without delay in slabs; ``waves`` are all
-    fields of the echoes of a leg, by what they met; ``of_leg (echo,)`` counts the echoes of each
-    leg. ``arriving (keyframe, line, end, echo, 3)`` is the direction, ``valid (keyframe, line, end,
-    echo)``.
-    """
-
-    field: Field
-    waves: dict[Leg, dict[Passages, Field]]
-    of_leg: NDArray[np.int64]
-    arriving: Array
-    valid: NDArray[np.bool_]
-    sections: list[_Section]
+# -- one path --------------------------------------------------------------------------------------
 
 
 class _Section(NamedTuple):
     """A straight section of the legs of some echoes, from origins to targets (..., 3) [m].
 
-    It may be the ``last`` one, and reflected ``at_solid``, a face of furniture.
+    It is of the legs from the ends of a line from ``first`` on, those of Tx before those of Rx; it
+    may be the ``last`` one, of which the model may know what the body hides (``known``), and be
+    reflected ``at_solid``, a face of furniture.
     """
 
     echo: NDArray[np.int64]
+    first: int
     origins: Array
     targets: Array
     last: bool
+    known: bool
     at_solid: bool
 
 
-def _carry(
-    around: Surroundings,
-    legs: Sequence[Leg],
-    path: NDArray[np.int64],
-    points: Array,
-    antennas: Array,
-    antenna: Antenna | None,
-) -> _Carried:
-    """Carry the fields of antennas over the legs of some paths, each echo by that of its own."""
-    shape = (points.shape[0], *antennas.shape[:2], points.shape[2])
-    field = np.zeros((len(around.walls.frequency), *shape, 3), dtype=np.complex128)
-    arriving, valid = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-    of_leg, sections, all_waves = np.empty(len(path), dtype=np.int64), [], {}
-    paths: dict[Leg, list[int]] = {}
-    for number in np.unique(path).tolist():
-        paths.setdefault(legs[number], []).append(number)
-    for leg, numbers in paths.items():
-        chosen = np.flatnonzero(np.isin(path, numbers))
-        of_leg[chosen] = np.arange(len(chosen))
-        ends = antennas[:, :, None], points[:, :, None, chosen]
-        own = around.walls.carried(leg, *ends, antenna, around.polarization)
-        valid[..., chosen] = own.extent != 0
-        for step, (origins, targets) in enumerate(pairwise(own.corners)):
-            start, end = np.broadcast_arrays(origins, targets)
-            at_solid = any(isinstance(face.wall, SolidFace) for face in leg)
-            sections.append(_Section(chosen, start, end, step == len(leg), at_solid))
-        all_waves[leg] = {wave.passages: wave.field for wave in own.waves}
-        field[..., chosen, :] = all_waves[leg].setdefault((), field[..., chosen, :])
-        arriving[..., chosen, :] = own.ways[-1]
-    return _Carried(field, all_waves, of_leg, arriving, valid, sections)
+class _Over(NamedTuple):
+    """The echoes ``echo (n,)`` of one path.
+
+    ``fields (node, keyframe, line, tx_end, rx_end, n)`` are the co-polar ones over the bare return,
+    by what slabs delay; ``free (keyframe, line, end, n)`` says where the legs from all ends of a
+    line exist, ``start`` is that of `PathKeyframes`.
+    """
+
+    echo: NDArray[np.int64]
+    fields: dict[DelayingPassages, Field]
+    free: NDArray[np.bool_]
+    start: Array
+    sections: list[_Section]
 
 
-def _pairs(
-    paths: Sequence[WallPath], path: NDArray[np.int64], legs: Sequence[_Carried]
-) -> Iterator[tuple[NDArray[np.int64], DelayingPassages, tuple[Field, Field]]]:
-    """Echoes, what they met, and the fields (node, keyframe, line, end, echo, 3) of both legs."""
+def _over(around: Surroundings, columns: EchoColumns, number: int, poses: Poses) -> _Over:
+    """Carry the fields of all antennas over both legs of a path, and put them together."""
+    path, echo = around.paths[number], np.flatnonzero(columns.path == number)
+    part, (ends, radar) = columns.part[echo], (around.ends, around.radar)
+    points, near, exists = specular_points(path, part, ends, poses)
+    known = around.whole_level or not path.order
+    legs, sections = [], []
+    for leg, antennas, antenna, first in (
+        (path.out, ends.tx, radar.tx_antenna, 0),
+        (path.back, ends.rx, radar.rx_antenna, ends.tx.shape[1]),
+    ):
+        given = antennas[:, :, None], points[:, :, None], antenna, around.polarization
+        legs.append(around.walls.carried(leg, *given))
+        at_solid = any(isinstance(face.wall, SolidFace) for face in leg)
+        for step, between in enumerate(pairwise(legs[-1].corners)):
+            last = step == len(leg)
+            start, stop = np.broadcast_arrays(*between)
+            sections.append(_Section(echo, first, start, stop, last, last and known, at_solid))
     out, back = legs
-    yield np.arange(len(path)), NO_DELAYS, (out.field, back.field)
-    for number in np.unique(path):
-        there, here = out.waves[paths[number].out], back.waves[paths[number].back]
-        if len(there) == len(here) == 1:
-            continue
-        chosen = np.flatnonzero(path == number)
-        for (met_out, sent), (met_back, received) in product(there.items(), here.items()):
-            if (met_out, met_back) != NO_DELAYS:
-                fields = sent[..., out.of_leg[chosen], :], received[..., back.of_leg[chosen], :]
-                yield chosen, (met_out, met_back), fields
+    fields = {
+        (sent.passages, received.passages): _left(
+            around, part, known, (-out.ways[-1], -back.ways[-1]), sent.field, received.field
+        )
+        for sent, received in product(out.waves, back.waves)
+    }
+    free = np.concatenate([leg.extent != 0 for leg in legs], axis=2) & exists[:, :, None]
+    return _Over(echo, fields, free, near, sections)
+
+
+def specular_points(
+    path: WallPath, part: NDArray[np.int64], ends: ArrayEnds, poses: Poses
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Find the specular points of parts (echo,) over a path, and whether there is one at all.
+
+    Returned are points for the middles of the lines (keyframe, line, echo, 3), world [m]; for the
+    ends of the lines of Tx (keyframe, line, tx_end, echo, 3), in the axes of the parts [m]; and
+    (keyframe, line, echo) bool.
+    """
+    # The middle of each line of Tx and its ends, all with the middle of the receivers kept.
+    tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
+    count, pairs = len(poses.centres), tx.shape[:2]
+    rx = np.repeat(images(path.back, ends.rx_middle), pairs[1], axis=0)
+    antennas = np.tile(images(path.out, tx).reshape(-1, 3), (count, 1)), np.tile(rx, (count, 1))
+    centres, frames = poses.centres[:, part], poses.frames[:, part]
+    posed = [np.repeat(own, len(rx), axis=0) for own in (centres, frames)]
+    at = Geometry(antennas[0], antennas[1][:, None], posed[0], posed[1], poses.semi_axes[part])
+    _, amplitude, found = solve_specular_points(at, points=True)
+    points = found.reshape(count, *pairs, len(part), 3)
+    exists = (amplitude != 0).reshape(points.shape[:-1])
+    away = points[:, :, 1:] - centres[:, None, None]
+    return points[:, :, 0], np.einsum("keji,klsej->klsei", frames, away), exists[:, :, 0]
 
 
 def _left(
     around: Surroundings,
-    legs: Sequence[_Carried],
-    known: NDArray[np.int64],
     part: NDArray[np.int64],
-    chosen: NDArray[np.int64],
+    known: bool,
+    ways: tuple[Array, Array],
     sent: Field,
     received: Field,
 ) -> Field:
-    """Co-polar field over that of the bare return, (node, keyframe, line, 2, rx_end, echo)."""
-    back_tx, back_rx = (-leg.arriving[..., chosen, :] for leg in legs)
-    to_tx, to_rx = back_tx[:, :, :, None], back_rx[:, :, None]
+    """Co-polar field over that of the bare return, (node, keyframe, line, tx_end, rx_end, echo).
+
+    The unit ``ways (keyframe, line, end, echo, 3)`` go from the body back over both legs. The bare
+    return of what is ``known`` holds the co-polar fraction of a conductor.
+    """
+    to_tx, to_rx = ways[0][:, :, :, None], ways[1][:, :, None]
     if around.surfaces.conduct:
-        shape = *sent.shape[:4], received.shape[3], len(chosen)
+        shape = *sent.shape[:4], received.shape[3], len(part)
         factor = np.empty(shape, dtype=np.complex128)
-        fields = (np.ascontiguousarray(array) for array in (sent, received, back_tx, back_rx))
-        in_threads(received_from_conductors, shape[1], *fields, factor)
+        fields = (np.ascontiguousarray(array) for array in (sent, received, *ways))
+        received_from_conductors(0, shape[1], *fields, factor)
     else:
         arrives = sent[:, :, :, :, None], -to_tx, bisector(to_tx, to_rx)
         returned = around.surfaces.reflected(part, *arrives, around.walls.frequency)
         factor = np.asarray(np.sum(received[:, :, :, None] * returned, axis=-1))
     # A conductor at normal incidence counts as +1: that the field is reversed is in the sign.
     np.negative(factor, out=factor)
-    own = np.flatnonzero(np.isin(chosen, known))
-    if len(own):
-        # The bare return of these holds the co-polar fraction of a conductor.
-        ways = to_tx[..., own, :], to_rx[..., own, :]
-        factor[..., own] = over_copolar(factor[..., own], *ways, around.polarization)
-    return factor
+    return over_copolar(factor, to_tx, to_rx, around.polarization) if known else factor
 
 
 # -- occlusion -------------------------------------------------------------------------------------
 
 
+def _rays(
+    sections: Sequence[_Section], asked: NDArray[np.bool_]
+) -> tuple[Array, Array, NDArray[np.bool_], tuple[NDArray[np.int64], ...]]:
+    """Sections of the legs that are asked about (keyframe, line, end, echo), one after the other.
+
+    Returned are both ends (ray, 3) [m], whether they are the last of their leg, and which leg.
+    """
+    found = []
+    for section in sections:
+        which = slice(section.first, section.first + section.origins.shape[2])
+        at = np.nonzero(asked[:, :, which, section.echo])
+        leg = *at[:2], at[2] + section.first, section.echo[at[3]]
+        ends = section.origins[at], section.targets[at]
+        found.append((*ends, np.full(len(at[0]), section.last), *leg))
+    starts, stops, last, *legs = (np.concatenate(column) for column in zip(*found, strict=True))
+    return starts, stops, last, tuple(legs)
+
+
 def _past_solids(
-    solids: SolidEdges, leg: _Carried, exists: NDArray[np.bool_], times: Array
-) -> Field:
-    """What furniture and objects leave of the field on a leg, (keyframe, line, end, echo)."""
-    asked = leg.valid & exists[:, :, None]
-    left = asked.astype(np.complex128)
-    for echo, origins, targets, _, at_solid in leg.sections:
-        own = left[..., echo]
-        still = own != 0
-        moments = np.broadcast_to(times[:, None, None, None], still.shape)[still]
-        # What a face of furniture reflects has its edges already.
-        given = origins[still], targets[still], moments
-        own[still] *= solids.left(*given, bent=not at_solid)
-        left[..., echo] = own
-    return left
+    solids: SolidEdges,
+    sections: Sequence[_Section],
+    free: NDArray[np.bool_],
+    times: Array,
+    left: Field,
+) -> None:
+    """Multiply what is left of legs (keyframe, line, end, echo) by what solids leave.
+
+    Asked are those that are ``free`` of walls.
+    """
+    for at_solid in (False, True):
+        own = [section for section in sections if section.at_solid == at_solid]
+        if own:
+            starts, stops, _, legs = _rays(own, free)
+            # What a face of furniture reflects has its edges already.
+            passed = solids.left(starts, stops, times[legs[0]], bent=not at_solid)
+            np.multiply.at(left, legs, passed)
 
 
-def _not_occluded(
+def _past_body(
     body: BodyTracer,
-    legs: Sequence[_Carried],
-    seen: NDArray[np.bool_],
+    sections: Sequence[_Section],
+    asked: NDArray[np.bool_],
     poses: Poses,
     part: NDArray[np.int64],
-    known: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Whether the body leaves both legs free, (keyframe, line, 2, rx_end, echo).
+    """Whether the body leaves legs free, of those ``asked`` (keyframe, line, end, echo).
 
-    Of the last sections of the ``known`` echoes the model knows that itself.
+    Of the last sections of the ``known`` ones the model knows that itself.
     """
-    keyframes, kinds = len(seen), len(poses.semi_axes) + 1
-    # A group for each part at each keyframe, and one for targets on no part.
+    own = [section for section in sections if not section.known]
+    if not own:
+        return asked
+    starts, stops, last, legs = _rays(own, asked)
+    keyframes, kinds = len(asked), len(poses.semi_axes) + 1
+    # A group for each part at each keyframe, and one for targets on no part: at the specular point
+    # the part itself cannot be in the way, before a wall it can.
     parts = np.tile(np.append(np.arange(kinds - 1), -1), keyframes)
+    group = legs[0] * kinds + np.where(last, part[legs[3]], kinds - 1)
     pose = np.repeat(np.arange(keyframes), kinds)
-    both = [np.logical_or.reduce(seen, axis=axis) for axis in (3, 2)]
-    for leg, clear in zip(legs, both, strict=True):
-        rays = []
-        for chosen, origins, targets, last, _ in leg.sections:
-            asked = ~np.isin(chosen, known) if last else np.ones(len(chosen), dtype=bool)
-            where = np.nonzero(clear[..., chosen] & asked)
-            echo = chosen[where[-1]]
-            # At the specular point the part itself cannot be in the way, before a wall it can.
-            own = part[echo] if last else np.full(len(echo), kinds - 1)
-            rays.append((origins[where], targets[where], where[0] * kinds + own, *where[:-1], echo))
-        starts, stops, group, keyframe, line, end, echo = (
-            np.concatenate(column) for column in zip(*rays, strict=True)
-        )
-        occluded = ~body.clear(starts, stops, group, parts, pose, poses)
-        clear[keyframe[occluded], line[occluded], end[occluded], echo[occluded]] = False
-    return np.asarray(both[0][:, :, :, None] & both[1][:, :, None])
+    occluded = ~body.clear(starts, stops, group, parts, pose, poses)
+    clear = asked.copy()
+    clear[tuple(index[occluded] for index in legs)] = False
+    return clear
 
 
 # -- many keyframes --------------------------------------------------------------------------------
@@ -383,7 +406,8 @@ class RoomKeyframes:
             poses = self._body.at(np.minimum(times, self._body.duration_s))
             around, there = self._around, radar.at(float(times[0]))
             if radar.is_moving:
-                around = around._replace(radar=there, ends=ArrayEnds.of(there))
+                ends = ArrayEnds.of(there, around.ends.tx.shape[1])
+                around = around._replace(radar=there, ends=ends)
             keyframes = path_keyframes(around, self.columns, poses, times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))
@@ -404,11 +428,17 @@ class RoomKeyframes:
         )
 
 
-def nearby_points(blend: Blend, before: PathKeyframes, after: PathKeyframes) -> Nearby:
-    """Return the specular points that are expected at chirps between keyframes."""
-    wanted = np.any(before.seen | after.seen, axis=(2, 3))
-    interval, fraction, line, tx_weight, _ = blend
-    return Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
+def expected_points(
+    blend: Blend, before: PathKeyframes, after: PathKeyframes
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return where specular points are expected at chirps, and which echoes may be seen.
+
+    They are (chirp, echo, 3), in the axes of the parts [m], and (chirp, echo).
+    """
+    at, weight = (blend.interval, blend.line), blend.tx_weight.astype(np.float32)
+    first, last = (np.einsum("cs,csei->cei", weight, own.start[at]) for own in (before, after))
+    wanted = np.any(before.seen | after.seen, axis=(2, 3))[at]
+    return np.asarray(first + blend.fraction[:, None, None] * (last - first)), wanted
 
 
 def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:

@@ -12,8 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.body import Poses
-from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
+from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, nearby_echoes
 from rtradar.kernels.scatter.rooms import LegAntennas, PartPoints, SlabDelays, delayed_lengths
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
@@ -21,7 +20,6 @@ from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
 from rtradar.scatter.multipath.slabs import Passage, Passages, WallResponse
-from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.system.threads import in_threads
 
 Array = NDArray[np.float64]
@@ -65,15 +63,15 @@ class LegImages:
         path: Indices,
         part: Indices,
         poses: ChirpPoses,
-        near: Nearby,
+        near: Array,
         formula: ConductorEcho | None,
     ) -> tuple[Array, Array]:
         """Compute lengths and amplitudes (chirp, rx, echo) of conductors over perfect mirrors [m].
 
-        Each echo has its ``path (echo,)`` and its body part. ``near`` are expected specular points;
-        echoes that are not wanted return nothing. The echo model's ``formula``, if it has one,
-        needs no specular points and computes all echoes. Amplitudes are without regard to
-        polarisation.
+        Each echo has its ``path (echo,)`` and its body part. ``near (chirp, echo, 3)`` are expected
+        specular points, in the axes of the parts [m]; echoes that have 0 there return nothing. The
+        echo model's ``formula``, if it has one, needs no specular points and computes all echoes.
+        Amplitudes are without regard to polarisation.
         """
         shape = (*poses.rx.shape[:2], len(path))
         length, amplitude = np.empty(shape), np.empty(shape)
@@ -155,40 +153,6 @@ class EchoColumns:
             )
             for met in self.met
         ]
-
-    def specular_points(
-        self, ends: ArrayEnds, poses: Poses
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Find the specular points of all echoes, and whether there is one at all.
-
-        Returned are points for the middles of the lines (keyframe, line, echo, 3), world [m]; for
-        the ends of the lines of Tx (keyframe, line, 2, echo, 3), in the axes of the parts [m]; and
-        (keyframe, line, echo) bool.
-        """
-        count, part = len(poses.centres), self.part
-        # The middle of each line of Tx and its ends, all with the middle of the receivers kept.
-        tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
-        rx = np.repeat(ends.rx_middle[:, None], tx.shape[1], axis=1)
-        shape = (count, *tx.shape[:2], len(part))
-        places, exists = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-        for number in np.unique(self.path):
-            chosen, path = np.flatnonzero(self.path == number), self._paths[number]
-            own = part[chosen]
-            from_tx = images(path.out, tx.reshape(-1, 3))
-            to_rx = images(path.back, rx.reshape(-1, 3))
-            centres, frames = (
-                np.repeat(array[:, own], len(from_tx), axis=0)
-                for array in (poses.centres, poses.frames)
-            )
-            antennas = np.tile(from_tx, (count, 1)), np.tile(to_rx, (count, 1))[:, None]
-            _, amplitude, found = solve_specular_points(
-                Geometry(*antennas, centres, frames, poses.semi_axes[own]), points=True
-            )
-            exists[..., chosen] = (np.abs(amplitude) > 0).reshape(*shape[:3], len(own))
-            places[..., chosen, :] = found.reshape(*shape[:3], len(own), 3)
-        away = places[:, :, 1:] - poses.centres[:, None, None, part]
-        starts = np.einsum("keji,klsej->klsei", poses.frames[:, part], away)
-        return places[:, :, 0], starts, exists[:, :, 0]
 
     def lengths(self, legs: LegImages, at: ChirpPoses, points: Array, length: Array) -> Array:
         """Compute the lengths (chirp, rx, column) of all columns [m].

@@ -13,7 +13,7 @@ import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
-from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds, take, times_factor, together, weakest
-from rtradar.scatter.common.polarization import CONDUCTOR, Polarization, Surfaces, over_legs
+from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces, is_shaped
 from rtradar.scatter.common.poses import (
     ChirpPoses,
     EchoModel,
@@ -42,13 +40,12 @@ from rtradar.scatter.multipath.image_paths import (
     reflecting_faces,
     wall_paths,
 )
-from rtradar.scatter.multipath.keyframes import RoomKeyframes, Surroundings, nearby_points
+from rtradar.scatter.multipath.keyframes import RoomKeyframes, Surroundings, expected_points
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.slabs import HALF_SPACE, WallResponse, room_series
 from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.multipath.wall_edges import WallEdges
-from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.system.checks import check_order
 from rtradar.system.threads import in_threads
@@ -57,6 +54,7 @@ from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.occluders import Occluders
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 FIELD_ERROR = 0.02
 """Largest error of the field of an echo over or through a wall, over the sweep, without a limit."""
@@ -74,20 +72,10 @@ _LOOK_EVERY, _LEAST_LOOKS = 5, 25
 number of these."""
 
 
-@runtime_checkable
-class HasFormula(EchoModel, Protocol):
-    """A model with one formula for all echoes: direct ones, and with images those over walls."""
-
-    def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
-        """Compute the echoes of conductors before given antennas.
-
-        Returned are lengths and amplitudes (chirp, rx, part) [m].
-        """
-        ...
-
-
 class RoomModel:
     """A fidelity level in a room; its model of the ``person`` alone is that of free space.
+
+    Free space is a room without walls, with the direct path alone.
 
     ``before(radar)`` builds the model of that level, for conductors before that radar. Radar and
     body are at their positions in the scene; ``materials (part,)`` are those of the parts, by
@@ -95,9 +83,10 @@ class RoomModel:
     legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
     ``variant`` asks for the backend that traces what occludes; None is for no occlusion.
 
-    A model whose class says ``fast_over_walls`` computes the echoes over all paths, with a formula,
-    or by ``specular_echo`` with specular points, which the room follows over walls itself. Of any
-    other level each path has a model before the images of the antennas over its legs. ``paths`` are
+    Of a model that says ``fast_over_walls`` the room takes one formula for the echoes over all
+    paths, ``conductor_echo``, or the direct echoes, one a part, and follows specular points over
+    walls itself. Of any other level each path has a model before the images of the antennas over
+    its legs. ``paths`` are
     all paths, the direct one first, and ``path_names`` theirs; ``faces`` says of each face of
     furniture whether paths lead over it; ``not_followed``, known after `prune`, are the walls whose
     frequency response is not known to `FIELD_ERROR`, with the fraction of the echo power that meets
@@ -119,15 +108,19 @@ class RoomModel:
         check_order(order)
         self._before, self._radar, self._body = before, radar, body
         self._conductor = conductor = before(radar)
-        self.person = over_legs(conductor, radar, body, materials)
         self._fast = bool(getattr(conductor, "fast_over_walls", False))
         self._models: dict[int, EchoModel] = {0: conductor}
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
         room, occluders = None, None
-        self.variant: str | None = None
-        if variant is not None:
+        self.in_free_space = scene.is_empty
+        self.person: EchoModel = self
+        if not scene.is_empty:
+            self.person = in_free_space(lambda _: conductor, radar, body, materials)
+        self.variant: str | None = getattr(conductor, "variant", None)
+        self.traces = bool(getattr(conductor, "traces", False))
+        if variant is not None and not scene.is_empty:
             backend = select(variant)
             self.variant, mi = backend.kind, use(backend)
             room = Occluders(mi, scene)
@@ -153,12 +146,14 @@ class RoomModel:
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages.of(radar, self.paths)
         columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
+        # Of one path it costs little to look from every Tx.
+        ends = ArrayEnds.of(radar, max(map(len, radar.tx_lines)) if scene.is_empty else 2)
         self._around = Surroundings(
             radar,
             walls,
             occluders,
             Surfaces(materials or (CONDUCTOR,) * len(body.part_names), radar),
-            ArrayEnds.of(radar),
+            ends,
             self.paths,
             # A formula alone knows neither polarisation nor occlusion.
             whole_level=not self._fast and getattr(conductor, "traces", True),
@@ -198,36 +193,21 @@ class RoomModel:
         specular points also where they are not seen.
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
-        at, blend, near, factors = self._between_keyframes(chirps)
-        if ghosts:
-            near = near._replace(wanted=np.ones_like(near.wanted))
-        # Lengths and bare amplitudes: direct echoes by the model, the others by images.
-        n_direct, n_echoes = at.centres.shape[1], len(columns.part)
-        empty = *at.rx.shape[:2], n_direct
-        model, formula = self._conductor, None
-        if self._fast and isinstance(model, HasFormula):
-            formula = model.conductor_echo
-        if ghosts:
-            found = [(np.zeros(empty), np.zeros(empty))]
-        elif formula is not None:
-            found = [formula(Geometry.of(at))]
-        else:
-            start = near.take(slice(n_direct)).places()
-            if self._fast:
-                specular: Any = model
-                found = [specular.specular_echo(chirps, at, start)]
-            else:
-                sent = Polarization(self._radar.polarization, at.axes)
-                found = [solve_specular_points(at, start=start, polarization=sent)[:2]]
+        at, blend, (points, wanted), factors = self._between_keyframes(chirps)
+        formula = getattr(self._conductor, "conductor_echo", None) if self._fast else None
+        n_direct, by_model = at.centres.shape[1], self._fast and formula is None
+        wanted |= ghosts
+        wanted[:, :n_direct] &= not (ghosts or by_model)
+        # Lengths and bare amplitudes, as if walls were perfect mirrors.
         there, legs = self._images(at)
-        if n_echoes > n_direct:
-            others = slice(n_direct, n_echoes)
-            own = columns.path[others], columns.part[others]
-            found.append(legs.echoes(*own, there, near.take(others), formula))
-        length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
+        near = points * wanted[..., None]
+        length, bare = legs.echoes(columns.path, columns.part, there, near, formula)
+        if by_model and not ghosts:
+            own = self._conductor.echoes(chirps)
+            length[..., :n_direct], bare[..., :n_direct] = own.length, own.amplitude[0].real
         echo = np.array(columns.echo, dtype=np.int64)
         if columns.delayed:
-            length = columns.lengths(legs, there, near.places(), length)
+            length = columns.lengths(legs, there, points, length)
             # Contiguous, or Numba would compile the same for another layout.
             bare = np.ascontiguousarray(bare[..., echo])
         # Times what walls, the body's surface and occluders leave.
@@ -253,8 +233,8 @@ class RoomModel:
 
     def _between_keyframes(
         self, chirps: NDArray[np.int64]
-    ) -> tuple[ChirpPoses, Blend, Nearby, list[PathFactors]]:
-        """Poses of chirps, where they are between keyframes, specular points, and both factors."""
+    ) -> tuple[ChirpPoses, Blend, tuple[Array, Bools], list[PathFactors]]:
+        """Poses of chirps, where they are between keyframes, `expected_points`, both factors."""
         columns, at = self._columns, chirp_poses(self._radar, self._body, chirps)
         blend, *ends = self._keyframes.around(chirps, at.tx_index)
         factors = [PathFactors(end.factor, end.seen) for end in ends]
@@ -264,7 +244,7 @@ class RoomModel:
             factors = [
                 own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
             ]
-        return at, blend, nearby_points(blend, *ends), factors
+        return at, blend, expected_points(blend, *ends), factors
 
     @property
     def has_ghost_tones(self) -> bool:
@@ -288,14 +268,14 @@ class RoomModel:
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
         columns = self._columns
-        at, blend, near, factors = self._between_keyframes(chirps)
+        at, blend, (points, _), factors = self._between_keyframes(chirps)
         # The first keyframes find which echoes slabs delay, so that columns are counted after them.
         echo = np.array(columns.echo)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
         if columns.delayed:
             there, legs = self._images(at)
-            extra = columns.lengths(legs, there, near.places(), extra)
-        nodes = self._around.walls.frequency
+            extra = columns.lengths(legs, there, points, extra)
+        around, nodes = self._around, self._around.walls.frequency
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         in_threads(path_amplitudes, len(extra), np.ones(extra.shape), *factors, blend, left)
         found = []
@@ -304,10 +284,15 @@ class RoomModel:
             # Each of its echoes in each column of its part.
             column = np.flatnonzero(columns.path[echo] == path)
             which, place = np.nonzero(own.part[:, None] == columns.part[echo[column]])
-            factor, column = (nodes, left[..., column[place]]), column[place]
+            column = column[place]
+            factor = left[..., column]
+            if not around.surfaces.conduct:
+                # Each further bounce, wherever it is, takes what one straight on does.
+                straight = around.surfaces.straight[own.part[which]]
+                factor = factor * straight ** (own.bounces[which] - 1)
             found.append(
                 replace(
-                    times_factor(take(own, which), *factor),
+                    times_factor(take(own, which), nodes, factor),
                     length=own.length[..., which] + extra[..., column],
                     bounces=own.bounces[which] + self.paths[path].order,
                     path=np.full(len(which), path),
@@ -385,6 +370,20 @@ class RoomModel:
         self._keyframes.restrict(worth, keep)
         self._keyframes.look_ahead(n_chirps)
         return summaries
+
+
+def in_free_space(
+    before: Callable[[Radar], EchoModel], radar: Radar, body: Body, materials: Sequence[str] = ()
+) -> EchoModel:
+    """Return the model of a level without a room, for the parameters of `RoomModel`.
+
+    Conductors before isotropic antennas are the level's own; patterns and materials are those of a
+    room without walls.
+    """
+    shaped = is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna)
+    if not shaped and set(materials) <= {CONDUCTOR}:
+        return before(radar)
+    return RoomModel(before, Scene(), radar, body, materials)
 
 
 def _places(radar: Radar) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from references.cases import OfEach, Pair, filled, kernel_case
-from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
+from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, nearby_echoes
 from rtradar.kernels.scatter.specular_point import (
     _NO_BISECTOR,
     ROOT_PI,
@@ -111,10 +111,7 @@ def _nearby(wide_m: float) -> Pair:
     at.rx[0] = np.linspace(-wide_m, wide_m, 8)[:, None] * [0.0, 0.5, 0.1]
     points = solve_reference(at._replace(rx=at.rx.mean(axis=1, keepdims=True)))[2][0, 0]
     local = np.einsum("pji,pj->pi", at.frames[0], points - at.centres[0]).astype(np.float32)
-    places = np.broadcast_to(local, (1, 1, 2, 21, 3)).copy()
-    ends = np.broadcast_to([0.5, 0.5], (5, 2)).copy()
-    wanted = np.ones((1, 1, 21), dtype=bool)
-    near = Nearby(places, places, wanted, zero, zero, np.linspace(0, 1, 5), ends)
+    near = np.repeat(local[None], 5, axis=0)
     rx = np.ascontiguousarray(at.rx[None, :1].swapaxes(2, 3))
     middle = at.rx.mean(axis=1)[None]
     images = Images(at.tx[None], rx, middle, 0 * part, 0 * part, part)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from references.specular_point import bisected, nearby_echoes_reference
-from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
+from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, nearby_echoes
 from rtradar.kernels.scatter.specular_point import Geometry
 
 Array = NDArray[np.float64]
@@ -27,14 +27,12 @@ POINT = bisected(Geometry(TX[None], MIDDLE[None, None], *BODY))[0][0, 0, 0]
 
 def nearby(start: Array, *wanted: bool) -> tuple[int, Array, Array]:
     """Number of searches, and lengths and returns (2, rx, echo), found and expected."""
-    near = np.broadcast_to(start.astype(np.float32), (1, 1, 2, len(wanted), 3)).copy()
+    near = (start * np.array(wanted)[:, None])[None].astype(np.float32)
     zero, each = np.zeros(1, dtype=np.int64), np.zeros(len(wanted), dtype=np.int64)
-    ends = np.array([[1.0, 0.0]])
-    begins = Nearby(near, near, np.array([[wanted]]), zero, zero, np.zeros(1), ends)
     antennas = TX[None, None], np.ascontiguousarray(RX.T)[None, None], MIDDLE[None, None]
     images = Images(*antennas, each, each, each)
     out = np.empty((2, 1, len(RX), len(wanted)))
-    searched = nearby_echoes(0, 1, images, zero, BODY, begins, *out)
+    searched = nearby_echoes(0, 1, images, zero, BODY, near, *out)
     return searched, out[:, 0], np.array(nearby_echoes_reference(images, zero, BODY))[:, 0]
 
 

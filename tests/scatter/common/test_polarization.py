@@ -18,9 +18,10 @@ from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import (
     Polarization,
     antenna_field,
+    bisector,
     body_material,
     body_reflection,
-    material_factor,
+    over_copolar,
     sent_field,
 )
 from rtradar.scene import material
@@ -34,6 +35,17 @@ CONDUCTOR = material("perfect-conductor").eta(np.array([14e9]))
 
 def unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+
+
+def material_factor(
+    to_tx: Array, to_rx: Array, eta: NDArray[np.complex128], polarization: Polarization
+) -> NDArray[np.complex128]:
+    """Co-polar echo over that of a perfect conductor of the same shape, (node, ...)."""
+    tx, rx = unit(to_tx), unit(to_rx)
+    sent, received = antenna_field(-tx, polarization), antenna_field(-rx, polarization)
+    field = np.broadcast_to(sent.astype(np.complex128), (len(eta), *sent.shape))
+    back = -np.sum(received * body_reflection(field, -tx, bisector(tx, rx), eta), axis=-1)
+    return over_copolar(back, tx, rx, polarization)
 
 
 def incidence(angle: float) -> tuple[Array, Array, Array, Array]:
