@@ -32,9 +32,9 @@ from rtradar.scatter.common.poses import (
     keyframe_step,
     keyframe_time,
 )
-from rtradar.scatter.specular_points import solve_specular_points
+from rtradar.scatter.specular_points import sees, solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
-from rtradar.system.threads import thread_map
+from rtradar.system.threads import in_threads
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
@@ -47,7 +47,6 @@ LEAST_DB = -30.0
 _FADE_DB = 3.0
 """Power above that within which a pair fades in, so that none begins at once."""
 
-_CHIRPS_PER_THREAD = 16
 _KEPT, _PASSING = 2048, 2
 
 
@@ -103,12 +102,8 @@ def solve_doubles(
     options = Options(horizontal=polarization.kind == "h", spreading=spreading)
     above = np.empty(at.tx.shape)
     above[:] = polarization.up
-
-    def some(begin: int) -> None:
-        end = min(begin + _CHIRPS_PER_THREAD, len(at.tx))
-        solve_double(begin, end, at, above, pairs, first, options, length, amplitude, points)
-
-    thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
+    given = at, above, pairs, first, options, length, amplitude, points
+    in_threads(solve_double, len(at.tx), *given)
     return Doubles(length, amplitude, points)
 
 
@@ -140,18 +135,11 @@ def _touch(centres: Array, frames: Array, axes: Array) -> NDArray[np.bool_]:
 
 def legs_clear(tracer: BodyTracer, tx: Array, rx: Array, points: Array, pairs: Indices) -> Visible:
     """Whether no part hides any of the three legs, (chirp, rx, pair) bool, of the posed body."""
-    shape = points.shape[:3]
-    sent, received = (points[..., end, :].reshape(-1, 3) for end in (0, 1))
-    own, other = (np.broadcast_to(pairs[:, end], shape).ravel() for end in (0, 1))
+    sent, received, (own, other) = points[..., 0, :], points[..., 1, :], pairs.T
     middle = (sent + received) / 2
-    from_tx, from_rx = (
-        np.broadcast_to(antennas, (*shape, 3)).reshape(-1, 3)
-        for antennas in (tx[:, None, None], rx[:, :, None])
-    )
-    lines = [(from_tx, sent, own), (middle, sent, own)]
-    lines += [(middle, received, other), (from_rx, received, other)]
-    clear = [tracer.sees(*line).reshape(shape) for line in lines]
-    return np.asarray(np.all(clear, axis=0))
+    lines = [(tx[:, None, None], sent, own), (middle, sent, own)]
+    lines += [(middle, received, other), (rx[:, :, None], received, other)]
+    return np.asarray(np.all([sees(tracer, *line) for line in lines], axis=0))
 
 
 def double_scattering(

@@ -39,13 +39,12 @@ from rtradar.scatter.common.poses import (
     keyframe_step,
     keyframe_time,
 )
-from rtradar.system.threads import thread_map
+from rtradar.system.threads import in_threads
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
-
-_CHIRPS_PER_THREAD = 64
-"""Fewer cost more for waking threads than for the work, the more so while Mitsuba's are awake."""
+Indices = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 
 
 def solve_specular_points(
@@ -76,13 +75,8 @@ def solve_specular_points(
     above, horizontal = np.zeros(at.tx.shape), False
     if polarization is not None:
         above[:], horizontal = polarization.up, polarization.kind == "h"
-    options = Options(horizontal, spreading)
-
-    def some(first: int) -> None:
-        last = min(first + _CHIRPS_PER_THREAD, len(at.tx))
-        solve(first, last, at, above, begin, options, length, amplitude, point)
-
-    thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
+    given = at, above, begin, Options(horizontal, spreading)
+    in_threads(solve, len(at.tx), *given, length, amplitude, point)
     return length, amplitude, point
 
 
@@ -106,24 +100,25 @@ class Keyframe(NamedTuple):
     start: NDArray[np.float64]
 
 
-def unobstructed(
-    tracer: BodyTracer,
-    tx: NDArray[np.float64],
-    rx: NDArray[np.float64],
-    points: NDArray[np.float64],
-) -> NDArray[np.bool_]:
+def sees(tracer: BodyTracer, places: Array, points: Array, parts: Indices) -> Bools:
+    """Whether no other part of the posed body is between places and points on some parts.
+
+    Both are (..., 3), world [m], and broadcast against each other; the result and ``parts`` are
+    (...).
+    """
+    starts, ends = np.broadcast_arrays(places, points)
+    own = np.broadcast_to(parts, ends.shape[:-1])
+    return tracer.sees(starts.reshape(-1, 3), ends.reshape(-1, 3), own.ravel()).reshape(own.shape)
+
+
+def unobstructed(tracer: BodyTracer, tx: Array, rx: Array, points: Array) -> Bools:
     """Whether no other part of the posed body occludes either leg, (chirp, rx, part) bool.
 
     The legs run from ``tx (chirp, 3)`` and ``rx (chirp, rx, 3)`` to one point on each part,
     ``points (chirp, rx, part, 3)``, world [m].
     """
-    own = np.broadcast_to(np.arange(points.shape[2]), points.shape[:3]).ravel()
-    targets = points.reshape(-1, 3)
-    from_tx, from_rx = (
-        tracer.sees(np.broadcast_to(antennas, points.shape).reshape(-1, 3), targets, own)
-        for antennas in (tx[:, None, None], rx[:, :, None])
-    )
-    return (from_tx & from_rx).reshape(points.shape[:3])
+    given = points, np.arange(points.shape[2])
+    return sees(tracer, tx[:, None, None], *given) & sees(tracer, rx[:, :, None], *given)
 
 
 class SpecularVisibility:
@@ -160,23 +155,19 @@ class SpecularVisibility:
         between two keyframes that differ; and the specular points (chirp, part, 3) of one pair at
         the keyframe before, in the parts' axes [m].
         """
-        chirps = np.asarray(chirps, dtype=np.int64)
-        parts = len(self._body.part_names)
-        weight = np.empty((len(chirps), self._radar.n_rx, parts))
-        start = np.empty((len(chirps), parts, 3))
-        tx = self._radar.tx_of_chirp(chirps)
-        intervals, rest = keyframe_before(self._radar, chirps, self._step)
-        for interval in np.unique(intervals):
-            inside = np.flatnonzero(intervals == interval)
-            first = int(interval) * self._step
-            before = self._kept.get(first, partial(self.keyframe, first))
-            weight[inside], start[inside] = before.visible[tx[inside]], before.start
-            if (rest[inside] > 0).any():
-                number = first + self._step
-                after = self._kept.get(number, partial(self.keyframe, number)).visible[tx[inside]]
-                ramp = smoothstep(rest[inside] / self._step)[:, None, None]
-                weight[inside] = (1 - ramp) * weight[inside] + ramp * after
-        return weight, start
+        before, rest = keyframe_before(self._radar, chirps, self._step)
+        # At a keyframe the one after it does not matter.
+        numbers, place = np.unique([before, before + (rest > 0)], return_inverse=True)
+        kept = [
+            self._kept.get(number, partial(self.keyframe, number * self._step))
+            for number in numbers.tolist()
+        ]
+        place = place.reshape(2, -1)
+        visible = np.stack([one.visible for one in kept])
+        first, last = visible[place, self._radar.tx_of_chirp(chirps)]
+        ramp = smoothstep(rest / self._step)[:, None, None]
+        start = np.stack([one.start for one in kept])[place[0]]
+        return (1 - ramp) * first + ramp * last, start
 
 
 # -- the second term -------------------------------------------------------------------------------

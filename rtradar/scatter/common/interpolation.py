@@ -98,36 +98,26 @@ class ArrayEnds:
         """Return the ends of the lines of this radar at rest, for so many places along its Tx."""
         lines = _tx_lines(radar)
         line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, places))
-        for number, (line, _) in enumerate(lines):
+        rx_weight = np.zeros((radar.n_tx, radar.n_rx, 2 * len(lines[0][1])))
+        found = []
+        for number, (line, groups) in enumerate(lines):
+            tx, rx = radar.tx[line], radar.rx[radar.rx_of_tx[line[0]]]
             line_of_tx[line], tx_weight[line] = number, _straight(len(line), places)
-        rx = [radar.rx[radar.rx_of_tx[line[0]]] for line, _ in lines]
-        weights = np.zeros((len(lines), radar.n_rx, 2 * len(lines[0][1])))
-        for weight, (_, groups) in zip(weights, lines, strict=True):
             for column, group in enumerate(groups):
-                weight[group, 2 * column : 2 * column + 2] = _straight(len(group))
-        ends = [
-            np.concatenate([kept[group[[0, -1]]] for group in groups])
-            for kept, (_, groups) in zip(rx, lines, strict=True)
-        ]
-        return cls(
-            line_of_tx,
-            tx=np.array(
-                [np.linspace(radar.tx[line[0]], radar.tx[line[-1]], places) for line, _ in lines]
-            ),
-            rx=np.array(ends),
-            tx_middle=np.array([radar.tx[line].mean(axis=0) for line, _ in lines]),
-            rx_middle=np.array([kept.mean(axis=0) for kept in rx]),
-            tx_weight=tx_weight,
-            rx_weight=weights[line_of_tx],
-        )
+                own = slice(2 * column, 2 * column + 2)
+                rx_weight[line[:, None], group, own] = _straight(len(group))
+            rx_ends = np.concatenate([rx[group[[0, -1]]] for group in groups])
+            tx_ends = np.linspace(tx[0], tx[-1], places)
+            found.append((tx_ends, rx_ends, tx.mean(axis=0), rx.mean(axis=0)))
+        return cls(line_of_tx, *map(np.array, zip(*found, strict=True)), tx_weight, rx_weight)
 
 
 @lru_cache(maxsize=_KEPT_NODES)
 def shadow_nodes(radar: Radar, along_tx: int = 2, along_rx: int = 1) -> tuple[Array, Array, Array]:
     """Return places along the lines of Tx and those of Rx (node, 3) [m], and their weights.
 
-    One place is the middle of a line, two are its ends; with as many as antennas or more each
-    antenna is one. The weights of the places in each antenna, (tx, node) and (rx, node), follow.
+    One place is the middle of a line, more are spread from end to end, as many as antennas at most.
+    The weights of the places in each antenna, (tx, node) and (rx, node), follow.
     The radar is at rest.
     """
     blocks, found = [], []
@@ -136,12 +126,9 @@ def shadow_nodes(radar: Radar, along_tx: int = 2, along_rx: int = 1) -> tuple[Ar
         (radar.rx, radar.rx_lines, along_rx),
     ):
         for line in lines:
-            if count >= len(line):
-                blocks.append((antennas[line], np.eye(len(line))))
-            elif count == 1:
-                blocks.append((antennas[line].mean(axis=0)[None], np.ones((len(line), 1))))
-            else:
-                blocks.append((antennas[line[[0, -1]]], _straight(len(line))))
+            own, places = antennas[line], min(count, len(line))
+            ends = np.linspace(own[0], own[-1], places) if places > 1 else own.mean(axis=0)[None]
+            blocks.append((ends, _straight(len(line), places)))
         found.append(np.argsort(np.concatenate(lines)))
     weights = np.split(block_diag(*(weight for _, weight in blocks)), [radar.n_tx])
     tx, rx = (own[order] for own, order in zip(weights, found, strict=True))

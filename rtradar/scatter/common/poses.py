@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
@@ -271,16 +270,15 @@ class KeyframeCache(Generic[_Key, _Value]):
     def __init__(self, stay: int, passing: int) -> None:
         self.stay, self._passing = stay, passing
         self._staying: dict[_Key, _Value] = {}
-        self._later: OrderedDict[_Key, _Value] = OrderedDict()
+        self._later: dict[_Key, _Value] = {}
 
     def __contains__(self, key: object) -> bool:
         return key in self._staying or key in self._later
 
     def __getitem__(self, key: _Key) -> _Value:
-        if key in self._staying:
-            return self._staying[key]
-        self._later.move_to_end(key)
-        return self._later[key]
+        if key in self._later:
+            self._later[key] = self._later.pop(key)  # now the last to go
+        return self._later[key] if key in self._later else self._staying[key]
 
     def get(self, key: _Key, find: Callable[[], _Value]) -> _Value:
         """Return the value of a key, which is found now if it is not known."""
@@ -290,21 +288,13 @@ class KeyframeCache(Generic[_Key, _Value]):
 
     def keep(self, key: _Key, value: _Value) -> None:
         """Keep the value of a key that is not known."""
-        if len(self._staying) < self.stay:
-            self._staying[key] = value
-        else:
-            self._later[key] = value
-            if len(self._later) > self._passing:
-                self._later.popitem(last=False)
+        (self._staying if len(self._staying) < self.stay else self._later)[key] = value
+        if len(self._later) > self._passing:
+            del self._later[next(iter(self._later))]
 
-    def replace(self, new: Callable[[_Value], _Value]) -> None:
-        """Replace every value by a new one."""
-        for values in (self._staying, self._later):
-            for key, value in values.items():
-                values[key] = new(value)
-
-    def copy(self) -> KeyframeCache[_Key, _Value]:
-        """Return a cache of its own with the same values."""
+    def mapped(self, new: Callable[[_Value], _Value]) -> KeyframeCache[_Key, _Value]:
+        """Return a cache of its own with new values in place of all."""
         other = KeyframeCache[_Key, _Value](self.stay, self._passing)
-        other._staying, other._later = self._staying.copy(), self._later.copy()
+        for here, there in ((self._staying, other._staying), (self._later, other._later)):
+            there.update((key, new(value)) for key, value in here.items())
         return other

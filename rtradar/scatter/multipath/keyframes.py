@@ -363,7 +363,7 @@ class RoomKeyframes:
     def direct(self) -> RoomKeyframes:
         """Return those of the direct echoes alone, with what is already known of them."""
         other, keep = copy.copy(self), self.columns.direct
-        other.columns, other._cache = copy.copy(self.columns), self._cache.copy()
+        other.columns = copy.copy(self.columns)
         other.restrict(keep[np.array(self.columns.echo)], keep)
         return other
 
@@ -419,7 +419,7 @@ class RoomKeyframes:
     def restrict(self, column: NDArray[np.bool_], echo: NDArray[np.bool_]) -> None:
         """Leave out all other columns and all other echoes for good."""
         self.columns.keep(column, echo)
-        self._cache.replace(
+        self._cache = self._cache.mapped(
             lambda own: PathKeyframes(
                 _widened(own.factor, len(column))[..., column].copy(),
                 own.seen[..., echo].copy(),
