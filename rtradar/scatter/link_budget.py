@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.people import OnePart
-from rtradar.conventions import MINIMUM_KA, SPEED_OF_LIGHT_MPS
+from rtradar.conventions import MINIMUM_KA
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import at_nodes
+from rtradar.scatter.common.interpolation import field_of
 from rtradar.scatter.common.poses import EchoModel, chirps_by_steps, keyframe_step
 from rtradar.scatter.validity import (
     Inside,
@@ -89,7 +89,8 @@ def link_budget(
         ever_sampled[body.owner[echoes.part[inside.any(axis=(0, 1))]]] = True
         by_part = _by_part(echoes, len(body.part_names))
         powers.append(by_part)
-        fields.append(_field(echoes, radar.centre_frequency_hz).view(np.float64))
+        (field,) = field_of(echoes, np.array([radar.centre_frequency_hz]))
+        fields.append(field.astype(np.complex128).view(np.float64))
         others.look(times, body.at(times), by_part)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
         concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
@@ -148,13 +149,6 @@ def _by_part(echoes: Echoes, n_parts: int) -> Array:
     by_part = np.zeros((len(power), n_parts))
     np.add.at(by_part.T, echoes.part, power.T)
     return by_part
-
-
-def _field(echoes: Echoes, frequency_hz: float) -> NDArray[np.complex128]:
-    """Sum of the echoes (chirp, rx) at one frequency [m]."""
-    (amplitude,) = at_nodes(echoes.amplitude, echoes.frequency, np.array([frequency_hz]))
-    turns = np.exp(2j * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length)
-    return np.ascontiguousarray((amplitude * turns).sum(axis=-1), dtype=np.complex128)
 
 
 def _reference_power(radar: Radar, spreading: bool) -> float:

@@ -14,7 +14,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import together
+from rtradar.scatter.common.interpolation import field_of, together
 from rtradar.scatter.common.poses import EchoModel, account_of, one_echo_a_part
 from rtradar.scatter.echo_models import build_model, takes_backend
 from rtradar.scatter.multipath.image_paths import WallPath, wall_paths
@@ -144,9 +144,7 @@ class PeopleAndObjects:
 
 def _powers(echoes: Echoes) -> NDArray[np.float64]:
     """Power of echoes (chirp,) [m^2], of which those next to each other add up as fields."""
-    k = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
-    turns = np.exp(1j * k[:, None, None, None] * echoes.length)
-    fields = (echoes.amplitude * turns).sum(axis=3)
+    fields = field_of(echoes, echoes.frequency)
     return np.asarray((np.abs(fields) ** 2).mean(axis=(0, 2)))
 
 

@@ -73,7 +73,7 @@ _KEPT_KEYFRAMES, _PASSING, _KEPT_KNOTS = 512, 64, 8
 _SAMPLES, _STEP_S = 200, 1e-5
 """Instants of a capture at which velocities and distances are looked at, and the time for both."""
 
-_TASKS_AT_ONCE = 16
+_TASKS_AT_ONCE = 4
 
 _COUNT = 8
 _OFFSETS = np.arange(_COUNT) - _COUNT // 2 + 1
@@ -216,7 +216,10 @@ class RigidEchoes:
         knots = PolynomialsInTime(times, self._knot_s)
         count = len(knots.numbers)
         if count * radar.n_tx < len(chirps):
-            field = self._at_knots(knots.numbers.tolist())
+            # Those about the end of a pass serve the next.
+            field = np.stack(
+                [self._knots.get(one, partial(self._knot, one)) for one in knots.numbers.tolist()]
+            )
             used = field.any(axis=(0, 1, 2, 3))
             field = field[..., used]
             amplitude = knots.between(field, tx)
@@ -234,18 +237,10 @@ class RigidEchoes:
             bounces=np.full(len(steps), 1 + self.path.order),
         )
 
-    def _at_knots(self, numbers: list[int]) -> NDArray[np.complex128]:
-        """Amplitudes (knot, tx, rx, node, echo); those about the end of a pass serve the next."""
-        found = {number: self._knots[number] for number in numbers if number in self._knots}
-        missing = [number for number in numbers if number not in found]
-        if missing:
-            n_tx = self._radar.n_tx
-            every = np.repeat(np.array(missing) * self._knot_s, n_tx)
-            field = self._field(every, np.tile(np.arange(n_tx), len(missing)))
-            for number, own in zip(missing, np.split(field, len(missing)), strict=True):
-                found[number] = own.copy()
-                self._knots.keep(number, found[number])
-        return np.stack([found[number] for number in numbers])
+    def _knot(self, number: int) -> NDArray[np.complex128]:
+        """Amplitudes (tx, rx, node, echo) at one knot."""
+        tx = np.arange(self._radar.n_tx)
+        return self._field(np.full(len(tx), number * self._knot_s), tx)
 
     def _pose(self, times: Array) -> tuple[Array, Array]:
         """Rotations (time, 3, 3), and the point of reference (time, 3), world [m]."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 
@@ -224,6 +225,13 @@ def at_nodes(amplitude: NDArray[Any], frequency: Array, nodes: Array) -> NDArray
     # Not by BLAS, whose threads cost more than these few sums.
     pairs = zip(weights.T, amplitude, strict=True)
     return np.asarray(sum(np.multiply.outer(weight, own) for weight, own in pairs))
+
+
+def field_of(echoes: Echoes, frequency: Array) -> NDArray[Any]:
+    """Sum echoes as fields at some frequencies (node,) [Hz], (node, chirp, rx) [m]."""
+    amplitude = at_nodes(echoes.amplitude, echoes.frequency, frequency)
+    turns = 2j * np.pi / SPEED_OF_LIGHT_MPS * frequency[:, None, None, None] * echoes.length
+    return np.asarray((amplitude * np.exp(turns)).sum(axis=-1))
 
 
 def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:

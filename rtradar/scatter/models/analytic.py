@@ -120,15 +120,11 @@ class Analytic(BuiltInModel):
         return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
 
 
-class AnalyticPaper(BuiltInModel):
+class AnalyticPaper(Analytic):
     """`analytic-paper`: range of the centre and plane waves over the array, as in the paper."""
 
-    traces = False
-    relative_cost = 1.0
-
-    def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
-        self._radar, self._body, self._spreading = radar, body, spreading
-        self.variant: str | None = None
+    fast_over_walls = False
+    scattering = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.rooms import Blend, received_from_conductors
+from rtradar.kernels.scatter.rooms import Blend, PathFactors, received_from_conductors
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
@@ -369,26 +369,36 @@ class RoomKeyframes:
 
     def around(
         self, chirps: NDArray[np.int64], tx: NDArray[np.int64]
-    ) -> tuple[Blend, PathKeyframes, PathKeyframes]:
-        """Return where chirps are, and the keyframes before and after each interval.
+    ) -> tuple[Blend, list[PathFactors], Array, NDArray[np.bool_]]:
+        """Return where chirps are between keyframes, and what is known of their echoes.
 
-        ``tx (chirp,)`` are their transmitters.
+        ``tx (chirp,)`` are their transmitters. Returned are the `Blend`; what is left at both ends
+        of each interval; where specular points are expected, in the axes of the parts (chirp, echo,
+        3) [m]; and which echoes may be seen (chirp, echo).
         """
         numbers, rest = keyframe_before(self._around.radar, chirps, self.step)
         starts, interval = np.unique(numbers, return_inverse=True)
         fraction = rest / self.step
         # Where every chirp of an interval is its first, the keyframe after it does not matter.
         stops = starts + (np.bincount(interval, weights=fraction) > 0)
-        found = self._find(np.union1d(starts, stops).tolist())
-        before, after = (
-            _stack([found[number] for number in ends.tolist()], len(self.columns))
-            for ends in (starts, stops)
+        known, ends = self._find(np.union1d(starts, stops).tolist()), self._around.ends
+        line, weight = ends.line_of_tx[tx], ends.tx_weight[tx]
+        factors, points, wanted = (
+            [],
+            [],
+            np.zeros((len(chirps), len(self.columns.path)), dtype=bool),
         )
-        ends = self._around.ends
-        blend = Blend(
-            interval, fraction, ends.line_of_tx[tx], ends.tx_weight[tx], ends.rx_weight[tx]
-        )
-        return blend, before, after
+        for numbers in (starts, stops):
+            own = [known[number] for number in numbers.tolist()]
+            factor = np.stack([_widened(one.factor, len(self.columns)) for one in own])
+            seen, start = (np.stack(arrays) for arrays in list(zip(*own, strict=True))[1:])
+            # Whole arrays, or Numba would compile the same for another layout.
+            factors.append(PathFactors(factor, np.take(seen, self.columns.echo, axis=-1)))
+            wanted |= seen.any(axis=(2, 3))[interval, line]
+            points.append(np.einsum("cs,csei->cei", weight, start[interval, line]))
+        blend = Blend(interval, fraction, line, weight, ends.rx_weight[tx])
+        first, last = points
+        return blend, factors, first + fraction[:, None, None] * (last - first), wanted
 
     def look_ahead(self, n_chirps: int) -> None:
         """Compute the keyframes of a capture that stay, many at a time."""
@@ -426,25 +436,6 @@ class RoomKeyframes:
                 own.start[..., echo, :].copy(),
             )
         )
-
-
-def expected_points(
-    blend: Blend, before: PathKeyframes, after: PathKeyframes
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return where specular points are expected at chirps, and which echoes may be seen.
-
-    They are (chirp, echo, 3), in the axes of the parts [m], and (chirp, echo).
-    """
-    at, weight = (blend.interval, blend.line), blend.tx_weight.astype(np.float32)
-    first, last = (np.einsum("cs,csei->cei", weight, own.start[at]) for own in (before, after))
-    wanted = np.any(before.seen | after.seen, axis=(2, 3))[at]
-    return np.asarray(first + blend.fraction[:, None, None] * (last - first)), wanted
-
-
-def _stack(keyframes: list[PathKeyframes], columns: int) -> PathKeyframes:
-    factor = np.stack([_widened(own.factor, columns) for own in keyframes])
-    seen, start = (np.stack(arrays) for arrays in list(zip(*keyframes, strict=True))[1:])
-    return PathKeyframes(factor, seen, start)
 
 
 def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:

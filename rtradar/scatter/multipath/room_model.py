@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
+from rtradar.kernels.scatter.rooms import path_amplitudes
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds, take, times_factor, together, weakest
 from rtradar.scatter.common.polarization import CONDUCTOR, Surfaces, is_shaped
@@ -40,7 +40,7 @@ from rtradar.scatter.multipath.image_paths import (
     reflecting_faces,
     wall_paths,
 )
-from rtradar.scatter.multipath.keyframes import RoomKeyframes, Surroundings, expected_points
+from rtradar.scatter.multipath.keyframes import RoomKeyframes, Surroundings
 from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.slabs import HALF_SPACE, WallResponse, room_series
@@ -193,7 +193,8 @@ class RoomModel:
         specular points also where they are not seen.
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
-        at, blend, (points, wanted), factors = self._between_keyframes(chirps)
+        at = chirp_poses(self._radar, self._body, chirps)
+        blend, factors, points, wanted = self._keyframes.around(chirps, at.tx_index)
         formula = getattr(self._conductor, "conductor_echo", None) if self._fast else None
         n_direct, by_model = at.centres.shape[1], self._fast and formula is None
         wanted |= ghosts
@@ -231,21 +232,6 @@ class RoomModel:
             path=columns.path[echo],
         )
 
-    def _between_keyframes(
-        self, chirps: NDArray[np.int64]
-    ) -> tuple[ChirpPoses, Blend, tuple[Array, Bools], list[PathFactors]]:
-        """Poses of chirps, where they are between keyframes, `expected_points`, both factors."""
-        columns, at = self._columns, chirp_poses(self._radar, self._body, chirps)
-        blend, *ends = self._keyframes.around(chirps, at.tx_index)
-        factors = [PathFactors(end.factor, end.seen) for end in ends]
-        if columns.delayed:
-            echo = np.array(columns.echo)
-            # Contiguous, or Numba would compile the same for another layout.
-            factors = [
-                own._replace(seen=np.ascontiguousarray(own.seen[..., echo])) for own in factors
-            ]
-        return at, blend, expected_points(blend, *ends), factors
-
     @property
     def has_ghost_tones(self) -> bool:
         """Whether `ghosts` can be asked for, and there are any: not before a radar that moves."""
@@ -268,7 +254,8 @@ class RoomModel:
     def _by_paths(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes of the models of all paths, times what walls, materials and occluders leave."""
         columns = self._columns
-        at, blend, (points, _), factors = self._between_keyframes(chirps)
+        at = chirp_poses(self._radar, self._body, chirps)
+        blend, factors, points, _ = self._keyframes.around(chirps, at.tx_index)
         # The first keyframes find which echoes slabs delay, so that columns are counted after them.
         echo = np.array(columns.echo)
         extra = np.zeros((*at.rx.shape[:2], len(columns)))
