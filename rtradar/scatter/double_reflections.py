@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
 from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.double_reflections import solve_double
 from rtradar.kernels.scatter.specular_point import Geometry, Options
@@ -27,6 +26,7 @@ from rtradar.scatter.common.poses import (
     BuiltInModel,
     ChirpPoses,
     KeyframeCache,
+    check_option,
     chirp_poses,
     keyframe_before,
     keyframe_step,
@@ -74,11 +74,8 @@ class TwoBounceModel(BuiltInModel):
 
 def check_bounces(fidelity: str, bounces: int) -> None:
     """Raise InputError unless a level of one path a part is asked for one or two reflections."""
-    if bounces not in (1, 2):
-        raise InputError(
-            f"{fidelity}: bounces = {bounces!r}; it must be 1, or 2 for reflections from part to "
-            "part; 'rays' takes more"
-        )
+    allowed = "1, or 2 for reflections from part to part; 'rays' takes more"
+    check_option(fidelity, "bounces", bounces, bounces in (1, 2), allowed)
 
 
 def solve_doubles(

@@ -87,12 +87,12 @@ class ArrayEnds:
     """
 
     line_of_tx: Indices
+    tx_weight: Array
+    rx_weight: Array
     tx: Array
     rx: Array
     tx_middle: Array
     rx_middle: Array
-    tx_weight: Array
-    rx_weight: Array
 
     @classmethod
     def of(cls, radar: Radar, places: int = 2) -> ArrayEnds:
@@ -110,7 +110,8 @@ class ArrayEnds:
             rx_ends = np.concatenate([rx[group[[0, -1]]] for group in groups])
             tx_ends = np.linspace(tx[0], tx[-1], places)
             found.append((tx_ends, rx_ends, tx.mean(axis=0), rx.mean(axis=0)))
-        return cls(line_of_tx, *map(np.array, zip(*found, strict=True)), tx_weight, rx_weight)
+        ends = (np.array(every) for every in zip(*found, strict=True))
+        return cls(line_of_tx, tx_weight, rx_weight, *ends)
 
 
 @lru_cache(maxsize=_KEPT_NODES)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 
 
@@ -48,6 +49,12 @@ class BuiltInModel:
     scattering: ClassVar[Callable[..., NDArray[np.complex128]] | None] = None
     """Scattering length of one target (target, tx, rx, frequency, polarization, options of the
     model), which `scattering_length` calls; None where there is none."""
+
+
+def check_option(level: str, option: str, value: object, fine: bool, allowed: str) -> None:
+    """Raise an `InputError` where an option of a level is not ``fine``, with what is allowed."""
+    if not fine:
+        raise InputError(f"{level}: {option} = {value!r}; it must be {allowed}")
 
 
 def owners_of(body: Body) -> NDArray[np.int64]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,18 @@ def plane_wave_echo(
     return length, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
+def _scattering_length(
+    target: Ellipsoids,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    polarization: Literal["v", "h"],
+) -> NDArray[np.complex128]:
+    """Scattering length of one target, alike in both polarisations."""
+    at = target_geometry(target, tx, rx)
+    return sum_of_echoes(*far_field_echo(at), at, frequency)
+
+
 class Analytic(BuiltInModel):
     """`analytic`: closed-form cross-section at the specular range of each antenna.
 
@@ -78,22 +91,13 @@ class Analytic(BuiltInModel):
     traces = False
     fast_over_walls = True
     relative_cost = 1.0
+    scattering: ClassVar[Callable[..., NDArray[np.complex128]] | None] = staticmethod(
+        _scattering_length
+    )
 
     def __init__(self, radar: Radar, body: Body, *, spreading: bool = True) -> None:
         self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target, alike in both polarisations."""
-        at = target_geometry(target, tx, rx)
-        return sum_of_echoes(*far_field_echo(at), at, frequency)
 
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.

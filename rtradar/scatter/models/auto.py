@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, owners_of
+from rtradar.scatter.common.poses import BuiltInModel, check_option, owners_of
 from rtradar.scatter.models.physical_optics import PhysicalOptics, Reference
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.target import ellipsoid_areas
@@ -72,17 +71,11 @@ def choose_level(
 
     An `InputError` is raised where a tolerance is out of range.
     """
-    if not (math.isfinite(tolerance_db) and tolerance_db > 0):
-        raise InputError(
-            f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db, --advise)"
-        )
-    if tolerance_complex is not None and not (
-        math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX
-    ):
-        raise InputError(
-            f"auto: tolerance_complex = {tolerance_complex}; it must be at least "
-            f"{_LEAST_COMPLEX}, a fraction of the rms field (--tolerance-complex)"
-        )
+    allowed_db = "positive (--tolerance-db, --advise)"
+    check_option("auto", "tolerance_db", tolerance_db, 0 < tolerance_db < math.inf, allowed_db)
+    fine = tolerance_complex is None or _LEAST_COMPLEX <= tolerance_complex < math.inf
+    least = f"at least {_LEAST_COMPLEX}, a fraction of the rms field (--tolerance-complex)"
+    check_option("auto", "tolerance_complex", tolerance_complex, fine, least)
     # A decibel down is a smaller fraction than one up.
     allowed = _FIELD_OVER_POWER * (1 - 10 ** (-tolerance_db / 10))
     if tolerance_complex is not None:

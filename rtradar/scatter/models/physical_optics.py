@@ -16,7 +16,13 @@ from rtradar.body import Body, Ellipsoids, Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, has_mesh, one_echo_a_part
+from rtradar.scatter.common.poses import (
+    BuiltInModel,
+    check_option,
+    chirp_poses,
+    has_mesh,
+    one_echo_a_part,
+)
 from rtradar.scatter.double_reflections import (
     DoubleReflections,
     TwoBounceModel,
@@ -124,15 +130,12 @@ class PhysicalOptics(TwoBounceModel):
         bounces: int = 1,
     ) -> None:
         check_bounces("physical-optics", bounces)
-        if frequencies not in range(1, _MOST_FREQUENCIES + 1):
-            raise InputError(
-                f"physical-optics: frequencies = {frequencies}; it must be a whole number from "
-                f"1 to {_MOST_FREQUENCIES}"
-            )
+        allowed = f"a whole number from 1 to {_MOST_FREQUENCIES}"
+        fine = frequencies in range(1, _MOST_FREQUENCIES + 1)
+        check_option("physical-optics", "frequencies", frequencies, fine, allowed)
         positive = {"anchor_s": anchor_s, "tolerance": tolerance, "unevenness": unevenness}
         for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"physical-optics: {name} = {value}; it must be positive")
+            check_option("physical-optics", name, value, 0 < value < math.inf, "positive")
         self._radar, self._body = radar, body
         self._surface = facets_of_people(
             "physical-optics",

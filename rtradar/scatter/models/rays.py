@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
 from rtradar.kernels.elementary import cubic_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
@@ -22,6 +21,7 @@ from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.common.poses import (
     BuiltInModel,
     KeyframeCache,
+    check_option,
     chirp_poses,
     has_mesh,
     keyframe_before,
@@ -121,12 +121,10 @@ class _Ellipsoids:
 
 def check_options(rays_per_wavelength: float, bounces: int) -> None:
     """Raise an `InputError` where an option is out of range."""
-    if not 0.1 <= rays_per_wavelength <= 100:
-        raise InputError(
-            f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100"
-        )
-    if not (isinstance(bounces, int) and 1 <= bounces <= 10):
-        raise InputError(f"rays: bounces = {bounces}; allowed are 1 to 10")
+    fine = 0.1 <= rays_per_wavelength <= 100
+    check_option("rays", "rays_per_wavelength", rays_per_wavelength, fine, "from 0.1 to 100")
+    fine = isinstance(bounces, int) and 1 <= bounces <= 10
+    check_option("rays", "bounces", bounces, fine, "a whole number from 1 to 10")
 
 
 def _alike(points: Array) -> list[tuple[Array, NDArray[np.int64]]]:
@@ -204,8 +202,8 @@ class Rays(BuiltInModel):
         check_options(rays_per_wavelength, bounces)
         if anchor_s is None:
             anchor_s = radar.wavelength_m / _OF_MESHES_MPS if has_mesh(body) else ANCHOR_S
-        if not 0 <= anchor_s < 1:
-            raise InputError(f"rays: anchor_s = {anchor_s}; allowed are 0 (every chirp) to 1 s")
+        fine = 0 <= anchor_s < 1
+        check_option("rays", "anchor_s", anchor_s, fine, "from 0 (every chirp) to 1 s")
         self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces
         self._stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from rtradar.body import Body, Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.common.poses import chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import check_option, chirp_poses, one_echo_a_part
 from rtradar.scatter.double_reflections import (
     DoubleReflections,
     TwoBounceModel,
@@ -38,15 +37,10 @@ Visibility = Literal["sharp", "gradual"]
 def _check(bounces: int, terms: int, visibility: str) -> None:
     """Raise InputError where there is no such option."""
     check_bounces("specular", bounces)
-    if terms not in (1, 2):
-        raise InputError(
-            f"specular: terms = {terms!r}; it must be 1, for geometric optics, or 2 for the next "
-            "term in powers of 1/k as well"
-        )
-    if visibility not in (allowed := get_args(Visibility)):
-        raise InputError(
-            f"specular: visibility = {visibility!r} is unknown; allowed: {', '.join(allowed)}"
-        )
+    allowed = "1, for geometric optics, or 2 for the next term in powers of 1/k as well"
+    check_option("specular", "terms", terms, terms in (1, 2), allowed)
+    known = get_args(Visibility)
+    check_option("specular", "visibility", visibility, visibility in known, " or ".join(known))
 
 
 def _scattering_length(

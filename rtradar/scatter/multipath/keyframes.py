@@ -394,7 +394,7 @@ class RoomKeyframes:
             seen, start = (np.stack(arrays) for arrays in list(zip(*own, strict=True))[1:])
             # Whole arrays, or Numba would compile the same for another layout.
             factors.append(PathFactors(factor, np.take(seen, self.columns.echo, axis=-1)))
-            wanted |= seen.any(axis=(2, 3))[interval, line]
+            wanted |= np.asarray(seen.any(axis=(2, 3)))[interval, line]
             points.append(np.einsum("cs,csei->cei", weight, start[interval, line]))
         blend = Blend(interval, fraction, line, weight, ends.rx_weight[tx])
         first, last = points
