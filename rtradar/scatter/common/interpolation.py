@@ -179,25 +179,18 @@ def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
     fewer antennas than that has a node at each; a single node is in the middle. The radar is at
     rest.
     """
-    places: list[Array] = []
-    blocks = list(_blocks(radar, (along_tx, along_rx)))
-    count = sum(len(block.tx_nodes) * len(block.rx_nodes) for block in blocks)
-    weights = np.zeros((radar.n_tx, radar.n_rx, count))
-    done = 0
-    for block in blocks:
+    places, weights = list[Array](), list[Array]()
+    for block in _blocks(radar, (along_tx, along_rx)):
         tx, rx = (
             ends[0] + nodes[:, None] * (ends[1] - ends[0])
             for ends, nodes in zip(block.ends, (block.tx_nodes, block.rx_nodes), strict=True)
         )
         places.append(np.stack([np.repeat(tx, len(rx), axis=0), np.tile(rx, (len(tx), 1))], axis=1))
         own = _product_weights(block, _evenly(len(block.tx)), _evenly(len(block.rx)))
-        shape = len(block.tx), len(block.rx), own.shape[1]
-        chosen = np.ix_(block.tx, block.rx, np.arange(done, done + shape[2]))
-        weights[chosen] = own.reshape(shape)
-        done += shape[2]
-    pairs = np.concatenate(places)
-    antennas, where = np.unique(pairs.reshape(-1, 3), axis=0, return_inverse=True)
-    return ArrayNodes(antennas, where.reshape(-1, 2), weights)
+        weights.append(np.zeros((radar.n_tx, radar.n_rx, own.shape[1])))
+        weights[-1][np.ix_(block.tx, block.rx)] = own.reshape(len(block.tx), len(block.rx), -1)
+    antennas, where = np.unique(np.concatenate(places).reshape(-1, 3), axis=0, return_inverse=True)
+    return ArrayNodes(antennas, where.reshape(-1, 2), np.concatenate(weights, axis=2))
 
 
 def spread_nodes(radar: Radar, few: tuple[int, int], many: tuple[int, int]) -> Array:

@@ -327,13 +327,9 @@ def _past_body(
     if not own:
         return asked
     starts, stops, last, legs = _rays(own, asked)
-    keyframes, kinds = len(asked), len(poses.semi_axes) + 1
-    # A group for each part at each keyframe, and one for targets on no part: at the specular point
-    # the part itself cannot be in the way, before a wall it can.
-    parts = np.tile(np.append(np.arange(kinds - 1), -1), keyframes)
-    group = legs[0] * kinds + np.where(last, part[legs[3]], kinds - 1)
-    pose = np.repeat(np.arange(keyframes), kinds)
-    occluded = ~body.clear(starts, stops, group, parts, pose, poses)
+    # At the specular point the part itself cannot be in the way, before a wall it can.
+    target = np.where(last, part[legs[3]], -1)
+    occluded = ~body.clear(starts, stops, np.arange(len(starts)), target, legs[0], poses)
     clear = asked.copy()
     clear[tuple(index[occluded] for index in legs)] = False
     return clear
