@@ -86,12 +86,11 @@ class RoomModel:
     Of a model that says ``fast_over_walls`` the room takes one formula for the echoes over all
     paths, ``conductor_echo``, or the direct echoes, one a part, and follows specular points over
     walls itself. Of any other level each path has a model before the images of the antennas over
-    its legs. ``paths`` are
-    all paths, the direct one first, and ``path_names`` theirs; ``faces`` says of each face of
-    furniture whether paths lead over it; ``not_followed``, known after `prune`, are the walls whose
-    frequency response is not known to `FIELD_ERROR`, with the fraction of the echo power that meets
-    each. Of the weakest echoes that a tolerance leaves out ``left_out`` is the number and
-    ``left_out_m2`` the mean power [m^2].
+    its legs. ``paths`` are all paths, the direct one first, and ``path_names`` theirs; ``faces``
+    says of each face of furniture whether paths lead over it; ``not_followed``, known after
+    `prune`, are the walls whose frequency response is not known to `FIELD_ERROR`, with the fraction
+    of the echo power that meets each. Of the weakest echoes that a tolerance leaves out
+    ``left_out`` is the number and ``left_out_m2`` the mean power [m^2].
     """
 
     def __init__(
@@ -189,8 +188,8 @@ class RoomModel:
     def optical_echoes(self, chirps: NDArray[np.int64], *, ghosts: bool = False) -> Echoes:
         """Compute the echoes as `echoes` of a fast model, by geometric optics for any other.
 
-        With ``ghosts`` direct echoes are left empty, and ghosts have the lengths over their
-        specular points also where they are not seen.
+        With ``ghosts`` direct echoes do not count, and ghosts have the lengths over their specular
+        points also where they are not seen.
         """
         chirps, columns = np.asarray(chirps, dtype=np.int64), self._columns
         at = chirp_poses(self._radar, self._body, chirps)
