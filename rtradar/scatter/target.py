@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +94,7 @@ MOST_TUBES = 4_000_000
 """Some 1.5 GB; a body at 77 GHz with 3 rays per wavelength has 2.4 million."""
 
 
-@dataclass(frozen=True)
-class Tubes:
+class Tubes(NamedTuple):
     """Facets at which rays are aimed.
 
     ``places`` and ``normals (tube, 4, 3)`` are three corners and the centroid of each facet [m],
@@ -104,9 +104,6 @@ class Tubes:
     places: Array
     normals: Array
     surface: NDArray[np.int64]
-
-    def __len__(self) -> int:
-        return len(self.surface)
 
 
 @dataclass(frozen=True)
