@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.front_end import Antenna
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import shadow_nodes
 from rtradar.scatter.common.polarization import (
@@ -24,7 +23,7 @@ from rtradar.scatter.common.polarization import (
     bisector,
     unit,
 )
-from rtradar.scatter.multipath.image_paths import Leg, WallPath, images
+from rtradar.scatter.multipath.image_paths import WallPath, images
 from rtradar.scatter.multipath.slabs import Carried, WallResponse
 from rtradar.scene import Material, Object, reflection
 from rtradar.trace.occluders import Occluders
@@ -49,10 +48,6 @@ class RigidLegs:
         self, radar: Radar, path: WallPath, walls: WallResponse, past: Occluders | None
     ) -> None:
         self.path, self._radar, self._walls, self._past = path, radar, walls, past
-        self._sides: tuple[tuple[Leg, Antenna | None], ...] = (
-            (path.out, radar.tx_antenna),
-            (path.back, radar.rx_antenna),
-        )
         self._polarization = Polarization(radar.polarization, radar.axes)
         self._real, self.tx_weight, self.rx_weight = shadow_nodes(radar)
         self._sends: Bools = np.any(self.tx_weight != 0, axis=0)
@@ -86,11 +81,10 @@ class RigidLegs:
         A leg adds none where no wave comes to the point.
         """
         total = 0.0
-        for side in range(2):
-            waves = self._carried(side, point[None]).waves
-            powers = [float((np.abs(wave.field) ** 2).sum()) for wave in waves]
-            if waves:
-                total += float(waves[int(np.argmax(powers))].extra_m[0])
+        for leg in self._carried(point[None]):
+            powers = [float((np.abs(wave.field) ** 2).sum()) for wave in leg.waves]
+            if powers:
+                total += float(leg.waves[int(np.argmax(powers))].extra_m[0])
         return total
 
     def factor(self, points: Array, normals: Array, made_of: Material, longer_m: float) -> Field:
@@ -99,7 +93,7 @@ class RigidLegs:
         ``points`` are their middles and ``normals (facet, 3)`` unit vectors, world [m]. The phase
         of a length ``longer_m`` is taken out; waves that come much earlier or later are left out.
         """
-        out, back = (self._carried(side, points) for side in range(2))
+        out, back = self._carried(points)
         normal = bisector(-out.ways[-1], -back.ways[-1])
         radar = self._radar
         k = 2 * np.pi * self._walls.frequency[:, None] / SPEED_OF_LIGHT_MPS
@@ -125,8 +119,10 @@ class RigidLegs:
         # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
         return np.asarray(total * (in_tm - te * (in_te + in_tm)))
 
-    def _carried(self, side: int, points: Array) -> Carried:
-        """Carry the field of the array's middle over one of both legs to points (point, 3) [m]."""
-        leg, antenna = self._sides[side]
-        middle = np.array(self._radar.position_m)
-        return self._walls.carried(leg, middle, points, antenna, self._polarization)
+    def _carried(self, points: Array) -> list[Carried]:
+        """Carry the field of the array's middle over both legs to points (point, 3) [m]."""
+        given = np.array(self._radar.position_m), points
+        sides = (self.path.out, self._radar.tx_antenna), (self.path.back, self._radar.rx_antenna)
+        return [
+            self._walls.carried(leg, *given, antenna, self._polarization) for leg, antenna in sides
+        ]
