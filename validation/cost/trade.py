@@ -51,6 +51,9 @@ MODELS = (
 SLOW = ("rays", "reference")  # minutes for a frame: after all others
 
 
+BY_SIZE = "by size"  # what a part takes at this wavelength
+
+
 @dataclass(frozen=True)
 class ModelOption:
     """Values of one option, from cheap to expensive, for each radar; the default is among them."""
@@ -78,8 +81,11 @@ OPTIONS = (
     ModelOption(
         "physical-optics",
         "facets",
-        {"paper-12ghz": (320, 1280, 5120, 20480), "paper-77ghz": (1280, 5120, 20480)},
-        {"paper-12ghz": 5120, "paper-77ghz": 20480},
+        {
+            "paper-12ghz": (320, 1280, BY_SIZE, 5120, 20480),
+            "paper-77ghz": (1280, 5120, BY_SIZE, 20480),
+        },
+        for_both(BY_SIZE),
         "-",
     ),
     ModelOption(
