@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,12 @@ from rtradar.pipeline.compared import (
     CONFIDENCE,
     MAP_PICTURES,
     Comparison,
-    best_frame,
     comparison_rows,
     differing,
     draw_maps_and_clouds,
     figures_of,
     finite,
     means_of,
-    open_run_maps,
     unit_of,
     write_figures,
 )
@@ -37,11 +35,9 @@ from rtradar.pipeline.output.writer import files_of_pictures, files_of_runs
 from rtradar.pipeline.prepare import people_in, power_alone, prepare
 from rtradar.pipeline.result import Result
 from rtradar.pipeline.run import run_into
-from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report import comparison
 from rtradar.report.canvas import FieldUnit, field_unit
-from rtradar.report.plots import how_made
 from rtradar.scatter import MODELS
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scatter.models.auto import choose_level
@@ -125,7 +121,7 @@ def compare(
     place = check_path("out", out)
     with atomic_folder(place, kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
-        occluded: dict[str, _Occluded] = {}
+        occluded: dict[str, dict[str, Any]] = {}
         for name in names:
             own = replace(settings, fidelity=name)
             written: dict[str, Any] = {"pictures": pictures, "place": place / name}
@@ -133,16 +129,26 @@ def compare(
             occluded[name] = _occluded(results[name], *parts, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
-        summary = _summary(results, occluded, names[-1])
+        first, reference = results[names[0]].summary, results[names[-1]]
+        of_each = ("fidelity", "variant")
+        summary: dict[str, Any] = {
+            "reference": names[-1],
+            "parameters": {
+                key: value for key, value in first["parameters"].items() if key not in of_each
+            },
+            **{name: first[name] for name in ("seed", "noise_power_m2", "versions")},
+            "fidelities": {
+                name: _figures(one, occluded[name], reference) for name, one in results.items()
+            },
+        }
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
             other = run_into(Path(again, "again"), *parts, own)
-            summary["other_seed"] = _figures(other, occluded[names[-1]], results[names[-1]])
-        drawn, unit = _draw(results, occluded, folder, names[-1])
+            summary["other_seed"] = _figures(other, occluded[names[-1]], reference)
+        drawn, unit = _draw(results, folder, summary)
         views = {name: load_run_view(folder / name) for name in names}
-        comparison.write_comparison(
-            folder / "compare.html", summary, comparison_rows(summary), drawn, unit, views
-        )
+        rows = comparison_rows(summary)
+        comparison.write_comparison(folder / "compare.html", summary, rows, drawn, unit, views)
         write_figures(folder, summary, kind)
 
     def capture(name: str) -> Capture:
@@ -219,19 +225,11 @@ def compare_recordings(
         raise InputError(f"{len(motions)} recordings; give two or more, or use compare")
     place = check_path("out", out)
     names = [f"{number:02d}-{_file_name(own)}" for number, own in enumerate(motions, start=1)]
-    found = []
-    for name, motion in zip(names, motions, strict=True):
-        one = compare(
-            motion,
-            radar,
-            scene,
-            out=place / name,
-            fidelities=fidelities,
-            overwrite=overwrite,
-            pictures=pictures,
-            **options,
-        )
-        found.append(one.summary)
+    shared: dict[str, Any] = {"fidelities": fidelities, "overwrite": overwrite, **options}
+    found = [
+        compare(motion, radar, scene, out=place / name, pictures=pictures, **shared).summary
+        for name, motion in zip(names, motions, strict=True)
+    ]
     first = found[0]
     summary: dict[str, Any] = {name: first[name] for name in ("reference", "versions")}
     summary |= {"recordings": names, "confidence": CONFIDENCE}
@@ -328,66 +326,42 @@ def _file_name(motion: Moving) -> str:
     return re.sub(r"[^\w.-]+", "-", "-".join(names))[:40]
 
 
-class _Occluded(NamedTuple):
-    """Fraction of the echo power that other parts occlude, over all and of each part (part,)."""
-
-    share: float | None
-    of_parts: NDArray[np.float64]
-
-
 def _occluded(
     result: Result, motion: Movers, radar: Radar, scene: Scene, settings: RunSettings
-) -> _Occluded:
-    """Compare the echo power of each part with that which the same level has of it alone."""
+) -> dict[str, Any]:
+    """Return the fractions of the echo power, of all and of each part, that other parts occlude.
+
+    They are those of the power that the same level has of each part alone.
+    """
     seen = _budget(result).power_at
-    if result.summary["occlusion"] == "none":
-        return _Occluded(0.0, np.zeros(seen.shape[1]))
-    alone = power_alone(motion, radar, scene, settings)
+    traced = result.summary["occlusion"] != "none"
+    alone = power_alone(motion, radar, scene, settings) if traced else seen
     if alone is None:
-        return _Occluded(None, np.full(seen.shape[1], np.nan))
+        alone = np.full(seen.shape, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         of_parts = 1 - seen.sum(axis=0) / alone.sum(axis=0)
-        return _Occluded(finite(float(1 - seen.sum() / alone.sum())), of_parts)
+        whole = finite(float(1 - seen.sum() / alone.sum()))
+    by_part = zip(result.summary["part_power_m2"], map(finite, of_parts.tolist()), strict=True)
+    return {"occluded_share": whole, "part_occluded_share": dict(by_part)}
 
 
-def _summary(
-    results: Mapping[str, Result], occluded: Mapping[str, _Occluded], reference: str
-) -> dict[str, Any]:
-    first = next(iter(results.values())).summary
-    shared = dict(first["parameters"])
-    del shared["fidelity"], shared["variant"]
-    return {
-        "reference": reference,
-        "parameters": shared,
-        **{name: first[name] for name in ("seed", "noise_power_m2", "versions")},
-        "fidelities": {
-            name: _figures(result, occluded[name], results[reference])
-            for name, result in results.items()
-        },
-    }
-
-
-def _figures(result: Result, occluded: _Occluded, reference: Result) -> dict[str, Any]:
+def _figures(result: Result, occluded: Mapping[str, Any], reference: Result) -> dict[str, Any]:
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
-    budgets = _budget(result), _budget(reference)
+    ours, its = _budget(result), _budget(reference)
     least = np.finfo(np.float64).tiny
-    ours, its = (10 * np.log10(np.maximum(one.power_at.sum(axis=1), least)) for one in budgets)
-    power = ours - its
+    levels = (10 * np.log10(np.maximum(one.power_at.sum(axis=1), least)) for one in (ours, its))
+    power = np.subtract(*levels)
     with np.errstate(divide="ignore", invalid="ignore"):
-        norm = np.linalg.norm(budgets[1].field_at)
-        error = np.linalg.norm(budgets[0].field_at - budgets[1].field_at) / norm
-    of_parts = map(finite, occluded.of_parts.tolist())
+        error = np.linalg.norm(ours.field_at - its.field_at) / np.linalg.norm(its.field_at)
     return {
         "power_mean_db": finite(float(power.mean())),
         "power_rms_db": finite(float(np.sqrt((power**2).mean()))),
         "field_error": finite(float(error)),
-        "occluded_share": occluded.share,
         **figures_of(result, reference),
         "scatter_s": stages["scatter"] + stages["survey"],
-        **{name: summary[name] for name in _COSTS},
-        **{name: summary[name] for name in ("limits", "part_power_m2")},
-        "part_occluded_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
+        **{name: summary[name] for name in (*_COSTS, "limits", "part_power_m2")},
+        **occluded,
     }
 
 
@@ -397,53 +371,33 @@ def _budget(result: Result) -> LinkBudget:
 
 
 def _draw(
-    results: Mapping[str, Result],
-    occluded: Mapping[str, _Occluded],
-    folder: Path,
-    reference: str,
+    results: Mapping[str, Result], folder: Path, summary: Mapping[str, Any]
 ) -> tuple[dict[str, Path], FieldUnit]:
     """Draw the pictures of a comparison; return them and the unit of the power of parts."""
-    parameters, radar = results[reference].summary["parameters"], results[reference].radar
-    spreading, title = parameters["spreading"], f"{parameters['motion']}, {radar.name}"
+    reference, found = results[summary["reference"]], summary["fidelities"]
+    parameters, radar = summary["parameters"], reference.radar
+    title = f"{parameters['motion']}, {radar.name}"
 
-    def unit_of(powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
-        strongest = max(float(power.max()) for power in powers)
-        return field_unit(radar, spreading=spreading, strongest_m2=strongest)
+    def unit_of(powers: Mapping[str, NDArray[np.floating]]) -> FieldUnit:
+        strongest = max(float(power.max()) for power in powers.values())
+        return field_unit(radar, spreading=parameters["spreading"], strongest_m2=strongest)
 
     power, parts = (folder / file for file in list(_PICTURES.values())[:2])
-    budgets = {name: _budget(result) for name, result in results.items()}
-    total = {name: budget.power_at.sum(axis=1) for name, budget in budgets.items()}
-    comparison.draw_power_over_time(
-        power, budgets[reference].times, total, unit_of(total.values()), reference, title
+    total, mean = (
+        {name: reduced(_budget(one).power_at, axis) for name, one in results.items()}
+        for reduced, axis in ((np.sum, 1), (np.mean, 0))
     )
-    mean = {name: budget.power_at.mean(axis=0) for name, budget in budgets.items()}
-    hidden = {name: found.of_parts for name, found in occluded.items()}
-    names, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
+    times = _budget(reference).times
+    over_time = times, total, unit_of(total), summary["reference"], title
+    comparison.draw_power_over_time(power, *over_time)
+    hidden = {
+        name: np.array([*own["part_occluded_share"].values()], dtype=np.float64)
+        for name, own in found.items()
+    }
+    part_unit = unit_of(mean)
+    names = list(reference.summary["part_power_m2"])
     comparison.draw_part_power(parts, names, mean, hidden, part_unit, title)
-
-    def map_levels(powers: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], str]:
-        unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
-        levels = {name: unit.level(one / radar.n_channels) for name, one in powers.items()}
-        return levels, unit.label("mean of channels")
-
-    def column_levels(powers: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], str]:
-        # One echo is spread over as many range bins.
-        windows = WindowFunctions(range=parameters["range_window"])
-        range_bins = noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
-        unit = unit_of(one / range_bins for one in powers.values())
-        levels = {name: unit.level(one / range_bins) for name, one in powers.items()}
-        return levels, unit.label("one channel")
-
-    # The same frame of all, for they have the same times.
-    frame = best_frame(results[reference])
-    with open_run_maps(results[reference]) as maps:
-        at = f"window at {maps['time'][frame]:.2f} s"
-        of_frame, of_columns = (
-            f"{title}\n{how_made(maps[name])}".rstrip() for name in ("range_doppler", "spectrogram")
-        )
-    titles = f"{of_frame}, {at}", of_columns, title
-    frames, levels = [frame] * len(results), (map_levels, column_levels)
-    drawn = draw_maps_and_clouds(folder, results, frames, levels, titles)
+    drawn = draw_maps_and_clouds(folder, results, title, summary["reference"])
     return dict(zip(_PICTURES, (power, parts), strict=False)) | drawn, part_unit
 
 
@@ -500,9 +454,9 @@ def compare_folders(
     runs = {name: own for name, folder in read.items() if (own := folder.summary.get("run"))}
     summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
     with atomic_folder(Path(out), _OF_FOLDERS, overwrite=overwrite) as place:
-        pictures = _draw_folders(place, read)
+        pictures = draw_maps_and_clouds(place, read, " and ".join(names))
         rows = comparison_rows(summary)
-        comparison.write_folders(place / "compare.html", summary, rows, pictures)
+        comparison.write_comparison(place / "compare.html", summary, rows, pictures)
         write_figures(place, summary, _OF_FOLDERS)
     return Comparison(summary, Path(out))
 
@@ -522,20 +476,3 @@ def _check_axes(folder: Path, reference: Path) -> None:
                 )
         if not len(ours["time"]) or not len(ours["spectrogram_time"]):
             raise InputError(f"'{folder}' holds no frame; give a longer capture")
-
-
-def _draw_folders(place: Path, folders: Mapping[str, Result]) -> dict[str, Path]:
-    """Draw the pictures, each map in decibels below its own maximum."""
-
-    def levels(powers: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], str]:
-        units = {
-            name: field_unit(folders[name].radar, strongest_m2=float(power.max()), relative=True)
-            for name, power in powers.items()
-        }
-        found = {name: units[name].level(power) for name, power in powers.items()}
-        return found, next(iter(units.values())).label("all channels")
-
-    names = " and ".join(folders)
-    titles = f"{names}, frame of most detections of each", names, names
-    frames = [best_frame(folder) for folder in folders.values()]
-    return draw_maps_and_clouds(place, folders, frames, (levels, levels), titles)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,10 +21,10 @@ from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.truth import compared_echoes
 from rtradar.pipeline.output.writer import read_maps
-from rtradar.pipeline.result import Result
+from rtradar.pipeline.result import Result, plots_of
 from rtradar.radar import Radar
 from rtradar.report import comparison
-from rtradar.report.canvas import VELOCITY_LABEL, above_floor, thinned
+from rtradar.report.canvas import thinned
 from rtradar.system.files import csv_text
 from rtradar.system.output_folder import OutputFiles
 
@@ -112,12 +113,6 @@ def open_run_maps(result: Result) -> h5py.File:
 def unit_of(result: Result) -> str:
     """Return the unit of the samples."""
     return str(result.summary["parameters"].get("unit", "m"))
-
-
-def best_frame(result: Result) -> int:
-    """Return the number of the frame with most detections."""
-    with open_run_maps(result) as maps:
-        return int(np.argmax([np.count_nonzero(mask) for mask in maps["detections"]]))
 
 
 def figures_of(ours: Result, reference: Result) -> dict[str, Any]:
@@ -302,20 +297,21 @@ def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
     between both, and root mean squares are about the mean difference.
     """
     with open_run_maps(ours) as first, open_run_maps(reference) as second:
-        cells, both, either = [], 0, 0
-        for frame in range(min(len(maps["time"]) for maps in (first, second))):
-            mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))
-            union = mask | other
-            both, either = both + int((mask & other).sum()), either + int(union.sum())
-            cells.append([maps["range_doppler"][frame][union] for maps in (first, second)])
-        power, its_power = (np.concatenate(column) for column in zip(*cells, strict=True))
-        levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
-        columns = min(len(maps["spectrogram_time"]) for maps in (first, second))
-        spectrogram, its = (
-            thinned(maps["spectrogram"], maps["spectrogram_time"][:columns])[0]
-            for maps in (first, second)
-        )
-        alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
+        both = first, second
+        shared, either, cells = 0, 0, []
+        for frame in range(min(len(maps["time"]) for maps in both)):
+            masks = [maps["detections"][frame].astype(bool) for maps in both]
+            union = masks[0] | masks[1]
+            shared, either = shared + int((masks[0] & masks[1]).sum()), either + int(union.sum())
+            cells.append(np.array([maps["range_doppler"][frame][union] for maps in both]))
+        power = np.concatenate(cells, axis=1)
+        columns = min(len(maps["spectrogram_time"]) for maps in both)
+        spectrograms = [
+            thinned(maps["spectrogram"], maps["spectrogram_time"][:columns])[0] for maps in both
+        ]
+    seen = above_noise(spectrograms[0]) | above_noise(spectrograms[1])
+    levels = level_agreement(power[0], power[1], np.ones(power.shape[1], dtype=bool))
+    alike = level_agreement(spectrograms[0], spectrograms[1], seen)
     if unit_of(ours) != unit_of(reference):
         levels, alike = (
             one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
@@ -325,7 +321,7 @@ def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
         "range_doppler_correlation": finite(levels.correlation),
         "range_doppler_mean_db": finite(levels.mean_db),
         "range_doppler_rms_db": finite(levels.rms_db),
-        "detection_overlap": both / either if either else 1.0,
+        "detection_overlap": shared / either if either else 1.0,
         "spectrogram_correlation": finite(alike.correlation),
         "spectrogram_rms_db": finite(alike.rms_db),
     }
@@ -338,49 +334,33 @@ def finite(value: float) -> float | None:
 
 # -- pictures --------------------------------------------------------------------------------------
 
-Levels = Callable[[Mapping[str, NDArray[Any]]], tuple[dict[str, NDArray[np.float64]], str]]
-"""From the power of each result its level [dB] and the label of the colours."""
-
 
 def draw_maps_and_clouds(
-    place: Path,
-    compared: Mapping[str, Result],
-    frames: Sequence[int],
-    levels: tuple[Levels, Levels],
-    titles: tuple[str, str, str],
+    place: Path, compared: Mapping[str, Result], title: str, reference: str | None = None
 ) -> dict[str, Path]:
     """Draw `MAP_PICTURES` into a folder; return the files by their titles.
 
-    ``frames`` are those that are shown of each result, ``levels`` make levels of range-Doppler maps
-    and of spectrograms, and ``titles`` are those of the three pictures. A capture may be too short
-    for a spectrogram.
+    Results of one recording are shown at the time and in the unit of the ``reference``, others in
+    their frames of most energy, and each below its own maximum. A capture may be too short for a
+    spectrogram.
     """
     drawn = {name: place / file for name, file in MAP_PICTURES.items()}
-    powers, thin = {}, {}
-    times = []
-    for one in compared.values():
-        with open_run_maps(one) as maps:
-            times.append(maps["spectrogram_time"][:])
-    shortest = min(times, key=len)
-    for (name, one), frame in zip(compared.items(), frames, strict=True):
-        with open_run_maps(one) as maps:
-            powers[name] = maps["range_doppler"][frame]
-            if len(shortest):
-                # A spectrogram is read in parts: that of an hour is large.
-                thin[name] = thinned(maps["spectrogram"], shortest)
-            velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
-            radius = maps["range"][:]
-    shown, label = levels[0](powers)
-    seen = np.any([above_floor(power) for power in powers.values()], axis=0)
-    axes = (VELOCITY_LABEL, velocity), ("Range [m]", radius)
-    comparison.draw_maps(drawn["Range-Doppler"], shown, label, *axes, titles[0], seen)
-    if thin:
-        shown, label = levels[1]({name: power.T for name, (power, _) in thin.items()})
-        seen = np.any([above_floor(power.T) for power, _ in thin.values()], axis=0)
-        axes = ("Time [s]", next(iter(thin.values()))[1]), (VELOCITY_LABEL, slow)
-        comparison.draw_maps(drawn["Spectrogram"], shown, label, *axes, titles[1], seen)
-    else:
-        del drawn["Spectrogram"]
+    with ExitStack() as stack:
+        plots = {
+            name: plots_of(one, stack.enter_context(open_run_maps(one)), relative=reference is None)
+            for name, one in compared.items()
+        }
+        time_s = None
+        if reference is not None:
+            its = plots[reference]
+            time_s = float(its.maps["time"][its.frame()[0]])
+        shown = {name: own.shown(time_s) for name, own in plots.items()}
+    for name, kind in (("Range-Doppler", "range_doppler"), ("Spectrogram", "spectrogram")):
+        maps = {own: found[kind] for own, found in shown.items() if kind in found}
+        if len(maps) == len(compared):
+            comparison.draw_maps(drawn[name], maps, title, reference)
+        else:
+            del drawn[name]
     clouds = {name: one.points for name, one in compared.items()}
-    comparison.draw_rdt_clouds(drawn["Range-Doppler-time clouds"], clouds, titles[2])
+    comparison.draw_rdt_clouds(drawn["Range-Doppler-time clouds"], clouds, title)
     return drawn

@@ -4,34 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Literal, Protocol, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.pipeline.output.pictures import Shown
-from rtradar.pipeline.output.summary import cost, finished, summary_of_samples
-from rtradar.pipeline.output.writer import (
-    RUN_FILES,
-    RunWriter,
-    open_maps,
-    read_maps,
-    write_clouds,
-)
+from rtradar.pipeline.capture import SpectraSink
 from rtradar.pipeline.prepare import with_background
-from rtradar.pipeline.processing import Clouds, Processing, block_chirps, refuse_large_maps
+from rtradar.pipeline.processing import Processing, block_chirps, refuse_large_maps
 from rtradar.pipeline.result import Result
+from rtradar.pipeline.run import results_of
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
 from rtradar.settings import ProcessingOptions, settings_of
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import brief
-from rtradar.system.clock import Moment
-from rtradar.system.output_folder import atomic_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,77 +107,27 @@ def process_samples(
     """
     settings = settings_of("process_samples", ProcessingOptions, options)
     forget_peak_memory()
-    started = Moment.now()
-    blocks = _Blocks(samples, radar, in_memory=out is None)
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
-    processing = with_background(replace(Processing.of(radar, settings), unit=unit))
-    if out is None:
-        file = BytesIO()
-        clouds = _stream(blocks, processing, file)
-        with processing.stages.time("write"), open_maps(file) as maps:
-            maps.load()
-        result = _result(blocks, processing, clouds, started)
-        return replace(result, summary=finished(result.summary), _in_memory=maps)
-    return _into(Path(out), blocks, processing, started, overwrite, pictures)
+    given = replace(Processing.of(radar, settings), unit=unit)
+    source = Samples(samples, given, in_memory=out is None)
+    source.processing = with_background(given)
+    return results_of(source, None if out is None else Path(out), overwrite, pictures)
 
 
-def _into(
-    out: Path,
-    blocks: _Blocks,
-    processing: Processing,
-    started: Moment,
-    overwrite: bool,
-    pictures: bool,
-) -> Result:
-    """Process samples and write the files of `RUN_FILES` into a folder."""
-    with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
-        clouds = _stream(blocks, processing, folder / "maps.h5")
-        with processing.stages.time("write"):
-            write_clouds(folder, clouds)
-        result = _result(blocks, processing, clouds, started)
-        with read_maps(folder / "maps.h5") as maps:
-            shown = Shown.of(result, maps)
-            if pictures:
-                with processing.stages.time("pictures"):
-                    shown.draw(folder)
-            with processing.stages.time("report"):
-                shown.write_page(folder, result)
-        summary = finished(result.summary | cost(processing, blocks.n_chirps, started), folder)
-        return replace(result, summary=summary, out=out.absolute())
-
-
-def _result(blocks: _Blocks, processing: Processing, clouds: Clouds, started: Moment) -> Result:
-    summary = summary_of_samples(processing, blocks.n_chirps, clouds, started)
-    return Result(clouds.rdt.points, clouds.spatial, summary, processing.radar)
-
-
-def _stream(blocks: _Blocks, processing: Processing, file: Path | BinaryIO) -> Clouds:
-    """Stream samples into a file of maps; return their clouds."""
-    radar = processing.radar
-    together = chirps_together(radar)
-    with RunWriter(file, processing, f"{_NAME}, {radar.name}", blocks.frame_starts) as writer:
-        # The same pieces as those of a run, so that the maps are the same to the last bit.
-        at_once = min(writer.max_chirps, block_chirps(radar))
-        range_spectra = processing.range_spectra(at_once)
-        for first, block in tqdm(blocks, desc=_NAME, unit="block", disable=None):
-            for begin in range(0, len(block) * together, at_once):
-                part = block[begin // together : (begin + at_once) // together]
-                writer.push(range_spectra(part, first + begin), first + begin)
-        return writer.finish()
-
-
-class _Blocks:
-    """Blocks of `block_chirps` of checked samples, and the number of the first chirp of each.
+class Samples:
+    """Checked samples, in blocks of `block_chirps`, each with the number of its first chirp.
 
     ``frame_starts`` are the first cycles of the frames, none where the length is not known, and
     ``n_chirps`` is how many chirps there were so far.
     """
 
     def __init__(
-        self, samples: Block | Rows | Iterable[Block], radar: Radar, *, in_memory: bool
+        self, samples: Block | Rows | Iterable[Block], processing: Processing, *, in_memory: bool
     ) -> None:
-        self._radar, self._in_memory = radar, in_memory
+        self.processing, self._in_memory = processing, in_memory
+        self._radar = radar = processing.radar
+        self.title = f"{_NAME}, {radar.name}"
         self._cycle_rows = radar.n_tx // chirps_together(radar)
         self.n_chirps, self.frame_starts = 0, radar.window_starts(0)
         if hasattr(samples, "dtype"):
@@ -201,6 +141,17 @@ class _Blocks:
                 f"samples are of type {type(samples).__name__}; give an array (chirp, rx, sample) "
                 "of complex numbers, or blocks of them"
             )
+
+    def stream(self, sink: SpectraSink, kept: None = None) -> None:
+        """Make the range spectra of all samples, which the sink receives; samples are not kept."""
+        together = chirps_together(self._radar)
+        # The same pieces as those of a run, so that the maps are the same to the last bit.
+        at_once = min(sink.max_chirps, block_chirps(self._radar))
+        range_spectra = self.processing.range_spectra(at_once)
+        for first, block in tqdm(self, desc=_NAME, unit="block", disable=None):
+            for begin in range(0, len(block) * together, at_once):
+                part = block[begin // together : (begin + at_once) // together]
+                sink.push(range_spectra(part, first + begin), first + begin)
 
     def __iter__(self) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         most = block_chirps(self._radar) // chirps_together(self._radar)

@@ -21,13 +21,14 @@ from rtradar.pipeline.output.writer import open_maps, read_truth
 from rtradar.radar import Radar
 from rtradar.report.canvas import central_limits
 from rtradar.report.html import InlinePage, signal_to_noise
+from rtradar.report.plots import Plots
 from rtradar.scatter.link_budget import LinkBudget
+from rtradar.system.figure_style import figure_for, new_figure, png_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from rtradar.pipeline.experiment import Experiment
-    from rtradar.report.plots import Plots
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,9 +116,7 @@ class Result:
 
         Each method returns Matplotlib axes, in the units of the field.
         """
-        from rtradar.report.plots import Plots  # Matplotlib is slow to import
-
-        return Plots(self.maps, self.points, self.spatial, self.radar, self.summary)
+        return plots_of(self, self.maps, new_figure=figure_for)
 
     def view(self, *, height_px: int = 900) -> InlinePage:
         """Show body, paths and maps, linked and over time, as a page in the notebook.
@@ -191,15 +190,20 @@ class Result:
         return text_card("Result", self._title, self._rows() | self._made())
 
     def _repr_html_(self) -> str:
-        from rtradar.report.plots import Plots
-        from rtradar.system.figure_style import new_figure, png_of
-
         picture = None
         with suppress(InputError):  # the folder may be gone
-            found = self.maps, self.points, self.spatial, self.radar, self.summary
-            axes = Plots(*found, new_figure=new_figure).range_doppler()
+            axes = plots_of(self, self.maps).range_doppler()
             picture = png_of(axes.get_figure(root=True))
         note = "result.plot draws, result.view() moves, result.maps has the maps."
         rows = self._rows() | self._made()
         tables = {"": {label[0].upper() + label[1:]: value for label, value in rows.items()}}
         return html_card("Result", self._title, tables, picture=picture, note=note)
+
+
+def plots_of(result: Result, maps: Any, **options: Any) -> Plots:
+    """Return the pictures of a result and its open maps, on figures for files where none are told.
+
+    The options are those of `Plots`.
+    """
+    found = maps, result.points, result.spatial, result.radar, result.summary
+    return Plots(*found, **{"new_figure": new_figure, **options})

@@ -24,7 +24,7 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
-from rtradar.pipeline.output.pictures import Shown
+from rtradar.pipeline.output.pictures import draw_pictures, room_of
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
 from rtradar.pipeline.output.truth import EchoTable, chirps_between, labelled_echoes
@@ -39,22 +39,23 @@ from rtradar.pipeline.output.writer import (
     write_clouds,
 )
 from rtradar.pipeline.prepare import people_in, prepare
-from rtradar.pipeline.processing import Clouds, block_chirps, refuse_large
-from rtradar.pipeline.result import Result
+from rtradar.pipeline.processing import block_chirps, refuse_large
+from rtradar.pipeline.result import Result, plots_of
 from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.radar import Radar
+from rtradar.report import write_report
 from rtradar.report.snapshots import save_snapshots
 from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings, SimulationOptions, settings_of, takes_settings
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.checks import check_path
-from rtradar.system.clock import Moment
 from rtradar.system.output_folder import atomic_folder
-from rtradar.trace.rays import rays_traced
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from rtradar.pipeline.recorded import Samples
 
 _MOMENTS = 100, 20.0  # of the moving body on the page, and as many a second at most
 
@@ -122,29 +123,15 @@ def run(
     """
     settings = settings_of("run", RunOptions, options)
     parts = given_parts(motion, radar, scene, settings)
-    if out is None:
-        return _run_in_memory(*parts, settings)
-    return run_into(check_path("out", out), *parts, settings, overwrite, pictures)
-
-
-def _run_in_memory(motion: Movers, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
+    if out is not None:
+        return run_into(check_path("out", out), *parts, settings, overwrite, pictures)
     if settings.save_if:
         raise InputError(
             "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
             "rt.simulate(...).samples"
         )
-    started, rays_before = _start()
-    capture = prepare(motion, radar, scene, settings, in_memory=True)
-    file = BytesIO()
-    clouds, table = _stream(capture, file)
-    result = _result(capture, clouds, started, rays_before)
-    with capture.stages.time("write"), open_maps(file) as maps:
-        maps.load()
-        result.summary.update(room_findings(capture, maps))
-        truth = read_truth(file)
-    result.summary["run"] = in_words(capture.described())
-    summary = finished(result.summary | cost(capture.processing, capture.n_chirps, started))
-    return replace(result, summary=summary, _in_memory=maps, _truth=truth, _table=table)
+    forget_peak_memory()
+    return results_of(prepare(*parts, settings, in_memory=True))
 
 
 def run_into(
@@ -161,64 +148,93 @@ def run_into(
 
     ``place`` is where the folder will be in the end, if that is elsewhere.
     """
-    started, rays_before = _start()
+    forget_peak_memory()
     if not overwrite:
         refuse_another(out, [person.motion for person in people_in(scene, motion)[1]])
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
-    with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
-        kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
-        # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
-        clouds, table = _stream(capture, folder / "maps.h5", kept)
-        with capture.stages.time("write"):
-            write_clouds(folder, clouds)
-        result = _result(capture, clouds, started, rays_before)
-        summary = result.summary
-        summary["run"] = write_run_file(folder, place or out, capture.described())
-        with read_maps(folder / "maps.h5") as maps:
-            with capture.stages.time("view"):
-                moments = snapshots(table)
-                save_snapshots(folder / "view.npz", moments)
-                summary |= room_findings(capture, maps)
-                run_view = run_view_of(result, maps, moments.every(moments.stride(*_MOMENTS)))
-                shown = Shown.of(result, maps, capture)
-            if pictures:
-                with capture.stages.time("pictures"):
-                    shown.draw(folder)
-            with capture.stages.time("report"):
-                shown.write_page(folder, result, run_view)
-        summary |= {"pictures": pictures} | cost(capture.processing, capture.n_chirps, started)
-        return replace(result, summary=finished(summary, folder), out=out.absolute())
+    return results_of(capture, out, overwrite, pictures, place)
 
 
-def _result(capture: Capture, clouds: Clouds, started: Moment, rays_before: int) -> Result:
-    """Return what a capture found, whose summary begins with what is known so far."""
-    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
-    return Result(
-        clouds.rdt.points,
-        clouds.spatial,
-        summary,
-        capture.radar,
-        capture.link_budget,
-        experiment=Experiment(capture.described()),
-    )
+def results_of(
+    source: Capture | Samples,
+    out: Path | None = None,
+    overwrite: bool = False,
+    pictures: bool = False,
+    place: Path | None = None,
+) -> Result:
+    """Process what is received, simulated or recorded, in memory or into a folder.
 
-
-def _start() -> tuple[Moment, int]:
-    """Return the moment at which a run starts, and the number of rays traced before."""
-    forget_peak_memory()
-    return Moment.now(), rays_traced()
-
-
-def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> tuple[Clouds, EchoTable]:
-    """Stream a capture into a file of maps, and IF samples into an array.
-
-    Returned are its clouds, and the table of its echoes.
+    ``place`` is where the folder will be in the end, if that is elsewhere.
     """
-    table, starts = EchoTable(capture), capture.frame_starts
-    with RunWriter(maps, capture.processing, capture.title, starts, table) as writer:
-        capture.stream(writer, kept)
-        return writer.finish(capture.body), table
+    stages = source.processing.stages
+    if out is None:
+        file = BytesIO()
+        result, table = _streamed(source, file)
+        with stages.time("write"), open_maps(file) as maps:
+            maps.load()
+            held: dict[str, Any] = {"_in_memory": maps, "_table": table}
+            if table is not None:
+                result.summary.update(room_findings(table.capture, maps))
+                result.summary["run"] = in_words(table.capture.described())
+                held["_truth"] = read_truth(file)
+        return replace(result, summary=finished(result.summary | cost(source)), **held)
+    with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
+        keeps = source.processing.settings.save_if
+        whole = folder / "if.zarr", source.processing.radar, source.n_chirps
+        kept = if_array(*whole) if keeps else None
+        result, table = _streamed(source, folder / "maps.h5", kept)
+        summary = result.summary
+        with stages.time("write"):
+            write_clouds(folder, result.points, result.spatial)
+        room = run_view = None
+        with read_maps(folder / "maps.h5") as maps:
+            plots = plots_of(result, maps)
+            if table is not None:
+                summary["run"] = write_run_file(folder, place or out, table.capture.described())
+                summary["pictures"] = pictures
+                with stages.time("view"):
+                    moments = snapshots(table)
+                    save_snapshots(folder / "view.npz", moments)
+                    summary |= room_findings(table.capture, maps)
+                    run_view = run_view_of(result, maps, moments.every(moments.stride(*_MOMENTS)))
+                    room = room_of(table.capture, plots)
+            if pictures:
+                with stages.time("pictures"):
+                    draw_pictures(folder, plots, room)
+            with stages.time("report"):
+                write_report(
+                    folder / "report.html",
+                    radar=result.radar,
+                    summary=summary,
+                    maps=[*plots.shown().values()],
+                    room=room,
+                    rdt_points=result.points,
+                    spatial=result.spatial,
+                    run_view=run_view,
+                )
+        return replace(result, summary=finished(summary | cost(source), folder), out=out.absolute())
+
+
+def _streamed(
+    source: Capture | Samples, file: Path | BinaryIO, kept: Any = None
+) -> tuple[Result, EchoTable | None]:
+    """Stream what is received into a file of maps, and IF samples into an array.
+
+    Returned are the results, whose summary has what is known so far, and the table of the echoes
+    where these are simulated.
+    """
+    # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
+    table = EchoTable(source) if isinstance(source, Capture) else None
+    with RunWriter(file, source.processing, source.title, source.frame_starts, table) as writer:
+        source.stream(writer, kept)
+        clouds = writer.finish()
+    simulated: dict[str, Any] = {}
+    if table is not None:
+        budget, experiment = table.capture.link_budget, Experiment(table.capture.described())
+        simulated = {"link_budget": budget, "experiment": experiment}
+    found = clouds.rdt.points, clouds.spatial, summary_of(source, clouds), source.processing.radar
+    return Result(*found, **simulated), table
 
 
 # -- IF samples, whole or block by block ----------------------------------------------------------

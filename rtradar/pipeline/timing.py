@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from rtradar.system.clock import Moment
+from rtradar.trace.rays import rays_traced
 
 _LINES = {
     "survey": "link budget",
@@ -77,10 +78,14 @@ def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
 
 
 class Stages:
-    """Wall-clock time [s] by the name of the stage, in ``seconds``, without that of warming up."""
+    """Wall-clock time [s] by the name of the stage, in ``seconds``, without that of warming up.
+
+    ``begun`` is the moment at which they begin, ``rays`` how many rays were traced before.
+    """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.begun, self.rays = Moment.now(), rays_traced()
 
     @contextmanager
     def time(self, name: str) -> Iterator[None]:

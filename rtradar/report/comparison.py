@@ -9,14 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.canvas import (
-    FieldUnit,
-    add_colour_bar,
-    fitted_limits,
-    rdt_points,
-)
+from rtradar.report.canvas import FieldUnit, add_colour_bar, rdt_points
 from rtradar.report.html import write_page
-from rtradar.report.maps import colour_limits, draw_levels
+from rtradar.report.maps import ShownMap, colour_limits, draw_levels
 from rtradar.report.run_view import RunView
 from rtradar.report.three_d import posed_figure
 from rtradar.system.figure_style import LIGHT, dress, new_figure, save_figure, write_heading
@@ -85,32 +80,35 @@ def draw_part_power(
 
 
 def draw_maps(
-    path: Path,
-    maps: Mapping[str, NDArray[np.float64]],
-    label: str,
-    across: tuple[str, NDArray[np.float64]],
-    up: tuple[str, NDArray[np.float64]],
-    title: str,
-    shown: NDArray[np.bool_],
+    path: Path, maps: Mapping[str, ShownMap], title: str, reference: str | None = None
 ) -> None:
-    """Draw the same map (up, across) [dB] of each model in the same colours, one above another.
+    """Draw the same map of each model in the same colours and limits, one above another.
 
-    ``label`` is that of the colour bar, with its unit; ``across`` and ``up`` are the label and the
-    values (n,) of an axis, which is fitted to the cells ``shown (up, across)``.
+    Levels below a maximum are all below that of the ``reference``, if there is one.
     """
+    levels = {name: one.level_db for name, one in maps.items()}
+    if reference is not None:
+        its = maps[reference].unit.scale
+        for name, one in maps.items():
+            levels[name] = one.level_db + 10 * np.log10(its / one.unit.scale)
     figure = new_figure(1.0 + 2.6 * len(maps))
     panels = figure.subplots(len(maps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    limits = colour_limits(np.concatenate([np.ravel(level) for level in maps.values()]))
-    for axes, (name, level) in zip(panels, maps.items(), strict=True):
-        image = draw_levels(axes, level, across[1], up[1], limits)
-        axes.set_ylabel(up[0])
-        dress(axes, title=f"{title}\n{name}" if axes is panels[0] else name, grid=False)
-    panels[-1].set(
-        xlabel=across[0],
-        xlim=fitted_limits(shown.sum(axis=0), across[1]),
-        ylim=fitted_limits(shown.sum(axis=1), up[1]),
+    limits = colour_limits(np.concatenate([np.ravel(level) for level in levels.values()]))
+    for axes, (name, one) in zip(panels, maps.items(), strict=True):
+        image = draw_levels(axes, levels[name], one.across, one.up, limits)
+        axes.set_ylabel(one.labels[1])
+        shown = f"{name}: {one.title}".replace("\n", " ")
+        lines = (title, one.made, shown) if axes is panels[0] else (shown,)
+        dress(axes, title="\n".join(filter(None, lines)), grid=False)
+    across, up = (
+        np.array(ends) for ends in zip(*(one.limits for one in maps.values()), strict=True)
     )
-    add_colour_bar(image, list(panels), label)
+    panels[-1].set(
+        xlabel=one.labels[0],
+        xlim=(across[:, 0].min(), across[:, 1].max()),
+        ylim=(up[:, 0].min(), up[:, 1].max()),
+    )
+    add_colour_bar(image, list(panels), one.unit.label(one.qualifier))
     save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 
@@ -136,34 +134,28 @@ def write_comparison(
     summary: Mapping[str, Any],
     rows: Sequence[Sequence[str]],
     pictures: Mapping[str, Path],
-    unit: FieldUnit,
-    views: Mapping[str, RunView],
+    unit: FieldUnit | None = None,
+    views: Mapping[str, RunView] | None = None,
 ) -> None:
-    """Write a comparison as a page: maps side by side with one slider, tables and pictures.
+    """Write a comparison of models or of folders as a page: tables and pictures.
 
     ``summary`` is the content of ``compare.json``; ``rows`` are a heading row and one row for each
-    measure; ``pictures`` are PNG files by their titles; ``unit`` is that of the power of parts;
-    ``views`` are the data of the maps of each model, the reference last.
+    measure; ``pictures`` are PNG files by their titles. Of models, ``unit`` is that of the power of
+    parts, and ``views`` are the data of the maps of each, the reference last, which the page shows
+    side by side with one slider.
     """
     values = {"summary": summary, "rows": rows, "pictures": pictures, "unit": unit}
+    if views is None:
+        folders = summary["folders"]
+        differ = [
+            (key, *(str(values.get(name, "")) for name in folders))
+            for key, values in summary["differ"].items()
+        ]
+        write_page(path, "compare.html", values | {"folders": folders, "differ": differ})
+        return
     values |= {"fidelities": summary["fidelities"], "models": [*views]}
     scripts = ("plots.js", "figure.js", "compare.js")
     write_page(path, "compare.html", values, data=comparison_data(views), scripts=scripts)
-
-
-def write_folders(
-    path: Path,
-    summary: Mapping[str, Any],
-    rows: Sequence[Sequence[str]],
-    pictures: Mapping[str, Path],
-) -> None:
-    """Write a comparison of folders as a page: what `write_comparison` writes, but for models."""
-    differ = [
-        (key, *(str(values.get(name, "")) for name in summary["folders"]))
-        for key, values in summary["differ"].items()
-    ]
-    values = {"summary": summary, "rows": rows, "pictures": pictures}
-    write_page(path, "compare.html", values | {"folders": summary["folders"], "differ": differ})
 
 
 def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:

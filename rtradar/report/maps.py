@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.canvas import FieldUnit
+from rtradar.process.window_functions import WindowName, noise_bandwidth_bins
+from rtradar.radar import Radar
+from rtradar.report.canvas import (
+    VELOCITY_LABEL,
+    FieldUnit,
+    angle_label,
+    angle_view,
+    fitted_limits,
+    masking_note,
+)
 from rtradar.report.three_d import packed
 
 if TYPE_CHECKING:
@@ -42,6 +51,11 @@ class Overlay(NamedTuple):
     def packed(self) -> dict[str, Any]:
         """Return plain values for JSON."""
         return {"kind": self.kind, "name": self.name, "xy": packed(self.xy)}
+
+
+def ghost_mark(number: int, range_m: float, across: float) -> Overlay:
+    """Return the mark of a ghost over a map, with its number as the name."""
+    return Overlay("ghost", str(number), np.array([[across, range_m]]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,6 +158,73 @@ class ShownMap:
 
         across, up = self.limits
         return inside(self.up, up), inside(self.across, across)
+
+
+def range_doppler_map(
+    power: NDArray[np.floating],
+    mask: NDArray[np.bool_],
+    radar: Radar,
+    unit: FieldUnit,
+    *,
+    ghosts: Sequence[Overlay] = (),
+    counts: NDArray[np.integer] | None = None,
+    **others: Any,
+) -> ShownMap:
+    """Return a range-Doppler map (range, velocity) with its detections, and ghosts.
+
+    ``power`` is the sum over all channels [m^2]. The view fits ``counts`` of detections, by default
+    those of the ``mask``, and all ghosts. Others are fields of `ShownMap`.
+    """
+    velocity, distance = radar.velocity_mps(mask.shape[1]), radar.range_m
+    rows, columns = np.nonzero(mask)
+    places = np.column_stack([velocity[columns], distance[rows]])
+    found = mask if counts is None else counts
+    across, ahead = np.concatenate([np.empty((0, 2)), *(one.xy for one in ghosts)]).T
+    fields: dict[str, Any] = {
+        "labels": (VELOCITY_LABEL, "Range [m]"),
+        "level_db": unit.level(power / radar.n_channels),
+        "across": velocity,
+        "up": distance,
+        "view": (
+            fitted_limits(found.sum(axis=0), velocity, include=[0.0, *across]),
+            fitted_limits(found.sum(axis=1), distance, include=ahead),
+        ),
+        "unit": unit,
+        "qualifier": "mean of channels",
+        "over": (Overlay("detection", f"{len(rows)} detections", places), *ghosts),
+        "note": masking_note(power, mask),
+    }
+    return ShownMap(**fields | others)
+
+
+def range_angle_map(
+    name: str,
+    power: NDArray[np.floating],
+    angles: NDArray[np.float64],
+    radar: Radar,
+    unit: FieldUnit,
+    window: WindowName,
+    over: Sequence[Overlay] = (),
+    **others: Any,
+) -> ShownMap:
+    """Return a map (range, angle) of detected cells, over ``angles`` [degree].
+
+    ``power`` [m^2] is a sum over velocities, over as many of which the ``window`` function spreads
+    one echo. Others are fields of `ShownMap`.
+    """
+    ghosts = [(one.xy[0, 0], one.xy[0, 1]) for one in over if one.kind == "ghost"]
+    return ShownMap(
+        labels=(angle_label(name, radar), "Range [m]"),
+        level_db=unit.level(power / noise_bandwidth_bins(window, radar.cycles_per_frame)),
+        across=angles,
+        up=radar.range_m,
+        view=angle_view(power, angles, radar, ghosts),
+        unit=unit,
+        qualifier="detected cells",
+        below_peak_db=40,
+        over=tuple(over),
+        **others,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

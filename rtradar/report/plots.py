@@ -22,16 +22,13 @@ from rtradar.report.canvas import (
     FieldUnit,
     above_floor,
     add_colour_bar,
-    angle_label,
-    angle_view,
     field_unit,
     fitted_limits,
-    masking_note,
     place_limits,
     rdt_points,
     thinned,
 )
-from rtradar.report.maps import Overlay, ShownMap
+from rtradar.report.maps import ShownMap, range_angle_map, range_doppler_map
 from rtradar.system.checks import check_number
 from rtradar.system.figure_style import DIVERGING, axes_given, dress, figure_for, theme_of
 
@@ -79,6 +76,8 @@ class Plots:
         Contents of ``summary.json``, of which ``parameters`` and ``detected_range_m`` are read.
     new_figure : callable
         Function that makes the figure, from its height [inch].
+    relative : bool
+        Whether powers are in decibels below the strongest of each map, whatever its unit is.
     """
 
     maps: xr.Dataset | h5py.File
@@ -87,6 +86,7 @@ class Plots:
     radar: Radar
     summary: Mapping[str, Any]
     new_figure: Callable[[float], Figure] = field(default=figure_for)
+    relative: bool = False
 
     def range_doppler(self, time_s: float | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the range-Doppler map of one frame, and its detections in a second panel beside it.
@@ -335,14 +335,24 @@ class Plots:
 
     # -- the maps, for figures and pages -----------------------------------------------------------
 
-    @property
-    def shown(self) -> list[ShownMap]:
-        """Maps as `range_time`, `spectrogram`, `range_doppler` and `range_angle` show them."""
-        found = [self._range_time]
+    def shown(self, time_s: float | None = None) -> dict[str, ShownMap]:
+        """Return maps as `range_time`, `spectrogram`, `range_doppler` and `range_angle` show them.
+
+        Parameters
+        ----------
+        time_s : float, optional
+            Time of the frame, as for `range_doppler`.
+
+        Returns
+        -------
+        dict
+            Maps by their names in ``maps.h5``, in the order of a page.
+        """
+        found = {"range_time": self._range_time}
         if len(self.maps["spectrogram"]):
-            found.append(self._spectrogram)
-        found.append(self._range_doppler(None))
-        return found + [self._range_angle(name) for name in self._angles]
+            found["spectrogram"] = self._spectrogram
+        found["range_doppler"] = self._range_doppler(time_s)
+        return found | {f"range_{name}": self._range_angle(name, time_s) for name in self._angles}
 
     @cached_property
     def _range_time(self) -> ShownMap:
@@ -387,54 +397,22 @@ class Plots:
         frame, when = self.frame(time_s)
         power = np.asarray(self.maps["range_doppler"][frame])
         mask = np.asarray(self.maps["detections"][frame]) > 0
-        unit = self._unit(range_m=self.radar.range_m[:, None])
-        velocity, distance = self._axis("velocity"), self.radar.range_m
-        rows, columns = np.nonzero(mask)
-        # TI's chain leaves out what is no peak.
-        masked = self._parameters.get("detector") != "ti-oob"
-        return ShownMap(
-            title=f"Range-Doppler map,\n{when}",
-            made=how_made(self.maps["range_doppler"]),
-            labels=(VELOCITY_LABEL, "Range [m]"),
-            level_db=unit.level(power / self.radar.n_channels),
-            across=velocity,
-            up=distance,
-            view=(
-                fitted_limits(mask.sum(axis=0), velocity, include=0.0),
-                fitted_limits(mask.sum(axis=1), distance),
-            ),
-            unit=unit,
-            qualifier="mean of channels",
-            over=(
-                Overlay(
-                    "detection",
-                    f"{len(rows)} detections",
-                    np.column_stack([velocity[columns], distance[rows]]),
-                ),
-            ),
-            note=masking_note(power, mask) if masked else "",
-        )
+        strongest = float(power.max()) / self.radar.n_channels
+        unit = self._unit(range_m=self.radar.range_m[:, None], strongest_m2=strongest)
+        told: dict[str, Any] = {"title": f"Range-Doppler map,\n{when}"}
+        if self._parameters.get("detector") == "ti-oob":  # which leaves out what is no peak
+            told["note"] = ""
+        made = how_made(self.maps["range_doppler"])
+        return range_doppler_map(power, mask, self.radar, unit, made=made, **told)
 
     def _range_angle(self, name: str, time_s: float | None = None) -> ShownMap:
         frame, when = self.frame(time_s)
-        angles = np.degrees(self._axis(name))
-        # One echo is spread over as many velocities.
-        power = np.asarray(self.maps[f"range_{name}"][frame]) / noise_bandwidth_bins(
-            self._parameters.get("doppler_window", "hann"), self.radar.cycles_per_frame
-        )
+        power = self.maps[f"range_{name}"]
+        given = np.asarray(power[frame]), np.degrees(self._axis(name)), self.radar
         unit = self._unit(range_m=self.radar.range_m[:, None])
-        return ShownMap(
-            title=f"Range-{name}, {when}",
-            made=how_made(self.maps[f"range_{name}"]),
-            labels=(angle_label(name, self.radar), "Range [m]"),
-            level_db=unit.level(power),
-            across=angles,
-            up=self.radar.range_m,
-            view=angle_view(power, angles, self.radar),
-            unit=unit,
-            qualifier="detected cells",
-            below_peak_db=40,
-        )
+        window = self._parameters.get("doppler_window", "hann")
+        told: dict[str, Any] = {"title": f"Range-{name}, {when}", "made": how_made(power)}
+        return range_angle_map(name, *given, unit, window, **told)
 
     # -- what the pictures share -------------------------------------------------------------------
 
@@ -471,9 +449,10 @@ class Plots:
         return self.new_figure(height_in).add_subplot(**options) if ax is None else ax
 
     def _unit(self, **options: Any) -> FieldUnit:
-        if self.maps["range_doppler"].attrs.get("units", "m2") != "m2":
+        if self.maps["range_doppler"].attrs.get("units", "m2") != "m2" and not self.relative:
             return FieldUnit(COUNTS, 1.0)
-        return field_unit(self.radar, spreading=self._parameters.get("spreading", True), **options)
+        options |= {"spreading": self._parameters.get("spreading", True)}
+        return field_unit(self.radar, relative=self.relative, **options)
 
     def _axis(self, name: str) -> NDArray[np.float64]:
         return np.asarray(self.maps[name])

@@ -10,25 +10,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from rtradar.process import WindowFunctions
-from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
+from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
-from rtradar.report.canvas import (
-    VELOCITY_LABEL,
-    add_colour_bar,
-    angle_label,
-    angle_view,
-    field_unit,
-    fitted_limits,
-    masking_note,
-)
-from rtradar.report.maps import Overlay, ShownMap
+from rtradar.report.canvas import add_colour_bar, field_unit
+from rtradar.report.maps import Overlay, ShownMap, range_angle_map, range_doppler_map
 from rtradar.scene import Furniture, Scene
 from rtradar.scene.plan import (
     draw_plan,
@@ -47,19 +39,6 @@ if TYPE_CHECKING:
 
 CIRCLES = "Circles are ghosts, predicted over"
 _HALF_TURN = 180.0
-
-
-class GhostMark(NamedTuple):
-    """Place of a ghost in a picture: its number, range [m], and coordinate across the picture."""
-
-    number: int
-    range_m: float
-    across: float
-
-    @property
-    def overlay(self) -> Overlay:
-        """What marks it over a map."""
-        return Overlay("ghost", str(self.number), np.array([[self.across, self.range_m]]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,7 +129,7 @@ def draw_room_plan(path: Path, room: ShownRoom, title: str) -> None:
 
 def before_after(
     maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.bool_]]],
-    ghosts: Sequence[GhostMark],
+    ghosts: Sequence[Overlay],
     radar: Radar,
 ) -> list[ShownMap]:
     """Return range-Doppler maps with their detections, and ghosts where they are predicted.
@@ -159,34 +138,13 @@ def before_after(
     (range, velocity); ``ghosts`` are marked over velocity [m/s]. All have the colours of the first.
     """
     unit = field_unit(radar, range_m=radar.range_m[:, None])
-    found = np.sum([mask for _, mask in maps.values()], axis=0)
-    velocity, distance = radar.velocity_mps(found.shape[1]), radar.range_m
+    counts = np.sum([mask for _, mask in maps.values()], axis=0)
     shown: list[ShownMap] = []
     for name, (power, mask) in maps.items():
-        rows, columns = np.nonzero(mask)
-        places = np.column_stack([velocity[columns], distance[rows]])
-        detected = Overlay("detection", f"{len(rows)} detections", places)
+        title = f"{name}: {np.count_nonzero(mask)} detections"
+        told: dict[str, Any] = {"title": title, "colours_db": shown[0].limits_db if shown else None}
         shown.append(
-            ShownMap(
-                title=f"{name}: {detected.name}",
-                labels=(VELOCITY_LABEL, "Range [m]"),
-                level_db=unit.level(power / radar.n_channels),
-                across=velocity,
-                up=distance,
-                view=(
-                    fitted_limits(
-                        found.sum(axis=0), velocity, include=[0.0, *(one.across for one in ghosts)]
-                    ),
-                    fitted_limits(
-                        found.sum(axis=1), distance, include=[one.range_m for one in ghosts]
-                    ),
-                ),
-                unit=unit,
-                qualifier="mean of channels",
-                colours_db=shown[0].limits_db if shown else None,
-                over=(detected, *(one.overlay for one in ghosts)),
-                note=masking_note(power, mask),
-            )
+            range_doppler_map(power, mask, radar, unit, ghosts=ghosts, counts=counts, **told)
         )
     return shown
 
@@ -195,24 +153,20 @@ def azimuth_and_walls(
     found: tuple[NDArray[np.floating], NDArray[np.float64]],
     scene: Scene,
     radar: Radar,
-    ghosts: Sequence[GhostMark],
+    ghosts: Sequence[Overlay],
     window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> ShownMap:
     """Return power over azimuth and range, with upright walls and furniture where they are.
 
     What was ``found`` is the power (range, azimuth), summed over detected cells [m^2], and the
-    angles (azimuth,) of its columns [rad], over which ``ghosts`` are marked. The
+    angles (azimuth,) of its columns [rad]; ``ghosts`` are marked over degrees. The
     ``window_functions`` are those of the transforms that gave the power.
     """
     power, azimuth = found
-    unit = field_unit(radar, range_m=radar.range_m[:, None])
-    velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
-    angles = np.degrees(azimuth)
-    marked = [one._replace(across=float(np.degrees(one.across))) for one in ghosts]
     place = np.asarray(radar.position_m)[:2]
     yaw = np.radians(radar.yaw_deg)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    over = [one.overlay for one in marked]
+    over = list(ghosts)
     for one in outlines(scene):
         xy = one.xy
         if one.kind == "wall":
@@ -223,18 +177,9 @@ def azimuth_and_walls(
         gaps = np.abs(np.diff(angle, prepend=angle[0])) > _HALF_TURN
         line = np.column_stack([np.where(gaps, np.nan, angle), np.hypot(x, y)])
         over.append(one._replace(xy=line))
-    return ShownMap(
-        title="Range-azimuth map and room",
-        labels=(angle_label("azimuth", radar), "Range [m]"),
-        level_db=unit.level(power / velocities),  # one echo is spread over as many velocities
-        across=angles,
-        up=radar.range_m,
-        view=angle_view(power, angles, radar, [(one.across, one.range_m) for one in marked]),
-        unit=unit,
-        qualifier="detected cells",
-        below_peak_db=40,
-        over=tuple(over),
-    )
+    unit, title = field_unit(radar, range_m=radar.range_m[:, None]), "Range-azimuth map and room"
+    given = np.degrees(azimuth), radar, unit, window_functions.doppler, over
+    return range_angle_map("azimuth", power, *given, title=title)
 
 
 def draw_room_maps(

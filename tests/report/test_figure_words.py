@@ -35,10 +35,9 @@ from rtradar.report.comparison import (
     draw_power_over_time,
     draw_rdt_clouds,
 )
-from rtradar.report.maps import ShownMap
+from rtradar.report.maps import ShownMap, ghost_mark
 from rtradar.report.plots import Plots
 from rtradar.report.rooms import (
-    GhostMark,
     ShownRoom,
     azimuth_and_walls,
     before_after,
@@ -110,7 +109,7 @@ WALL = Wall(
     thickness_m=0.1,
 )
 ROOM = rt.Scene(walls=(WALL,))
-GHOST = GhostMark(1, 0.3, 0.0)
+GHOST = ghost_mark(1, 0.3, 0.0)
 SHOWN = ShownRoom(
     scene=ROOM,
     radar=RADAR,
@@ -121,7 +120,10 @@ SHOWN = ShownRoom(
     azimuth=[azimuth_and_walls(MAPS["azimuth"], ROOM, RADAR, [GHOST])],
 )
 HISTORY = [{f"{side}_{name}": 0.5 for side in ("train", "test") for name in ("loss", "accuracy")}]
-AXES = ("", np.arange(8.0)), ("", np.arange(16.0))
+AXES = {"across": np.arange(8.0), "up": np.arange(16.0), "view": (None, (0.0, 15.0))}
+MAP = ShownMap(
+    title="", labels=("", ""), level_db=POWER, unit=UNIT, qualifier="one channel", **AXES
+)
 EVERY: dict[str, Callable[[], None]] = {
     "room_maps": lambda: draw_room_maps(
         FILE, [*SHOWN.before_after, *SHOWN.azimuth], {1: NAME}, NAME
@@ -129,9 +131,7 @@ EVERY: dict[str, Callable[[], None]] = {
     "room_plan": lambda: draw_room_plan(FILE, SHOWN, NAME),
     "power_over_time": lambda: draw_power_over_time(FILE, np.arange(8.0), ALONE, UNIT, NAME, NAME),
     "part_power": lambda: draw_part_power(FILE, [NAME] * 8, ALONE, ALONE, UNIT, NAME),
-    "maps": lambda: draw_maps(
-        FILE, {"a": POWER, NAME: POWER}, UNIT.label("one channel"), *AXES, NAME, POWER > 0
-    ),
+    "maps": lambda: draw_maps(FILE, {"a": MAP, NAME: MAP}, NAME, NAME),
     "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
     "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
     "confusion": lambda: evaluation.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
@@ -298,7 +298,7 @@ def test_the_panel_of_detections_names_no_detector_for_it_is_not_told_which(
 
 
 def test_ghosts_have_numbers_with_a_key(drawn: list[Figure]) -> None:
-    ghosts = [GhostMark(number, 0.3 + 0.01 * number, 0.0) for number in (1, 2, 3)]
+    ghosts = [ghost_mark(number, 0.3 + 0.01 * number, 0.0) for number in (1, 2, 3)]
     key = {1: "left", 2: "right", 3: "floor > left"}
     shown = before_after({"As received": (POWER, MASK)}, ghosts, RADAR)
     draw_room_maps(FILE, shown, key, "run")

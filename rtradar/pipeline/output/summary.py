@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 from rtradar.description import versions
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.writer import RUN_FILES
-from rtradar.pipeline.processing import Clouds, Processing
+from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.timing import peak_memory_mb, to_cloud_s
-from rtradar.radar import Radar
 from rtradar.scatter import account_of
 from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scatter.validity import Limit
 from rtradar.settings import ProcessingOptions
 from rtradar.system.clock import Moment
+from rtradar.trace.rays import rays_traced
+
+if TYPE_CHECKING:
+    from rtradar.pipeline.recorded import Samples
 
 _SINGLE_REFLECTIONS = {
     "name": "single_reflections",
@@ -34,49 +37,74 @@ _REST_BINS = 2
 """Doppler bins on either side of zero that hold what does not move: the lobe of a Hann window."""
 
 
-def cost(processing: Processing, n_chirps: int, started: Moment) -> dict[str, Any]:
-    """Return time since ``started``, and memory, for so many chirps."""
-    now = Moment.now()
-    wall_s, warmup_s = now.work_s - started.work_s, now.warm_up_s - started.warm_up_s
-    capture_s = processing.radar.duration_of(n_chirps)
-    stages = processing.stages.seconds
+def cost(source: Capture | Samples) -> dict[str, Any]:
+    """Return the time and the memory that a run has taken so far."""
+    now, stages = Moment.now(), source.processing.stages
+    wall_s = now.work_s - stages.begun.work_s
+    capture_s = source.processing.radar.duration_of(source.n_chirps)
     return {
-        "stages": {name: round(spent, 4) for name, spent in stages.items()},
+        "stages": {name: round(spent, 4) for name, spent in stages.seconds.items()},
         "wall_s": round(wall_s, 4),
-        "cloud_s": round(to_cloud_s(stages, wall_s), 4),
-        "warmup_s": round(warmup_s, 4),
+        "cloud_s": round(to_cloud_s(stages.seconds, wall_s), 4),
+        "warmup_s": round(now.warm_up_s - stages.begun.warm_up_s, 4),
         "capture_s": capture_s,
         "real_time_factor": round(wall_s / capture_s, 4),
         "peak_memory_mb": round(peak_memory_mb(), 1),
     }
 
 
-def summary_of(capture: Capture, clouds: Clouds, started: Moment) -> dict[str, Any]:
-    """Return the summary of a run that started at ``started``, see `cost`."""
-    settings, radar, budget = capture.settings, capture.radar, capture.link_budget
+def summary_of(source: Capture | Samples, clouds: Clouds) -> dict[str, Any]:
+    """Return the summary of a run, as far as it is known before its files are written.
+
+    Of IF samples that were recorded it has no entries of motion, scene, echoes and noise, which are
+    not known.
+    """
+    processing = source.processing
+    radar, settings, n_chirps = processing.radar, processing.settings, source.n_chirps
+    ranges = clouds.ranges
+    summary = {
+        "parameters": settings.parameters() | {"radar": dataclasses.asdict(radar)},
+        "seed": settings.seed,
+        "versions": versions(),
+        **cost(source),
+        "windows": len(radar.window_starts(n_chirps)),
+        "chirps": n_chirps,
+        "detections": clouds.rdt.n_voxels,
+        "rdt_triangles": clouds.rdt.n_triangles,
+        "rdt_points": len(clouds.rdt.points),
+        "xyz_points": len(clouds.spatial.points),
+        "xyz_points_found": clouds.n_spatial,
+        "detected_range_m": ranges and (ranges.low_m, ranges.high_m),
+        "limits": _limits_of_detections(clouds),
+    }
+    if isinstance(source, Capture):
+        return _of_simulation(summary, source)
+    taken = {"radar", *ProcessingOptions.__annotations__}
+    parameters = {key: value for key, value in summary["parameters"].items() if key in taken}
+    told = {"duration_s": radar.duration_of(n_chirps), "unit": processing.unit}
+    return summary | {"parameters": parameters | told}
+
+
+def _of_simulation(summary: dict[str, Any], capture: Capture) -> dict[str, Any]:
+    """Return a summary with what is known of a simulation alone."""
+    radar, budget, settings = capture.radar, capture.link_budget, capture.settings
     # A model may trace nothing yet, and would if a part came near a line of sight.
     traces = capture.model.variant is not None or getattr(
         capture.model.people_alone, "traces", False
     )
-    summary = {
-        "parameters": {
-            "motion": capture.motion,
-            "scene": capture.scene.name,
-            **settings.parameters(),
-            "duration_s": capture.body.duration_s,
-            "radar": dataclasses.asdict(radar),
-        },
-        "seed": settings.seed,
-        "versions": versions(),
+    of_motion = {"motion": capture.motion, "scene": capture.scene.name}
+    duration = {"duration_s": capture.body.duration_s}
+    summary = summary | {
+        "parameters": of_motion | summary["parameters"] | duration,
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
         "occlusion": "mitsuba" if traces else "none",
-        **cost(capture.processing, capture.n_chirps, started),
-        **_found(radar, capture.n_chirps, clouds),
         "echo_power_m2": budget.power if budget.visible else 0.0,
         "part_power_m2": budget.part_power,
         "noise_power_m2": capture.noise.power,
         "people": _people(capture),
+        "limits": _limits(capture) + summary["limits"],
+        "rays_traced": rays_traced() - capture.stages.rays,
     }
     if radar.transmit_power_dbm is not None and settings.spreading:
         # Powers per IF sample as received at the port of the antenna: the radar equation.
@@ -86,7 +114,6 @@ def summary_of(capture: Capture, clouds: Clouds, started: Moment) -> dict[str, A
             "echo_power_w": budget.power * scale,
             "noise_power_w": capture.noise.power * scale,
         }
-    summary["limits"] = _limits(capture) + _limits_of_detections(clouds)
     if (modelled := account_of(capture.model)) is not None:
         summary["modelled"] = modelled
     if capture.receiver is not None:
@@ -123,41 +150,6 @@ def _people(capture: Capture) -> list[dict[str, Any]]:
             }
         )
     return found
-
-
-def summary_of_samples(
-    processing: Processing, n_chirps: int, clouds: Clouds, started: Moment
-) -> dict[str, Any]:
-    """Return the summary of so many chirps of IF samples; their processing began at ``started``.
-
-    It has no entries of motion, scene, echoes and noise, which are not known.
-    """
-    radar, settings = processing.radar, processing.settings
-    names = set(ProcessingOptions.__annotations__)
-    of_processing = {key: value for key, value in settings.parameters().items() if key in names}
-    capture_s = radar.duration_of(n_chirps)
-    return {
-        "parameters": of_processing
-        | {"duration_s": capture_s, "unit": processing.unit, "radar": dataclasses.asdict(radar)},
-        "seed": settings.seed,
-        "versions": versions(),
-        **cost(processing, n_chirps, started),
-        **_found(radar, n_chirps, clouds),
-        "limits": _limits_of_detections(clouds),
-    }
-
-
-def _found(radar: Radar, n_chirps: int, clouds: Clouds) -> dict[str, Any]:
-    return {
-        "windows": len(radar.window_starts(n_chirps)),
-        "chirps": n_chirps,
-        "detections": clouds.rdt.n_voxels,
-        "rdt_triangles": clouds.rdt.n_triangles,
-        "rdt_points": len(clouds.rdt.points),
-        "xyz_points": len(clouds.spatial.points),
-        "xyz_points_found": clouds.n_spatial,
-        "detected_range_m": clouds.ranges and (clouds.ranges.low_m, clouds.ranges.high_m),
-    }
 
 
 def finished(summary: dict[str, Any], folder: Path | None = None) -> dict[str, Any]:

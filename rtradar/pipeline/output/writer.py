@@ -16,12 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
-from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
+from rtradar.clouds import SpatialCloud, save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.clouds.sample_files import TABLES, Array
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange.recording import new_store
 from rtradar.motion.skeleton import NODES
-from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.truth import (
     EchoTable,
     Parts,
@@ -46,6 +45,7 @@ from rtradar.process import (
     range_azimuth,
     range_elevation,
 )
+from rtradar.radar import Radar
 from rtradar.signal.multiplexing import chirps_together
 from rtradar.system.hdf5 import LastingFile, netcdf_array
 from rtradar.system.output_folder import OutputFiles, one_of
@@ -198,15 +198,15 @@ class RunWriter:
                 kept["range_azimuth_received"] = range_azimuth(angles, radar)
             self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
 
-    def finish(self, body: Body | None = None) -> Clouds:
+    def finish(self) -> Clouds:
         """Write what is buffered, close the file and return the clouds.
 
-        Of the people of a ``body``, place, speed and joints are written too.
+        Where echoes are known, place, speed and joints of their people are written too.
         """
         power, times = self._range_time.finish()
         self._store.extend("slow_time", times, range_time=power)
-        if body is not None:
-            self._store.put_truth(body)
+        if self._table is not None:
+            self._store.put_truth(self._table.capture.body)
         self._store.close()
         clouds = self._clouds.finish()
         if not len(clouds.rdt.points):
@@ -215,18 +215,17 @@ class RunWriter:
         return clouds
 
 
-def write_clouds(folder: Path, clouds: Clouds) -> None:
+def write_clouds(folder: Path, points: NDArray[np.float64], spatial: SpatialCloud) -> None:
     """Write the files of both clouds."""
-    save_cloud_npz(folder / "cloud_rdt.npz", clouds.rdt.points)
-    save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
-    save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
+    save_cloud_npz(folder / "cloud_rdt.npz", points)
+    save_ply(folder / "cloud_rdt.ply", points)
+    save_spatial_npz(folder / "cloud_xyz.npz", spatial)
 
 
-def if_array(path: Path, capture: Capture) -> Any:
+def if_array(path: Path, radar: Radar, n_chirps: int) -> Any:
     """Make a new Zarr array (chirp, rx, sample) for all IF samples, described by attributes."""
-    radar = capture.radar
     together = chirps_together(radar)
-    shape = (capture.n_chirps // together, radar.n_rx, radar.samples_per_chirp)
+    shape = (n_chirps // together, radar.n_rx, radar.samples_per_chirp)
     described = ("multiplexing", "chirp_duration_s", "sample_rate_hz")
     attributes = {name: getattr(radar, name) for name in described}
     return new_store(path, shape, block_chirps(radar) // together, attributes)
