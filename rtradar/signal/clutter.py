@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import cache, lru_cache, partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -25,7 +25,13 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.elementary import add_blended, cubic_weights
 from rtradar.kernels.scatter.silhouettes import Shadow
 from rtradar.radar import Radar
-from rtradar.scatter.common.interpolation import at_nodes, interpolation_weights, sweep_nodes
+from rtradar.scatter.common.interpolation import (
+    at_nodes,
+    interpolation_weights,
+    sweep_nodes,
+    take,
+    together,
+)
 from rtradar.scatter.common.poses import KeyframeCache, antennas_in_use, keyframe_before
 from rtradar.signal.synthesis import synthesize
 from rtradar.system.threads import begun, thread_map
@@ -90,45 +96,24 @@ def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group
     for kind in dict.fromkeys(kinds):
         member = np.array([other == kind for other in kinds])
         chosen = [own for own, inside in zip(objects, member, strict=True) if inside]
-        together = replace(
-            chosen[0],
-            length=np.concatenate([own.length for own in chosen], axis=-1),
-            # In the precision of the samples.
-            amplitude=np.concatenate(
-                [own.amplitude for own in chosen], axis=-1, dtype=np.complex64, casting="same_kind"
-            ),
-            part=np.concatenate([own.part for own in chosen]),
-            bounces=np.concatenate([own.bounces for own in chosen]),
-        )
-        groups.append(_Group(together, member, np.cumsum(counts * member) - counts * member))
+        echoes = together(chosen)
+        # In the precision of the samples.
+        echoes = replace(echoes, amplitude=echoes.amplitude.astype(np.complex64))
+        groups.append(_Group(echoes, member, np.cumsum(counts * member) - counts * member))
     return groups
-
-
-def _amplitude(
-    echoes: Echoes, which: NDArray[np.int64], radar: Radar, nodes: _Array | None
-) -> tuple[NDArray[np.complexfloating], _Array]:
-    """Amplitudes of some echoes at given frequencies, or at few of their own, and these."""
-    if nodes is None:
-        if len(echoes.frequency) <= _SHADOW_NODES:
-            return echoes.amplitude[..., which], echoes.frequency
-        nodes = sweep_nodes(radar, _SHADOW_NODES)
-    return at_nodes(echoes.amplitude[..., which], echoes.frequency, nodes), nodes
 
 
 class _Still(tuple[Echoes, ...]):
     """The echoes of each object of a room; two of the same arrays are one key."""
 
-    def _arrays(self) -> list[NDArray[Any]]:
-        return [array for own in self for array in (own.length, own.amplitude)]
+    def _arrays(self) -> list[int]:
+        return [id(array) for own in self for array in (own.length, own.amplitude)]
 
     def __hash__(self) -> int:
-        return hash(tuple(map(id, self._arrays())))
+        return hash(tuple(self._arrays()))
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, _Still) or len(other) != len(self):
-            return False
-        pairs = zip(self._arrays(), other._arrays(), strict=True)
-        return all(one is another for one, another in pairs)
+        return isinstance(other, _Still) and other._arrays() == self._arrays()
 
 
 @lru_cache(maxsize=_KEPT_ROOMS)
@@ -174,8 +159,8 @@ class RoomIf:
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
             self._sweep = interpolation_weights(shadow.frequency, frequency)
-        self._lost: dict[int, _Samples] = {}
-        self._begun: Callable[[], dict[int, _Samples]] | None = None
+        # What is lost at keyframes: what was begun is waited for.
+        self._lost: Callable[[], dict[int, _Samples]] = dict
         self._slow: KeyframeCache[int, _Samples] = KeyframeCache(0, 4)
 
     @property
@@ -204,19 +189,15 @@ class RoomIf:
         if self._shadow is None:
             samples += self._whole[tx]
             return
+        self.begin(chirps)
+        found = self._lost()
         keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
-        if not self._found().keys() >= set(self._keyframes(keyframes)):
-            self.begin(chirps)
-            self._found()
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
             inside = np.flatnonzero(keyframes == keyframe)
             some = slice(int(inside[0]), int(inside[-1]) + 1)
-            lost = [self._lost[k] for k in range(keyframe - 1, keyframe + 3)]
-            if not any(one.any() for one in lost):
-                samples[some] += self._whole[tx[some]]
-                continue
-            self._blend(samples[some], tx[some], weights[some], np.stack(lost))
+            lost = np.stack([found[k] for k in range(keyframe - 1, keyframe + 3)])
+            self._blend(samples[some], tx[some], weights[some], lost)
 
     def begin(self, chirps: NDArray[np.int64]) -> None:
         """Begin to compute what the body occludes around some chirps (chirp,), ascending.
@@ -226,24 +207,14 @@ class RoomIf:
         """
         if self._shadow is None:
             return
-        needed = self._keyframes(keyframe_before(self._radar, chirps, self._shadow.step)[0])
-        self._lost = {k: lost for k, lost in self._found().items() if k in needed}
-        missing = [k for k in needed if k not in self._lost]
+        before = np.unique(keyframe_before(self._radar, chirps, self._shadow.step)[0])
+        needed = np.unique(before[:, None] + np.arange(-1, 3)).tolist()
+        # Only after what was begun are the caches free.
+        kept = {k: lost for k, lost in self._lost().items() if k >= needed[0]}
+        missing = [k for k in needed if k not in kept]
+        self._lost = lambda: kept
         if missing:
-            self._begun = begun(lambda: {k: self._find(k) for k in missing})
-
-    def _keyframes(self, before: NDArray[np.int64]) -> list[int]:
-        """Numbers of the keyframes around chirps, of which those before them are given."""
-        return np.unique(before[:, None] + np.arange(-1, 3)).tolist()
-
-    def _found(self) -> dict[int, _Samples]:
-        """Wait for what was begun; only then are the caches free."""
-        if self._begun:
-            try:
-                self._lost |= self._begun()
-            finally:
-                self._begun = None
-        return self._lost
+            self._lost = cache(begun(lambda: kept | {k: self._find(k) for k in missing}))
 
     def _blend(
         self,
@@ -273,10 +244,10 @@ class RoomIf:
             weights = cubic_weights([rest / shadow.slower])[0].astype(np.float32)
             for weight, number in zip(weights, range(before - 1, before + 3), strict=True):
                 if weight:
-                    lost += weight * self._slow.get(number, partial(self._find_slow, number))
+                    lost += weight * self._slow.get(number, partial(self._of_weak, number))
         return lost
 
-    def _find_slow(self, number: int) -> _Samples:
+    def _of_weak(self, number: int) -> _Samples:
         """The same of weak points, at one of their own keyframes."""
         assert self._shadow is not None
         return self._of_points(*self._shadow.slow_at(number))
@@ -288,19 +259,18 @@ class RoomIf:
         own = np.searchsorted(starts, echo, side="right") - 1
         for group in self._groups:
             chosen = np.flatnonzero(group.member[own])
-            if len(chosen):
-                which = group.first[own[chosen]] + echo[chosen] - starts[own[chosen]]
-                given = which, self._radar, nodes if len(fraction) > 1 else None
-                amplitude, frequency = _amplitude(group.echoes, *given)
-                some = replace(
-                    group.echoes,
-                    length=group.echoes.length[..., which],
-                    amplitude=amplitude * fraction[..., chosen].astype(np.complex64),
-                    frequency=frequency,
-                    part=group.echoes.part[which],
-                    bounces=group.echoes.bounces[which],
-                )
-                lost += _synthesized(some, self._radar)
+            if not len(chosen):
+                continue
+            which = group.first[own[chosen]] + echo[chosen] - starts[own[chosen]]
+            some = take(group.echoes, which)
+            few = len(some.frequency) <= _SHADOW_NODES
+            frequency = some.frequency if few else sweep_nodes(self._radar, _SHADOW_NODES)
+            frequency = nodes if len(fraction) > 1 else frequency
+            amplitude = at_nodes(some.amplitude, some.frequency, frequency)
+            amplitude = amplitude * fraction[..., chosen].astype(np.complex64)
+            lost += _synthesized(
+                replace(some, amplitude=amplitude, frequency=frequency), self._radar
+            )
         return lost
 
 

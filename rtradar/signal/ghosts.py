@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -238,9 +239,6 @@ def _apart(echoes: NDArray[np.int64], length: NDArray[np.float64]) -> NDArray[np
 def _cubic_weights(cycles: NDArray[np.int64], cycle: NDArray[np.int64]) -> NDArray[np.float64]:
     """Weights (chirp, 4) of values at ``cycles (chirp, 4)`` in the cubic through them."""
     weights = np.ones(cycles.shape)
-    for one in range(ANCHORS):
-        for other in range(ANCHORS):
-            if other != one:
-                step = (cycle - cycles[:, other]) / (cycles[:, one] - cycles[:, other])
-                weights[:, one] *= step
+    for one, other in permutations(range(ANCHORS), 2):
+        weights[:, one] *= (cycle - cycles[:, other]) / (cycles[:, one] - cycles[:, other])
     return weights

@@ -132,8 +132,11 @@ class ReceiverStage:
         radar, receiver = self._radar, self._receiver
         if receiver.leakage_db is None:
             return ()
-        power = receiver.leakage_db / 10 - math.log10(self._watts_per_m2_of_1w())
-        power = 10**power
+        antennas = (radar.tx_antenna, radar.rx_antenna)
+        gains = math.prod(one.peak_gain for one in antennas if one is not None)
+        # Received power of an echo of 1 m^2 over the power of the Tx.
+        of_1_m2 = gains * radar.wavelength_m**2 / (4 * math.pi) ** 3
+        power = 10 ** (receiver.leakage_db / 10 - math.log10(of_1_m2))
         apart = radar.tx_m[:, None] - radar.rx_m[radar.rx_of_tx]
         length = np.linalg.norm(apart, axis=-1)[..., None] + receiver.leakage_length_m
         echoes = Echoes(
@@ -150,13 +153,6 @@ class ReceiverStage:
         times = radar.chirp_times(radar.n_tx)
         self._still += synthesize(echoes, radar, times, dtype=np.complex64)
         return (echoes,)
-
-    def _watts_per_m2_of_1w(self) -> float:
-        """Received power of an echo of 1 m^2 over the power of the Tx."""
-        radar = self._radar
-        antennas = (radar.tx_antenna, radar.rx_antenna)
-        gains = math.prod(one.peak_gain for one in antennas if one is not None)
-        return gains * radar.wavelength_m**2 / (4 * math.pi) ** 3
 
     def _in_m2(self, level_dbm: float) -> float:
         return 10 ** (level_dbm / 10) * 1e-3 / self._radar.watts_per_m2
@@ -231,15 +227,13 @@ class ReceiverStage:
         self._corners = np.zeros(0, np.float32)
         if receiver.highpass_hz:
             beat = np.arange(profiles.shape[-1]) * rate / profiles.shape[-1]
-            delays = np.array([mover.delay_s for mover in e.movers])
-            moving_hz = self._radar.slope_hz_per_s * delays
+            moving_hz = [self._radar.slope_hz_per_s * mover.delay_s for mover in e.movers]
             of_still, of_moving = (
-                np.abs(1 - _passed(receiver.highpass_hz, f)) for f in (beat, moving_hz)
+                np.abs(1 - _passed(receiver.highpass_hz, np.array(f))) for f in (beat, moving_hz)
             )
-            lost = float((np.abs(profiles * of_still) ** 2).max())
-            for mover, taken in zip(e.movers, of_moving, strict=True):
-                lost = max(lost, mover.power_m2 * float(taken) ** 2)
-            if keep("highpass", lost, e.cell_m2, "what it takes from the strongest echo"):
+            moving = np.array([mover.power_m2 for mover in e.movers]) * of_moving**2
+            lost = max((np.abs(profiles * of_still) ** 2).max(), moving.max())
+            if keep("highpass", float(lost), e.cell_m2, "what it takes from the strongest echo"):
                 corners = np.pi * np.array(receiver.highpass_hz) / rate
                 self._corners = corners.astype(np.float32)
         self._dc = np.complex64(0)
