@@ -19,9 +19,7 @@ from rtradar.pipeline.timing import Stages
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
-from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.people_and_objects import PeopleAndObjects
-from rtradar.scatter.validity import Limit
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.signal import Noise, receive, synthesize
@@ -46,19 +44,14 @@ class SpectraSink(Protocol):
 
 
 class PreparedRoom(NamedTuple):
-    """People and objects in a room: what is summed chirp by chirp, and the IF of the room itself.
+    """The IF samples of a room, and those of ghosts that are approximated, if any are.
 
-    ``model`` is that of the people, None of nobody, and ``summed`` the echoes of all that is
-    summed: all but ghosts whose IF samples are approximated, ``ghosts``. ``clutter`` is the room
-    itself. ``summary`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
+    ``summary`` is what was kept and dropped, for JSON.
     """
 
-    model: RoomModel | None
-    summed: PeopleAndObjects
     clutter: RoomIf
     ghosts: GhostIf | None
     summary: dict[str, Any]
-    limits: tuple[Limit, ...]
 
 
 @dataclass(frozen=True)
@@ -69,7 +62,7 @@ class Capture:
     places, and ``processing`` has the radar at its position in the scene.
     ``model`` includes the paths over walls if the scene has any; ``room`` is the room, or None.
     ``summed`` is the model of the echoes that are summed at every chirp: all but ghosts that the
-    room approximates. ``link_budget`` is that of the people's parts, ``warned`` its warnings.
+    room approximates. ``link_budget`` is that of the people's parts, with the limits of all else.
     ``n_chirps`` are whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame,
     ``noise`` is that of the IF samples, and ``receiver`` what else their receiver adds.
     """
@@ -82,7 +75,6 @@ class Capture:
     summed: EchoModel
     room: PreparedRoom | None
     link_budget: LinkBudget
-    warned: tuple[str, ...]
     noise: Noise
     receiver: ReceiverStage | None
     n_chirps: int

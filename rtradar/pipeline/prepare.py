@@ -87,7 +87,7 @@ def prepare(
     # What they return at this level, over every path, and how strong they are without the room.
     with processing.stages.time("survey"):
         model = _echo_model(radar, body, scene, settings)
-        budget, warned = _surveyed(model, radar, body, n_chirps, scene, settings)
+        budget = _surveyed(model, radar, body, n_chirps, scene, settings)
     # With that the noise.
     noise = _noise(radar, budget, settings)
     # The room: its clutter, and which echoes over its walls are worth their cost beside the noise.
@@ -98,8 +98,10 @@ def prepare(
     if not scene.is_empty:
         with processing.stages.time("room"):
             powers = budget.power, noise.power
-            room = prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
-            summed = room.summed
+            room, limits = _prepare_room(model, radar, body, scene, settings, n_chirps, *powers)
+            budget = replace(budget, limits=(*budget.limits, *limits))
+        if room.ghosts is not None and model.room is not None:
+            summed = model.with_person(model.room.without_ghosts())
     # What else the receiver does to the samples, by the strongest that moves.
     receiver = None
     if radar.receiver is not None:
@@ -120,7 +122,6 @@ def prepare(
         summed=summed,
         room=room,
         link_budget=budget,
-        warned=warned,
         noise=noise,
         receiver=receiver,
         n_chirps=n_chirps,
@@ -210,19 +211,20 @@ def _surveyed(
     n_chirps: int,
     scene: Scene,
     settings: RunSettings,
-) -> tuple[LinkBudget, tuple[str, ...]]:
-    """Return the link budget with the limits of the objects, and the warnings that were given."""
+) -> LinkBudget:
+    """Return the link budget with the limits of the objects; of nobody visible, all warnings."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         alone, spreading = model.people_alone, settings.spreading
         budget = link_budget(alone, radar, body, n_chirps, spreading=spreading, scene=scene)
-        limits = model.limits
-        for limit in limits:
+        for limit in model.limits:
             warn_of(limit)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    said = tuple(str(warning.message) for warning in caught)
-    return replace(budget, limits=(*budget.limits, *limits)), said
+    limits = [*budget.limits, *model.limits]
+    if not budget.visible:
+        limits += [Limit("nobody_visible", 0.0, str(warning.message)) for warning in caught]
+    return replace(budget, limits=tuple(limits))
 
 
 def people_in(scene: Scene, several: Movers) -> tuple[Scene, tuple[Person, ...]]:
@@ -325,7 +327,7 @@ def _noise(radar: Radar, budget: LinkBudget, settings: RunSettings) -> Noise:
 # -- rooms -----------------------------------------------------------------------------------------
 
 
-def prepare_room(
+def _prepare_room(
     everything: PeopleAndObjects,
     radar: Radar,
     body: Body,
@@ -334,12 +336,13 @@ def prepare_room(
     n_chirps: int,
     person_power_m2: float,
     noise_power_m2: float,
-) -> PreparedRoom:
+) -> tuple[PreparedRoom, tuple[Limit, ...]]:
     """Trace a room with whoever is in it, and leave out what stays below the noise.
 
     The settings give the backend, the order of the paths, and whether everything is kept. The
     powers are those of people's echoes without the room, and of noise, per IF sample [m^2]. What is
-    not worth its cost is taken out of the model of ``everything``.
+    not worth its cost is taken out of the model of ``everything``. Returned are also the limits of
+    the walls.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     allowed = 0.0
@@ -384,11 +387,7 @@ def prepare_room(
         summary["approximation"] = {"tolerance_db": settings.path_tolerance_db, **said}
     if scene.objects:
         summary["objects"] = everything.prune(radar, n_chirps, noise)
-    summed = everything
-    if model is not None and ghosts is not None:
-        summed = everything.with_person(model.without_ghosts())
-    limits = _limits(model, radar, clutter)
-    return PreparedRoom(model, summed, static, ghosts, summary, limits)
+    return PreparedRoom(static, ghosts, summary), _limits(model, radar, clutter)
 
 
 def _limits(model: RoomModel | None, radar: Radar, clutter: Clutter) -> tuple[Limit, ...]:

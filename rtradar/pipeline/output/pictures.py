@@ -55,7 +55,7 @@ def room_of(capture: Capture, plots: Plots) -> ShownRoom | None:
     if not capture.room:
         return None
     maps: Any = plots.maps
-    radar, body, scene, model = capture.radar, capture.body, capture.scene, capture.room.model
+    radar, body, scene, model = capture.radar, capture.body, capture.scene, capture.model.room
     findings = plots.summary["room"]["ghosts"]
     time_s = findings["time_s"]
     frame = int(np.abs(maps["time"][:] - time_s).argmin())

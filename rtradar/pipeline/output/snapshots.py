@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.pipeline.output.truth import EchoTable, Look, truth_of
+from rtradar.pipeline.output.truth import EchoTable, Look, added_up, truth_of
 from rtradar.radar import Radar
 from rtradar.report.snapshots import Snapshots
 from rtradar.report.three_d import semi_axis_poses
@@ -30,14 +29,6 @@ _CELL_M, _COARSER = 0.005, 1.2  # of the grid that thins a mesh
 Key = tuple[int, int, int]
 
 
-class _Observed(NamedTuple):
-    """Values of the echoes at some instants, (step, key)."""
-
-    range_m: NDArray[np.float64]
-    velocity_mps: NDArray[np.float64]
-    power_m2: NDArray[np.float64]
-
-
 def snapshots(table: EchoTable) -> Snapshots:
     """Return body, room and echoes of a capture at the middle of evenly chosen frames.
 
@@ -47,8 +38,8 @@ def snapshots(table: EchoTable) -> Snapshots:
     radar, body, scene = capture.radar, capture.body, capture.scene
     times = np.minimum(radar.window_times(capture.frame_starts[window]), body.duration_s)
     paths = capture.model.paths
-    keys, observed = _by_key(table.shown(), len(body.part_names))
-    chosen = _strongest(keys, observed.power_m2)
+    keys, (power, ranges, rates) = _by_key(table.shown(), len(body.part_names))
+    chosen = _strongest(keys, power)
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
     vertices, faces, piece = _furniture(scene)
@@ -62,9 +53,9 @@ def snapshots(table: EchoTable) -> Snapshots:
         echo_path=np.array([used.index(path) for path, _, _ in keys], dtype=np.int64),
         echo_part=np.array([part for _, part, _ in keys], dtype=np.int64),
         echo_bounces=np.array([bounces for _, _, bounces in keys], dtype=np.int64),
-        range_m=observed.range_m[:, chosen],
-        velocity_mps=observed.velocity_mps[:, chosen],
-        power_m2=observed.power_m2[:, chosen],
+        range_m=ranges[:, chosen],
+        velocity_mps=rates[:, chosen],
+        power_m2=power[:, chosen],
         corners=_corners(radar, body, paths, keys, times).astype(np.float32),
         wall_names=np.array([wall.name for wall in scene.walls], dtype=np.str_),
         walls=np.array([wall.corners for wall in scene.walls]).reshape(-1, 4, 3),
@@ -83,31 +74,25 @@ def snapshots(table: EchoTable) -> Snapshots:
 # -- echoes ----------------------------------------------------------------------------------------
 
 
-def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], _Observed]:
-    """Return the echoes of people at some instants, with one column for each key that ever comes.
+def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], list[NDArray[np.float64]]]:
+    """Return the keys of people's echoes at some instants, and power, range and rate (step, key).
 
-    Echoes of one path, part and number of reflections are summed.
+    Echoes of one path, part and number of reflections are summed; of those that are not there range
+    and rate are 0.
     """
     step = np.repeat(np.arange(len(looks)), [len(look.part) for look in looks])
-    path, part, bounces, range_m, rate, power = (
+    path, part, bounces, *values = (
         np.concatenate([getattr(look, name) for look in looks])
-        for name in ("path", "part", "bounces", "range_m", "rate_mps", "power_m2")
+        for name in ("path", "part", "bounces", "power_m2", "range_m", "rate_mps")
     )
     # The view follows the parts of people, not objects.
     own = part < n_parts
     keys, column = np.unique(np.stack([path, part, bounces])[:, own], axis=1, return_inverse=True)
-    cell, shape = step[own] * keys.shape[1] + column.ravel(), (len(looks), keys.shape[1])
-
-    def summed(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        # Of nothing NumPy counts in whole numbers.
-        return np.bincount(cell, values, math.prod(shape)).reshape(shape).astype(np.float64)
-
-    total = summed(power[own])
-    fraction = np.where(total.ravel()[cell] > 0, power[own], 1.0)
-    weight = summed(fraction)
-    known = np.where(weight > 0, weight, 1.0)
-    ranges, rates = (summed(fraction * values[own]) / known for values in (range_m, rate))
-    return [tuple(key) for key in keys.T.tolist()], _Observed(ranges, rates, total)
+    shape = len(looks), keys.shape[1]
+    found = added_up(
+        step[own] * shape[1] + column.ravel(), shape, *(value[own] for value in values)
+    )
+    return [tuple(key) for key in keys.T.tolist()], [np.nan_to_num(one) for one in found]
 
 
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:

@@ -180,14 +180,9 @@ def _plain(value: object) -> Any:
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:
-    of_room = capture.room.limits if capture.room else ()
-    limits = [dataclasses.asdict(limit) for limit in (*capture.link_budget.limits, *of_room)]
-    if not capture.link_budget.visible:
-        invisible = {"name": "nobody_visible", "share": 0.0}
-        limits += [invisible | {"message": message} for message in capture.warned]
-    elif (capture.settings.model_options or {}).get("bounces", 1) == 1:
-        limits.append(_SINGLE_REFLECTIONS)
-    return limits
+    limits = [dataclasses.asdict(limit) for limit in capture.link_budget.limits]
+    single = (capture.settings.model_options or {}).get("bounces", 1) == 1
+    return limits + ([_SINGLE_REFLECTIONS] if single and capture.link_budget.visible else [])
 
 
 def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
@@ -229,7 +224,7 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
             "azimuth_deg": math.degrees(ghost.azimuth_rad),
             "power_m2": ghost.power_m2,
         }
-        for ghost in ghosts(capture.room.model, capture.radar, time_s)
+        for ghost in ghosts(capture.model.room, capture.radar, time_s)
     ]
     clutter = dict(capture.room.summary["clutter"])
     if not (capture.people or capture.scene.objects):

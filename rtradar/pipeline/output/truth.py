@@ -36,6 +36,9 @@ CYCLES_COMPARED = 40
 
 _STEP_S = 0.01  # over which speeds are taken
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
 
 class Parts(NamedTuple):
     """The parts of all people and then the objects: ``names`` and the number of the ``person``.
@@ -57,19 +60,31 @@ def parts_of(capture: Capture) -> Parts:
 def truth_of_parts(table: EchoTable, start_cycle: int, time_s: float) -> dict[str, NDArray[Any]]:
     """Return what is true of each part (part,) at the middle of a frame, which is at ``time_s``."""
     look, n_parts = table.middle(start_cycle), len(parts_of(table.capture).names)
-    direct = np.flatnonzero((look.bounces == 1) & (look.path == 0))
-    part, power = look.part[direct], look.power_m2[direct]
-    total = np.bincount(part, power, n_parts)
-    weight = np.where(total[part] > 0, power, 1.0)
-    sums = np.bincount(part, weight, n_parts)
-
-    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        added = np.bincount(part, weight * values[direct], n_parts)
-        return np.divide(added, sums, out=np.full(n_parts, np.nan), where=sums > 0)
-
-    rate = mean(look.rate_mps)
-    range_m = mean(look.range_m) + (time_s - look.time_s) * rate
+    direct = (look.bounces == 1) & (look.path == 0)
+    values = (own[direct] for own in (look.power_m2, look.range_m, look.rate_mps))
+    total, range_m, rate = added_up(look.part[direct], (n_parts,), *values)
+    range_m += (time_s - look.time_s) * rate
     return {"range_m": range_m, "range_rate_mps": rate, "power_m2": total, "visible": total > 0}
+
+
+def added_up(
+    cell: NDArray[np.integer], shape: tuple[int, ...], power: Array, *values: Array
+) -> list[Array]:
+    """Return the power of all echoes (echo,) of each cell, and means of their values.
+
+    Means are weighted by power, or plain where there is none, and NaN where there is no echo. The
+    ``cell`` is a number in an array of this shape.
+    """
+    size = math.prod(shape)
+
+    def summed(values: Array) -> Array:
+        # Of nothing NumPy counts in whole numbers.
+        return np.bincount(cell, values, size).reshape(shape).astype(np.float64)
+
+    total = summed(power)
+    weight = np.where(total.ravel()[cell] > 0, power, 1.0)
+    with np.errstate(invalid="ignore"):
+        return [total, *(summed(weight * own) / summed(weight) for own in values)]
 
 
 def truth_of(body: Body, times: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
@@ -209,9 +224,6 @@ _RATE_CYCLES = 2
 MAX_SHOWN, SHOWN_HZ = 400, 40.0
 """Largest number of frames whose middle is kept, those of 10 s, and of these in a second; of longer
 captures fewer frames are kept."""
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 class Look(NamedTuple):

@@ -123,6 +123,7 @@ def run_view_of(result: Result, maps: Mapping[str, Any], snapshots: Snapshots) -
     fidelity = _line(summary.get("fidelity", ""))
     scene = _line(parameters.get("scene", "free-space"))
     removal = _line(parameters.get("clutter_removal", "none"))
+    power_db, source = _of_points(maps, points, radar, spreading, len(snapshots.sources))
     cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
     return RunView(
         heading=_line(parameters.get("motion", "Recording")),
@@ -132,8 +133,8 @@ def run_view_of(result: Result, maps: Mapping[str, Any], snapshots: Snapshots) -
         range_doppler=_range_doppler(maps, snapshots, radar, spreading),
         spectrogram=_spectrogram(maps, radar, spreading, _windows(parameters)),
         rdt_points=points,
-        rdt_power_db=_at_points(maps, points, radar, spreading),
-        rdt_source=_source_of_points(maps, points, len(snapshots.sources)),
+        rdt_power_db=power_db,
+        rdt_source=source,
         spatial=result.spatial,
         spreading=spreading,
     )
@@ -283,45 +284,31 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     return Levels.of([level_db], shape, colour_limits(level_db), label=label, **axes)
 
 
-def _at_points(
-    maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool
-) -> NDArray[np.float64]:
-    """Return the power of the range-Doppler map nearest to each point, mean of channels [dB]."""
+def _of_points(
+    maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool, n_sources: int
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the power of the cell nearest to each point, mean of channels [dB], and its source.
+
+    That is who returned the detected cell nearest to the point, -1 where nobody is known: points
+    lie on the surface about detected cells, half a cell away from one.
+    """
+    power, found = np.zeros(len(points)), np.full(len(points), -1)
     if not len(points):
-        return np.zeros(0)
-    nearest = _cells(maps, points)
-    found = np.zeros(len(points))
-    for window in np.unique(nearest[0]).tolist():
-        own = nearest[0] == window
-        found[own] = maps["range_doppler"][window][nearest[1][own], nearest[2][own]]
-    unit = field_unit(radar, spreading=spreading, range_m=maps["range"][:][nearest[1]])
-    return unit.level(_powers(found) / radar.n_channels)
-
-
-def _cells(maps: Any, points: NDArray[np.float64]) -> list[NDArray[np.int64]]:
-    """Return the indices of the cells nearest to points, along each axis of the maps."""
-    axes = (maps[axis][:] for axis in _MAPS["range_doppler"])
-    return [
+        return power, found
+    axes = [maps[axis][:] for axis in _MAPS["range_doppler"]]
+    cells = [
         np.searchsorted((values[1:] + values[:-1]) / 2, column)
         for values, column in zip(axes, points.T, strict=True)
     ]
-
-
-def _source_of_points(maps: Any, points: NDArray[np.float64], n_sources: int) -> NDArray[np.int64]:
-    """Return who returned the detected cell nearest to each point, -1 where nobody is known.
-
-    Points lie on the surface about detected cells, half a cell away from one.
-    """
-    found = np.full(len(points), -1)
-    if not len(points) or "source" not in maps:
-        return found
-    cells = _cells(maps, points)
+    nearest_first = sorted(np.ndindex(3, 3, 3), key=lambda step: sum(abs(i - 1) for i in step))
     for window in np.unique(cells[0]).tolist():
         own = np.flatnonzero(cells[0] == window)
+        power[own] = maps["range_doppler"][window][cells[1][own], cells[2][own]]
+        if "source" not in maps:
+            continue
         first = max(window - 1, 0)
         sources = _whole(np.asarray(maps["source"][first : window + 2]))
-        order = sorted(np.ndindex(3, 3, 3), key=lambda step: sum(abs(one - 1) for one in step))
-        for step in order:
+        for step in nearest_first:
             lacking = own[found[own] < 0]
             at = [cells[axis][lacking] + step[axis] - 1 for axis in range(3)]
             at[0] -= first
@@ -329,4 +316,6 @@ def _source_of_points(maps: Any, points: NDArray[np.float64], n_sources: int) ->
                 [(i >= 0) & (i < n) for i, n in zip(at, sources.shape, strict=True)], axis=0
             )
             found[lacking[inside]] = sources[tuple(index[inside] for index in at)]
-    return np.where(found < n_sources, found, -1)
+    unit = field_unit(radar, spreading=spreading, range_m=axes[1][cells[1]])
+    level_db = unit.level(_powers(power) / radar.n_channels)
+    return level_db, np.where(found < n_sources, found, -1)

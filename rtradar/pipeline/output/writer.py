@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -124,12 +124,9 @@ class RunWriter:
         self._kept_cycle = None
         if len(frame_starts) and removed["time"] != "none":
             self._kept_cycle = int(frame_starts[len(frame_starts) // 2])
-        left_out = ("source",) if table is None else ()
         said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
         parts = None if table is None else parts_of(table.capture)
-        self._store = MapStore(
-            file, axes_of(processing), said, removed, left_out, processing.unit, parts
-        )
+        self._store = MapStore(file, axes_of(processing), said, removed, processing.unit, parts)
 
     def __enter__(self) -> RunWriter:
         return self
@@ -180,11 +177,11 @@ class RunWriter:
     ) -> None:
         """Collect the range spectra of the frame that is kept, and once it is whole, its maps."""
         radar, windows = self._processing.radar, self._processing.window_functions
-        begin = max(start_cycle * radar.n_tx - first, 0)
-        end = start_cycle * radar.n_tx + radar.chirps_per_frame - first
-        if begin >= min(end, len(spectra)):
+        begin = start_cycle * radar.n_tx - first
+        end = begin + radar.chirps_per_frame
+        if end <= 0 or begin >= len(spectra):
             return
-        self._received.append(spectra[begin:end].copy())
+        self._received.append(spectra[max(begin, 0) : end].copy())
         if end > len(spectra):
             return
         shape = radar.cycles_per_frame, radar.n_tx, *spectra.shape[1:]
@@ -246,9 +243,9 @@ class MapStore:
     ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
-    becomes an attribute of their datasets, ``attributes`` those of the file. The maps ``left_out``
-    are not made. ``unit`` is that of the samples, whose square is that of powers. For the ``parts``
-    there is a group ``truth``.
+    becomes an attribute of their datasets, ``attributes`` those of the file. ``unit`` is that of
+    the samples, whose square is that of powers. For the ``parts`` there is a group ``truth``, and
+    without them no map ``source``.
     """
 
     def __init__(
@@ -257,7 +254,6 @@ class MapStore:
         fixed: Mapping[str, NDArray[np.float64]],
         attributes: Mapping[str, Any],
         clutter_removal: Mapping[str, str] | None = None,
-        left_out: Collection[str] = (),
         unit: str = "m",
         parts: Parts | None = None,
     ) -> None:
@@ -276,7 +272,8 @@ class MapStore:
             self._make(name, TABLES["axes"][name], data=values)
         said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
         for name, kind in TABLES["maps"].items():
-            if name in left_out or any(axis not in fixed for axis in kind.dims[1:]):
+            unknown = name == "source" and parts is None
+            if unknown or any(axis not in fixed for axis in kind.dims[1:]):
                 continue
             removal = (clutter_removal or {}).get(kind.dims[0], "none")
             shape = tuple(len(fixed[axis]) for axis in kind.dims[1:])
