@@ -217,14 +217,15 @@ def _surveyed(
         warnings.simplefilter("always", ValidityWarning)
         alone, spreading = model.people_alone, settings.spreading
         budget = link_budget(alone, radar, body, n_chirps, spreading=spreading, scene=scene)
-        for limit in model.limits:
+        limits = model.limits
+        for limit in limits:
             warn_of(limit)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    limits = [*budget.limits, *model.limits]
+    all_limits = [*budget.limits, *limits]
     if not budget.visible:
-        limits += [Limit("nobody_visible", 0.0, str(warning.message)) for warning in caught]
-    return replace(budget, limits=tuple(limits))
+        all_limits += [Limit("nobody_visible", 0.0, str(warning.message)) for warning in caught]
+    return replace(budget, limits=tuple(all_limits))
 
 
 def people_in(scene: Scene, several: Movers) -> tuple[Scene, tuple[Person, ...]]:

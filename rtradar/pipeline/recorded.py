@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias, Unpack
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
+from rtradar.exchange.recording import SampleFile
 from rtradar.pipeline.capture import SpectraSink
 from rtradar.pipeline.prepare import with_background
 from rtradar.pipeline.processing import Processing, block_chirps, refuse_large_maps
@@ -29,27 +30,12 @@ if TYPE_CHECKING:
     Block: TypeAlias = NDArray[np.complexfloating[Any, Any]] | xr.DataArray
 
 
-class Rows(Protocol):
-    """Array whose rows are read when they are asked for, such as a file or one of Zarr."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Length of the axes."""
-
-    @property
-    def dtype(self) -> Any:
-        """Type of the samples."""
-
-    def __len__(self) -> int: ...
-    def __getitem__(self, rows: slice, /) -> Any: ...
-
-
 _NAME = "IF samples"
 _DIMENSIONS = ("chirp", "rx", "sample"), ("cycle", "tx", "rx", "sample")
 
 
 def process_samples(
-    samples: Block | Rows | Iterable[Block],
+    samples: Block | SampleFile | Iterable[Block],
     radar: Radar,
     out: str | Path | None = None,
     *,
@@ -123,7 +109,11 @@ class Samples:
     """
 
     def __init__(
-        self, samples: Block | Rows | Iterable[Block], processing: Processing, *, in_memory: bool
+        self,
+        samples: Block | SampleFile | Iterable[Block],
+        processing: Processing,
+        *,
+        in_memory: bool,
     ) -> None:
         self.processing, self._in_memory = processing, in_memory
         self._radar = radar = processing.radar
@@ -166,13 +156,16 @@ class Samples:
                 held.append(part)
                 begin, count = begin + len(part), count + len(part)
                 if count == most:
-                    yield self._block(part if len(held) == 1 else np.concatenate(held))
+                    yield self._block(held)
                     held, count = [], 0
-        if whole := count // self._cycle_rows * self._cycle_rows:
-            yield self._block(np.concatenate(held)[:whole])
+        if count >= self._cycle_rows:
+            yield self._block(held)
         self._checked(self.n_chirps)
 
-    def _block(self, block: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
+    def _block(self, held: list[NDArray[np.complex64]]) -> tuple[int, NDArray[np.complex64]]:
+        """Join rows to a block of whole cycles, with the number of its first chirp."""
+        block = held[0] if len(held) == 1 else np.concatenate(held)
+        block = block[: len(block) // self._cycle_rows * self._cycle_rows]
         first, n_chirps = self.n_chirps, len(block) * chirps_together(self._radar)
         if not np.isfinite(block).all():
             where = first + int(np.flatnonzero(~np.isfinite(block).all(axis=(1, 2)))[0])

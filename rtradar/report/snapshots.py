@@ -24,7 +24,7 @@ _LARGEST = 1e9
 DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
 """Errors that damaged files and arrays cause."""
 
-_MAY_BE_NAN = ("corners",)
+_MAY_BE_NAN = ("corners", "places")
 
 
 def _array(kind: str, *axes: str | int, into: str | None = None) -> Any:
@@ -101,7 +101,7 @@ class Snapshots:
         sizes: dict[str, int] = {}
         for one in fields(self):
             kind, axes = one.metadata["kind"], one.metadata["axes"]
-            array = _checked(one.name, getattr(self, one.name), sizes, kind, axes)
+            array = checked(one.name, getattr(self, one.name), sizes, kind, axes)
             object.__setattr__(self, one.name, array)
         if not sizes["step"]:
             raise InputError("view: there is no snapshot; at least one is needed")
@@ -155,10 +155,14 @@ class Snapshots:
         return int(np.abs(self.times - time_s).argmin())
 
 
-def _checked(
+def checked(
     name: str, values: Any, sizes: dict[str, int], kind: str, axes: tuple[str | int, ...]
 ) -> NDArray[Any]:
-    """Return a field as an array of its type; ``sizes`` collects the lengths of named axes."""
+    """Return an array of a file as one of its type, ``kind``, with these axes.
+
+    ``sizes`` collects the lengths of named axes. InputError if it is another, or a value is not
+    finite or too large.
+    """
     array = np.asarray(values)
     if kind == "U" and array.size == 0:
         array = array.astype("U")  # an empty list has no string type
@@ -217,13 +221,6 @@ def refused(path: str | Path, error: Exception) -> InputError:
     return InputError(f"'{path}': {why}; make it anew with: rtradar run")
 
 
-_LATER = {
-    *("part_person", "object_names", "mesh_source", "mesh_faces", "mesh_of_vertex", "mesh_part"),
-    *("mesh_rows", "blend_vertex", "blend_row", "blend_weight"),
-}
-"""Fields that files of the first format lack, all of them empty or 0 there."""
-
-
 def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
     times, parts = arrays["times"], arrays["part_names"].tolist()
@@ -237,8 +234,8 @@ def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]
     }
     sizes = {"step": len(times), "part": len(parts)}
     for one in fields(Snapshots):
-        if one.name in _LATER:
+        if one.name not in {**found, **arrays}:
             axes, kind = one.metadata["axes"], one.metadata["kind"]
             shape = [axis if isinstance(axis, int) else sizes.get(axis, 0) for axis in axes]
-            found.setdefault(one.name, np.zeros(shape, kind))
+            found[one.name] = np.zeros(shape, kind)
     return found

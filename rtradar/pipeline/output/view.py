@@ -23,7 +23,7 @@ from rtradar.radar import Radar
 from rtradar.report.canvas import FieldUnit, field_unit, thinned
 from rtradar.report.maps import Levels, colour_limits, limits_of, spaced, strongest
 from rtradar.report.run_view import COLOURS, RunView, write_view
-from rtradar.report.snapshots import DAMAGE, Snapshots, load_snapshots, refused
+from rtradar.report.snapshots import DAMAGE, Snapshots, checked, load_snapshots, refused
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json
 from rtradar.system.hdf5 import stored
@@ -37,9 +37,6 @@ _MAPS = {
     "spectrogram": ("spectrogram_time", "spectrogram_velocity"),
 }
 """Datasets that are read from ``maps.h5``, with their axes."""
-
-_LARGEST = 1e9
-"""Largest coordinate or rate, in any unit; a larger one is damage."""
 
 _MAX_LETTERS = 200
 """Length of a name from the summary that is shown."""
@@ -156,17 +153,18 @@ def read_result(folder: Path) -> Result:
         radar = Radar(**summary["parameters"]["radar"])
         _windows(summary["parameters"])
         path = folder / "cloud_rdt.npz"
-        points = _archive(path, ("points",))["points"]
-        if points.ndim != 2 or points.shape[1] != 3:
-            raise ValueError(f"points have shape {points.shape}")
+        points = _sound("points", read_arrays(path)["points"], {}, "f8", ("point", 3))
         path = folder / "cloud_xyz.npz"
-        spatial = _archive(path, ("points", "velocity", "power", "time"), ("points",), ("source",))
-        try:
-            cloud = SpatialCloud(**spatial)
-        except InputError as error:
-            raise ValueError(str(error)) from None
-        return Result(points, cloud, summary, radar, out=folder)
-    except DAMAGE as error:
+        arrays, sizes = read_arrays(path), dict[str, int]()
+        columns = [_sound("places", arrays["points"], sizes, "f8", ("point", 3))]
+        kinds = {"velocity": "f8", "power": "f8", "time": "f8", "source": "i8"}
+        columns += [
+            _sound(name, arrays[name], sizes, kind, ("point",))
+            for name, kind in kinds.items()
+            if name in arrays or name != "source"
+        ]
+        return Result(points, SpatialCloud(*columns), summary, radar, out=folder)
+    except (InputError, *DAMAGE) as error:
         raise refused(path, error) from None
 
 
@@ -194,23 +192,12 @@ def _line(value: Any) -> str:
     return printable(str(value)[:_MAX_LETTERS])
 
 
-def _archive(
-    path: Path,
-    names: tuple[str, ...],
-    may_be_nan: tuple[str, ...] = (),
-    may_lack: tuple[str, ...] = (),
-) -> dict[str, NDArray[Any]]:
-    arrays = read_arrays(path)
-    for name in names:
-        _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
-    found = {name: arrays[name].astype(np.float64) for name in names}
-    return found | {name: _whole(arrays[name]) for name in may_lack if name in arrays}
-
-
-def _finite(values: NDArray[Any]) -> NDArray[Any]:
-    if values.dtype not in (np.float32, np.float64) or not (np.abs(values) <= _LARGEST).all():
-        raise ValueError("a value is no number, or too large")
-    return values
+def _sound(*given: Any) -> NDArray[Any]:
+    """Return what `checked` does; ValueError where that refuses it."""
+    try:
+        return checked(*given)
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
@@ -229,7 +216,7 @@ def _maps(file: h5py.File) -> dict[str, Any]:
         maps["source"] = stored(file, "source")
     for name, axes in _MAPS.items():
         if maps[name].dtype not in (np.float32, np.float64) or maps[name].shape != tuple(
-            len(_finite(maps[axis][:])) for axis in axes
+            len(_sound(axis, maps[axis][:], {}, "f8", (axis,))) for axis in axes
         ):
             raise ValueError(f"{name} does not fit its axes")
     if not all(len(maps[axis]) for axis in _MAPS["range_doppler"]):
