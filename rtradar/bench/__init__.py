@@ -7,6 +7,8 @@ import platform
 import sys
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from statistics import median
 from typing import Any, BinaryIO
@@ -296,31 +298,17 @@ def tables(found: dict[str, Any]) -> str:
     """All tables of what `measure` found."""
     template = templates(Path(__file__).parent, escaped=False).get_template("tables.md")
     given = {"not_to_cloud": NOT_TO_CLOUD, "cheapest": CHEAPEST}
-    stages = [(*one, _stages(one[1])) for one in _by_radar(found["models"])]
-    return aligned(template.render(found | given, stages=stages)).rstrip()
-
-
-def _by_radar(models: list[Row]) -> list[tuple[str, list[Row]]]:
-    radars = dict.fromkeys(row["radar"] for row in models)
-    return [(radar, [row for row in models if row["radar"] == radar]) for radar in radars]
-
-
-def _stages(models: list[Row]) -> list[tuple[str, list[float | None]]]:
-    """Label of each stage, and its median by each model that has it."""
-    lines = []
-    for name in dict.fromkeys(name for row in models for name in row["stages"]):
-        label = f"{name} (not to the cloud)" if name in NOT_TO_CLOUD else name
-        lines.append((label, [row["stages"].get(name, {}).get("median") for row in models]))
-    return [*lines, ("all to the cloud", [row["to_cloud_s"]["median"] for row in models])]
+    return aligned(template.render(found | given)).rstrip()
 
 
 def draw(found: dict[str, Any], file: BinaryIO) -> None:
     """Draw what `measure` found, as PNG."""
-    radars, growth = _by_radar(found["models"]), found["growth"]
+    growth = found["growth"]
+    radars = {radar: [*own] for radar, own in groupby(found["models"], itemgetter("radar"))}
     rows = max(1, len(radars) + bool(growth["duration"]))
     figure = new_figure(3.4 * rows, width_in=11)
     places = list(figure.subplots(rows, 1, squeeze=False)[:, 0])
-    for axes, (radar, models) in zip(places, radars, strict=False):
+    for axes, (radar, models) in zip(places, radars.items(), strict=False):
         _bars(axes, models, radar)
     if growth["duration"]:
         _growing(places[-1], growth["duration"], growth["fidelity"])

@@ -224,7 +224,13 @@ class CloudMaker:
         """Process and yield the frames that end with these chirps, and add them to the clouds."""
         radar, stages = self._processing.radar, self._processing.stages
         window_functions = self._processing.window_functions
-        for _, start, window in stages.each("frames", self._sliding.push(spectra)):
+        frames = self._sliding.push(spectra)
+        while True:
+            with stages.time("frames"):
+                frame = next(frames, None)
+            if frame is None:
+                return
+            _, start, window = frame
             with stages.time("clutter removal"):
                 cube = self._processing.removal.window(window)
             with stages.time("doppler"):

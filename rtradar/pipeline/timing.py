@@ -5,11 +5,10 @@ from __future__ import annotations
 import resource
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TypeVar
 
 from rtradar.system.clock import Moment
 from rtradar.trace.rays import rays_traced
@@ -25,8 +24,6 @@ _LINES = {
 
 NOT_TO_CLOUD = ("spectrogram", "angle", "sources", "write", "pictures", "view", "report")
 """Stages of a run that the range-Doppler-time cloud does not need: other products, and files."""
-
-_Item = TypeVar("_Item")
 
 _lines_shown: ContextVar[bool] = ContextVar("lines_shown", default=False)
 
@@ -96,17 +93,6 @@ class Stages:
                 yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + Moment.now().work_s - start
-
-    def each(self, name: str, items: Iterable[_Item]) -> Iterator[_Item]:
-        """Yield items, and add the time until each comes to stage ``name``."""
-        left = iter(items)
-        while True:
-            with self.time(name):
-                try:
-                    item = next(left)
-                except StopIteration:
-                    return
-            yield item
 
 
 def forget_peak_memory() -> None:

@@ -16,14 +16,13 @@ import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache, partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
 from rtradar.kernels.elementary import add_blended, cubic_weights
-from rtradar.kernels.scatter.silhouettes import Shadow
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import (
     at_nodes,
@@ -47,31 +46,6 @@ _CHIRPS_A_THREAD = 16
 
 _KEPT_ROOMS = 2
 """Rooms whose samples stay in memory: as many as traced rooms, which this package must not know."""
-
-
-class MovingShadow(Protocol):
-    """What of static clutter a body occludes, as `ClutterShadow` computes it.
-
-    ``step`` is the number of chirps between keyframes, ``slower`` that of keyframes between those
-    of weak points, 0 where none are apart; ``starts (object + 1,)`` the first echo of
-    each object of the clutter, ``mirrors`` the objects that walls reflect; ``frequency (node,)``
-    are the frequencies of their shadow, ``point_frequency (node,)`` those of the others' [Hz].
-    """
-
-    step: int
-    slower: int
-    starts: NDArray[np.int64]
-    mirrors: tuple[int, ...]
-    frequency: _Array
-    point_frequency: _Array
-
-    def at(self, keyframe: int) -> Shadow:
-        """Return what is occluded at a keyframe."""
-        ...
-
-    def slow_at(self, keyframe: int) -> tuple[NDArray[np.int64], NDArray[np.complex128]]:
-        """Return what is lost of weak points at the keyframe ``keyframe * slower``."""
-        ...
 
 
 class _Group(NamedTuple):
@@ -145,14 +119,13 @@ class RoomIf:
     The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes the IF
     of what the body occludes is computed. Between them a cubic goes through the samples, for the
     sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object for
-    one cycle, as `Clutter.cycle` yields them; without a shadow the room is exactly still.
+    one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes of them, a
+    `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly still.
     """
 
-    def __init__(
-        self, radar: Radar, objects: Iterable[Echoes], shadow: MovingShadow | None = None
-    ) -> None:
+    def __init__(self, radar: Radar, objects: Iterable[Echoes], shadow: Any = None) -> None:
         self._radar, still = radar, _Still(objects)
-        self._shadow = shadow if still else None
+        self._shadow: Any = shadow if still else None
         mirrors = tuple(shadow.mirrors) if shadow else ()
         self._groups, self._whole, self._mirrors = _at_rest(radar, still, mirrors)
         if shadow:
@@ -216,25 +189,18 @@ class RoomIf:
         if missing:
             self._lost = cache(begun(lambda: kept | {k: self._find(k) for k in missing}))
 
-    def _blend(
-        self,
-        samples: _Samples,
-        tx: NDArray[np.int64],
-        weights: NDArray[np.float32],
-        lost: _Samples,
-    ) -> None:
-        out = samples.reshape(len(tx), -1)
-        rows = lost.reshape(4, len(self._whole), -1), self._whole.reshape(len(self._whole), -1)
+    def _blend(self, out: _Samples, tx: Any, weights: NDArray[np.float32], lost: _Samples) -> None:
+        n_tx, whole = len(self._whole), self._whole.reshape(len(self._whole), -1)
+        rows, out = lost.reshape(4, n_tx, -1), out.reshape(len(tx), -1)
 
         def fill(begin: int) -> None:
             some = slice(begin, begin + _CHIRPS_A_THREAD)
-            add_blended(tx[some], weights[some], *rows, out[some])
+            add_blended(tx[some], weights[some], rows, whole, out[some])
 
         thread_map(fill, range(0, len(tx), _CHIRPS_A_THREAD))
 
     def _find(self, keyframe: int) -> _Samples:
         """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""
-        assert self._shadow is not None
         shadow, now = self._shadow, self._shadow.at(keyframe)
         lost = self._of_points(now.echo, now.fraction)
         for number, of_mirror in zip(now.mirror.tolist(), now.of_mirror, strict=True):
@@ -249,11 +215,9 @@ class RoomIf:
 
     def _of_weak(self, number: int) -> _Samples:
         """The same of weak points, at one of their own keyframes."""
-        assert self._shadow is not None
         return self._of_points(*self._shadow.slow_at(number))
 
     def _of_points(self, echo: NDArray[np.int64], fraction: NDArray[np.complex128]) -> _Samples:
-        assert self._shadow is not None
         starts, nodes = self._shadow.starts, self._shadow.point_frequency
         lost = np.zeros(self._whole.shape, dtype=np.complex64)
         own = np.searchsorted(starts, echo, side="right") - 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,25 +24,6 @@ def test_stages_add_up_by_name_also_after_an_error() -> None:
         pass
     assert list(stages.seconds) == ["first", "second"]
     assert stages.seconds["first"] > once >= 0
-
-
-def test_the_time_until_each_item_comes_is_that_of_a_stage(monkeypatch: pytest.MonkeyPatch) -> None:
-    now_s = [0.0]
-    monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))
-    stages = Stages()
-
-    def items() -> Iterator[int]:
-        for item in range(3):
-            now_s[0] += 2.0
-            yield item
-        now_s[0] += 1.0
-
-    taken = []
-    for item in stages.each("items", items()):
-        taken.append(item)
-        now_s[0] += 10.0  # what is done with an item is not the stage's
-    assert taken == [0, 1, 2]
-    assert stages.seconds == {"items": 7.0}
 
 
 def test_warming_up_is_the_time_of_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
