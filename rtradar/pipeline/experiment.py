@@ -16,8 +16,8 @@ from rtradar.cards import text_table
 from rtradar.description import Parts, parts_of, read_run_file, with_value
 from rtradar.errors import InputError
 from rtradar.pipeline.compared import chamfer_bins, write_tables
+from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.result import Result
-from rtradar.settings import SimulationOptions
 from rtradar.system.checks import check_path
 from rtradar.system.output_folder import OutputFiles, atomic_folder, one_of
 
@@ -138,12 +138,10 @@ class Experiment:
         InputError, BackendError, ExtensionError
             As of `rtradar.simulate`.
         """
-        from rtradar.pipeline.run import simulate
+        from rtradar.pipeline.run import Simulation
 
         people, radar, scene, settings = self.parts
-        taken = SimulationOptions.__annotations__
-        options: Any = {name: value for name, value in vars(settings).items() if name in taken}
-        return simulate(people, radar, scene, **options)
+        return Simulation(prepare(people, radar, scene, replace(settings, background=None)))
 
 
 # -- several values of some keys ------------------------------------------------------------------

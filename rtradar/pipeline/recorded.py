@@ -174,7 +174,8 @@ class Samples:
                 "does; every sample must be finite"
             )
         self.n_chirps += n_chirps
-        self._check_size(self.n_chirps)
+        if self._in_memory:
+            refuse_large_maps(self._radar, self.n_chirps)
         return first, block
 
     def _checked(self, n_chirps: int) -> NDArray[np.int64]:
@@ -187,12 +188,9 @@ class Samples:
                 f"'{radar.name}', which has {radar.chirps_per_frame}; give a longer capture, or a "
                 "radar with a shorter frame_duration_s"
             )
-        self._check_size(n_chirps)
-        return starts
-
-    def _check_size(self, n_chirps: int) -> None:
         if self._in_memory:
-            refuse_large_maps(self._radar, n_chirps)
+            refuse_large_maps(radar, n_chirps)
+        return starts
 
 
 def _rows(samples: Any, radar: Radar) -> Any:

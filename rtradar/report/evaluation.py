@@ -178,16 +178,7 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
         "scores": scores_of(found) if (found := together(outcomes)) else None,
         "confusion": scores.confusion(outcomes, n_classes).tolist(),
         "recordings": scores.recordings_of(outcomes, n_classes),
-        "trainings": [
-            {
-                "name": one.name,
-                "accuracy": one.accuracy,
-                "test_clouds": len(one.truth),
-                "test_recordings": len(set(one.recordings.tolist())),
-                "seconds": one.seconds,
-            }
-            for one in outcomes
-        ],
+        "trainings": [_training(one) for one in outcomes],
     }
     if any(one.trained_on for one in outcomes):
         values, *tables = scores.transfer(outcomes)
@@ -200,15 +191,25 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     return content
 
 
+def _training(one: Outcome) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "accuracy": one.accuracy,
+        "test_clouds": len(one.truth),
+        "test_recordings": len(set(one.recordings.tolist())),
+        "seconds": one.seconds,
+    }
+
+
 def _write_csv(out: Path, groups: Sequence[Group]) -> None:
     what = ["classifier", "training"]
     head = [*what, "trained_on", "test_clouds", "test_recordings", "accuracy", "seconds"]
     trainings, history = [], []
     for title, outcomes in groups:
         for one in outcomes:
-            counts = len(one.truth), len(set(one.recordings.tolist()))
-            numbers = f"{one.accuracy:.6f}", f"{one.seconds:.3f}"
-            trainings.append([title, one.name, one.trained_on, *counts, *numbers])
+            name, accuracy, *counts, seconds = _training(one).values()
+            numbers = f"{accuracy:.6f}", f"{seconds:.3f}"
+            trainings.append([title, name, one.trained_on, *counts, *numbers])
             history += [
                 [title, one.name, epoch, *(f"{row[name]:.6g}" for name in HISTORY)]
                 for epoch, row in enumerate(one.history, start=1)

@@ -156,27 +156,21 @@ def finished(summary: dict[str, Any], folder: Path | None = None) -> dict[str, A
     """Return a summary as JSON has it; with a folder, list the files there, and write it beside."""
     if folder is not None:
         summary = summary | {"files": RUN_FILES.list_of(folder)}
-    text = json.dumps(_finite(summary), indent=2, allow_nan=False, default=_plain)
+    text = json.dumps(_plain(summary), indent=2, allow_nan=False)
     if folder is not None:
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     found: dict[str, Any] = json.loads(text)
     return found
 
 
-def _finite(value: Any) -> Any:
-    """The same without infinity, which JSON does not know: ``inf`` as text."""
+def _plain(value: Any) -> Any:
+    """Return the same for JSON, without scalars of NumPy; ``inf``, which it lacks, as text."""
     if isinstance(value, dict):
-        return {key: _finite(own) for key, own in value.items()}
+        return {key: _plain(own) for key, own in value.items()}
     if isinstance(value, list):
-        return [_finite(own) for own in value]
+        return [_plain(own) for own in value]
+    value = value.item() if isinstance(value, np.generic) else value
     return str(value) if isinstance(value, float) and math.isinf(value) else value
-
-
-def _plain(value: object) -> Any:
-    """Convert a NumPy scalar for JSON: seeds from ``np.arange``, figures of a model."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError(f"a {type(value).__name__} has no place in summary.json")
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -90,7 +91,7 @@ def axes_of(processing: Processing) -> dict[str, NDArray[np.float64]]:
     return axes | {name: angle_grid(radar) for name in measured_angles(radar)}
 
 
-class RunWriter:
+class RunWriter(AbstractContextManager["RunWriter"]):
     """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
     A path, whose file is replaced, or an open file may be given. Where a ``table`` of echoes is
@@ -127,9 +128,6 @@ class RunWriter:
         said = {"title": title} | ({"gaps": text} if (text := radar.gaps_text) else {})
         parts = None if table is None else parts_of(table.capture)
         self._store = MapStore(file, axes_of(processing), said, removed, processing.unit, parts)
-
-    def __enter__(self) -> RunWriter:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._store.close()
@@ -361,21 +359,11 @@ def read_maps(file: Path | BinaryIO) -> h5py.File:
     return h5py.File(file, "r", rdcc_nbytes=0)
 
 
-def open_maps(file: Path | BinaryIO) -> xr.Dataset:
-    """Open what a `MapStore` has written; values are read when they are needed.
+def open_maps(file: Path | BinaryIO, group: str | None = None) -> xr.Dataset:
+    """Open what a `MapStore` has written, or a group of it; values are read when they are needed.
 
     An `InputError` is raised if the file is not there any more, or is damaged.
     """
-    return _opened(file)
-
-
-def read_truth(file: Path | BinaryIO) -> xr.Dataset:
-    """Read what is true of each part, the group ``truth``; errors as of `open_maps`."""
-    with _opened(file, _TRUTH) as truth:
-        return truth.load().assign(visible=truth["visible"].astype(bool))
-
-
-def _opened(file: Path | BinaryIO, group: str | None = None) -> xr.Dataset:
     import xarray as xr  # slow to import
 
     try:
@@ -385,3 +373,9 @@ def _opened(file: Path | BinaryIO, group: str | None = None) -> xr.Dataset:
         raise InputError(
             f"'{file}' cannot be read as the maps of a run ({error}); make it anew with rt.run"
         ) from None
+
+
+def read_truth(file: Path | BinaryIO) -> xr.Dataset:
+    """Read what is true of each part, the group ``truth``; errors as of `open_maps`."""
+    with open_maps(file, _TRUTH) as truth:
+        return truth.load().assign(visible=truth["visible"].astype(bool))
