@@ -175,7 +175,7 @@ def results_of(
             maps.load()
             held: dict[str, Any] = {"_in_memory": maps, "_table": table}
             if table is not None:
-                result.summary.update(room_findings(table.capture, maps))
+                result.summary.update(room_findings(table.capture, plots_of(result, maps)))
                 result.summary["run"] = in_words(table.capture.described())
                 held["_truth"] = read_truth(file)
         return replace(result, summary=finished(result.summary | cost(source)), **held)
@@ -196,7 +196,7 @@ def results_of(
                 with stages.time("view"):
                     moments = snapshots(table)
                     save_snapshots(folder / "view.npz", moments)
-                    summary |= room_findings(table.capture, maps)
+                    summary |= room_findings(table.capture, plots)
                     run_view = run_view_of(result, maps, moments.every(moments.stride(*_MOMENTS)))
                     room = room_of(table.capture, plots)
             if pictures:

@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.process import measured_angles
+from rtradar.process.window_functions import WindowName, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.system.figure_style import DIVERGING, STYLE, dress, fit, theme_of
 
@@ -205,6 +206,17 @@ def thinned(
         ]
     )
     return power, _means(times, every)
+
+
+def spectrogram_power(
+    maps: Any, radar: Radar, window: WindowName
+) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """Return the power (step, velocity) [m^2] of a spectrogram and its times [s], both `thinned`.
+
+    One echo is spread over as many range bins as the ``window`` function of the range is wide.
+    """
+    power, times = thinned(maps["spectrogram"], np.asarray(maps["spectrogram_time"]))
+    return power / noise_bandwidth_bins(window, radar.samples_per_chirp), times
 
 
 def _means(values: NDArray[Any], every: int) -> NDArray[Any]:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.canvas import (
     COUNTS,
@@ -26,6 +25,7 @@ from rtradar.report.canvas import (
     fitted_limits,
     place_limits,
     rdt_points,
+    spectrogram_power,
     thinned,
 )
 from rtradar.report.maps import ShownMap, range_angle_map, range_doppler_map
@@ -46,10 +46,11 @@ _TWO_LINES = VELOCITY_LABEL.replace(" (", "\n(")
 
 
 class _Found(NamedTuple):
-    """Detections of all frames by range and by velocity, and the moving energy of each frame."""
+    """Detections by range, by velocity and by frame, and the moving energy of each frame."""
 
     by_range: NDArray[np.float64]
     by_velocity: NDArray[np.float64]
+    by_frame: NDArray[np.float64]
     moving: NDArray[np.float64]
 
 
@@ -333,6 +334,11 @@ class Plots:
         frame = int(np.abs(times - wanted_s).argmin())
         return frame, f"window at {times[frame]:.2f} s"
 
+    @property
+    def detections(self) -> NDArray[np.float64]:
+        """Number of detections in each frame, (frame,)."""
+        return self._found.by_frame
+
     # -- the maps, for figures and pages -----------------------------------------------------------
 
     def shown(self, time_s: float | None = None) -> dict[str, ShownMap]:
@@ -372,12 +378,9 @@ class Plots:
 
     @cached_property
     def _spectrogram(self) -> ShownMap:
-        power, times = thinned(self.maps["spectrogram"], self._axis("spectrogram_time"))
         velocity = self._axis("spectrogram_velocity")
-        # One echo is spread over as many range bins.
-        power = power / noise_bandwidth_bins(
-            self._parameters.get("range_window", "hann"), self.radar.samples_per_chirp
-        )
+        window = self._parameters.get("range_window", "hann")
+        power, times = spectrogram_power(self.maps, self.radar, window)
         unit = self._unit(strongest_m2=float(power.max()))
         fitted = fitted_limits(above_floor(power).sum(axis=0), velocity, include=0.0)
         seen = self._velocity_limits if self._found.by_velocity.any() else fitted
@@ -488,7 +491,7 @@ class Plots:
         masks, maps = self.maps["detections"], self.maps["range_doppler"]
         n_frames, n_range, n_velocity = maps.shape
         by_range, by_velocity = np.zeros(n_range), np.zeros(n_velocity)
-        moving, still = np.zeros(n_frames), np.zeros(n_frames)
+        by_frame, moving, still = np.zeros((3, n_frames))
         # Not static clutter, which fills the main lobe of the window function at velocity 0.
         moves = np.abs(self._axis("velocity")) > 2.5 * self.radar.velocity_bin_mps
         at_once = max(1, _BYTES_AT_ONCE // (maps.dtype.itemsize * n_range * n_velocity))
@@ -497,10 +500,11 @@ class Plots:
             mask = np.asarray(masks[some]) > 0
             by_range += mask.sum(axis=(0, 2))
             by_velocity += mask.sum(axis=(0, 1))
+            by_frame[some] = mask.sum(axis=(1, 2))
             power = np.where(mask, np.asarray(maps[some]), 0).sum(axis=1)  # (frame, velocity)
             moving[some] = power[:, moves].sum(axis=1)
             still[some] = power.sum(axis=1)
-        return _Found(by_range, by_velocity, moving if moving.any() else still)
+        return _Found(by_range, by_velocity, by_frame, moving if moving.any() else still)
 
     @cached_property
     def _range_limits(self) -> tuple[float, float]:

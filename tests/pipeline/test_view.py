@@ -6,7 +6,6 @@ import json
 import pickle
 import shutil
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import h5py
@@ -71,29 +70,6 @@ def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
         near += bins[linked.seen[step]].min() <= 1.5
     # One of them is within its cell or next to it, but for the odd window in which parts interfere.
     assert near >= len(snapshots.times) - 1
-
-
-def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
-    linked = load_run_view(made)
-    with h5py.File(made / "maps.h5") as maps:
-        time, distance, velocity = (maps[name][:] for name in ("time", "range", "velocity"))
-        for point in (0, 17, len(linked.rdt_points) - 1):
-            t, r, v = linked.rdt_points[point]
-            # Vertices of a surface may lie midway between two cells, where rounding says which is
-            # the nearest.
-            nearest = [
-                np.flatnonzero(abs(axis - at) <= abs(axis - at).min() + 1e-9)
-                for axis, at in ((time, t), (distance, r), (velocity, v))
-            ]
-            # With R^4 for the loss over distance; the first bin, at 0 m, ends at half a bin.
-            levels = [
-                10
-                * np.log10(
-                    maps["range_doppler"][i, j, k] / 8 * max(distance[j], distance[1] / 2) ** 4
-                )
-                for i, j, k in product(*nearest)
-            ]
-            assert abs(np.array(levels) - linked.rdt_power_db[point]).min() < 1e-4
 
 
 def test_points_are_of_who_returned_them(made: Path, tmp_path: Path) -> None:

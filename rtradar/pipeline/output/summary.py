@@ -16,6 +16,7 @@ from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.output.writer import RUN_FILES
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.timing import peak_memory_mb, to_cloud_s
+from rtradar.report.plots import Plots
 from rtradar.scatter import account_of
 from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scatter.validity import Limit
@@ -193,22 +194,23 @@ def _limits_of_detections(clouds: Clouds) -> list[dict[str, Any]]:
     return [dataclasses.asdict(Limit("range_side_lobes", share, message))]
 
 
-def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
+def room_findings(capture: Capture, plots: Plots) -> dict[str, Any]:
     """Return the ``room`` of the summary with what its maps tell; nothing without a room.
 
-    ``maps`` are those of the run, open. They add ``ghosts``, with ``time_s`` and ``paths``, a
+    The ``plots`` are those of the run. They add ``ghosts``, with ``time_s`` and ``paths``, a
     list of path, range [m], velocity [m/s], azimuth [deg] and power [m^2]; and ``clutter``, to
     which ``after_removal_db`` is added, the signal to clutter ratio after removal, at least, and of
     a room in which nobody and nothing moves ``false_alarm_rate``, that of a cell.
     """
     if capture.room is None:
         return {}
+    maps: Any = plots.maps
     times = np.asarray(maps["time"])
     if "range_doppler_received" in maps:
         time_s = float(maps["range_doppler_received"].attrs["time_s"])
         frame = int(np.abs(times - time_s).argmin())
     else:
-        frame = int(np.asarray(maps["detections"]).sum(axis=(1, 2)).argmax())
+        frame = int(plots.detections.argmax())
         time_s = float(times[frame])
     paths = [
         {
@@ -222,7 +224,7 @@ def room_findings(capture: Capture, maps: Any) -> dict[str, Any]:
     ]
     clutter = dict(capture.room.summary["clutter"])
     if not (capture.people or capture.scene.objects):
-        clutter["false_alarm_rate"] = float(np.asarray(maps["detections"]).mean())
+        clutter["false_alarm_rate"] = float(plots.detections.sum() / maps["detections"].size)
     before_db = clutter["signal_to_clutter_db"]
     if "range_doppler_received" in maps and before_db is not None:
         velocity = np.asarray(maps["velocity"])

@@ -257,8 +257,8 @@ class EchoTable:
             np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin()
         )
         self._kept: dict[int, Look] = {}
-        self._shown: dict[int, Look] = {}
-        self._starts_shown = set(capture.frame_starts[self.shown_frames].tolist())
+        starts = capture.frame_starts[self.shown_frames].tolist()
+        self._shown = dict[int, Look | None].fromkeys(starts)
 
     @property
     def shown_frames(self) -> Indices:
@@ -277,20 +277,16 @@ class EchoTable:
 
     def middle(self, start_cycle: int) -> Look:
         """Return the look at the middle of a frame."""
+        if (known := self._shown.get(start_cycle)) is not None:
+            return known
+        (look,) = self._looks(start_cycle, np.array([start_cycle + self._cycles // 2]))
         if start_cycle in self._shown:
-            return self._shown[start_cycle]
-        (look,) = self._looks(start_cycle, np.array([self._middle(start_cycle)]))
-        if start_cycle in self._starts_shown:
             self._shown[start_cycle] = look
         return look
 
     def shown(self) -> list[Look]:
         """Return the middles of `shown_frames`."""
-        starts = self.capture.frame_starts[self.shown_frames].tolist()
-        return [self.middle(start) for start in starts]
-
-    def _middle(self, start_cycle: int) -> int:
-        return start_cycle + self._cycles // 2
+        return [self.middle(start) for start in self._shown]
 
     def _instants(self, start_cycle: int) -> Indices:
         """Cycles about a frame at which echoes are looked at; past a gap there is nothing."""
@@ -316,7 +312,7 @@ class EchoTable:
         for start in starts[np.searchsorted(starts, start_cycle) :].tolist():
             found.update(self._instants(start).tolist())
             if self._middles:
-                found.add(self._middle(start))
+                found.add(start + self._cycles // 2)
             if len(found) >= most:
                 break
         return found

@@ -18,9 +18,8 @@ from rtradar.errors import InputError
 from rtradar.pipeline.output.writer import read_maps
 from rtradar.pipeline.result import Result
 from rtradar.process import WindowFunctions
-from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.canvas import FieldUnit, field_unit, thinned
+from rtradar.report.canvas import FieldUnit, field_unit, spectrogram_power
 from rtradar.report.maps import Levels, colour_limits, limits_of, spaced, strongest
 from rtradar.report.run_view import COLOURS, RunView, write_view
 from rtradar.report.snapshots import DAMAGE, Snapshots, checked, load_snapshots, refused
@@ -260,9 +259,8 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     if not len(maps["spectrogram_time"]):
         none = np.zeros((1, len(velocity), 0), dtype=np.uint8)
         return Levels(level=none, low_db=0.0, step_db=1.0, label="", across=(0.0, 1.0), up=up)
-    found, times = thinned(maps["spectrogram"], maps["spectrogram_time"][:])
-    # One echo is spread over as many range bins.
-    power = _powers(found.T) / noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
+    found, times = spectrogram_power(maps, radar, windows.range)
+    power = _powers(found.T)
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
     level_db = unit.level(power)
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
