@@ -180,9 +180,9 @@ def results_of(
                 held["_truth"] = read_truth(file)
         return replace(result, summary=finished(result.summary | cost(source)), **held)
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
-        keeps = source.processing.settings.save_if
-        whole = folder / "if.zarr", source.processing.radar, source.n_chirps
-        kept = if_array(*whole) if keeps else None
+        kept = None
+        if source.processing.settings.save_if:
+            kept = if_array(folder / "if.zarr", source.processing.radar, source.n_chirps)
         result, table = _streamed(source, folder / "maps.h5", kept)
         summary = result.summary
         with stages.time("write"):
@@ -203,16 +203,7 @@ def results_of(
                 with stages.time("pictures"):
                     draw_pictures(folder, plots, room)
             with stages.time("report"):
-                write_report(
-                    folder / "report.html",
-                    radar=result.radar,
-                    summary=summary,
-                    maps=[*plots.shown().values()],
-                    room=room,
-                    rdt_points=result.points,
-                    spatial=result.spatial,
-                    run_view=run_view,
-                )
+                write_report(folder / "report.html", plots, room=room, run_view=run_view)
         return replace(result, summary=finished(summary | cost(source), folder), out=out.absolute())
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
+from rtradar.clouds.spatial import SHOWN_DB
 from rtradar.radar import Radar
 from rtradar.report.canvas import central_limits, field_unit
 from rtradar.report.html import signal_to_noise, write_page
 from rtradar.report.maps import ShownMap
+from rtradar.report.plots import Plots
 from rtradar.report.rooms import CIRCLES, ShownRoom, key_of
 from rtradar.report.run_view import RunView, linked_views, view_data
 from rtradar.report.three_d import rdt_data, spatial_data
@@ -28,13 +28,9 @@ _ELSEWHERE = (
 
 def write_report(
     path: str | Path,
+    plots: Plots,
     *,
-    radar: Radar,
-    summary: Mapping[str, Any],
-    maps: Sequence[ShownMap],
     room: ShownRoom | None = None,
-    rdt_points: ArrayLike,
-    spatial: SpatialCloud | None = None,
     run_view: RunView | None = None,
 ) -> None:
     """Write a run as a page: what was seen, body and maps that move together, and tables.
@@ -45,19 +41,11 @@ def write_report(
     ----------
     path : path
         HTML file.
-    radar : Radar
-        Radar of the run, whose limits and settings are listed.
-    summary : mapping
-        Values of ``summary.json``, any of which may be missing. Those that have no place of their
-        own on the page are listed in words.
-    maps : sequence of ShownMap
-        Maps in the order of the page.
+    plots : Plots
+        Maps, clouds, radar and summary of the run. Values of the summary that have no place of
+        their own on the page are listed in words; any may be missing.
     room : ShownRoom, optional
         Room around the person.
-    rdt_points : (point, 3)
-        Time [s], range [m] and velocity [m/s] of each point.
-    spatial : SpatialCloud, optional
-        Spatial cloud, shown as a whole.
     run_view : RunView, optional
         Data of the views that one slider moves, at as many moments as it has. Without it, as for
         samples that were measured, the page has no moving body.
@@ -65,16 +53,15 @@ def write_report(
     Raises
     ------
     InputError
-        If ``rdt_points`` has a wrong shape or values that are not finite.
+        If the points of the cloud are not finite.
     """
+    radar, summary, points = plots.radar, plots.summary, plots.points
     parameters = dict(summary.get("parameters", {}))
-    data: dict[str, Any] = {"rdt": rdt_data(rdt_points)}
-    points = np.asarray(rdt_points, dtype=np.float64)
-    if spatial is not None:
-        data["spatial"] = spatial_data(spatial, radar)
+    data: dict[str, Any] = {"rdt": rdt_data(points)}
+    data["spatial"] = spatial_data(plots.spatial_cloud, radar)
     clouds = dict(data)
     values = _summary(summary, radar) | _room(summary.get("room"), radar)
-    shown_maps = [_captioned(one) for one in maps]
+    shown_maps = [_captioned(one) for one in plots.shown().values()]
     of_room = [] if room is None else _maps_of(room)
     # The script draws all maps by their numbers.
     data["maps"] = [*shown_maps, *of_room]
@@ -87,7 +74,7 @@ def write_report(
     shown = {
         "figure": ("The moving body, its echoes and its maps", run_view),
         "rdt": ("Range-Doppler-time cloud", run_view is None),
-        "spatial": ("Spatial cloud", spatial),
+        "spatial": ("Spatial cloud", True),
         "maps": ("Maps", shown_maps),
         "room": ("The room", values["room"]),
         "limits": ("Limits of this result", True),

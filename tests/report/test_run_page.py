@@ -11,6 +11,7 @@ import re
 import zlib
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -89,8 +90,11 @@ def summary() -> dict[str, Any]:
 
 def write(path: Path, **changes: Any) -> Elements:
     given: dict[str, Any] = {"summary": summary(), "maps": []}
-    given |= {"rdt_points": np.array([[0.1, 4.0, -1.0]])} | changes
-    write_report(path, radar=RADAR, **given)
+    given |= {"points": np.array([[0.1, 4.0, -1.0]])} | changes
+    maps, nothing = dict(enumerate(given.pop("maps"))), np.zeros(0)
+    cloud = SpatialCloud(np.zeros((0, 3)), nothing, nothing, nothing)
+    plots: Any = SimpleNamespace(radar=RADAR, spatial_cloud=cloud, shown=lambda: maps, **given)
+    write_report(path, plots)
     return Elements(path.read_text(encoding="utf-8"))
 
 
@@ -156,13 +160,13 @@ def test_shows_the_numbers_that_it_was_given(tmp_path: Path) -> None:
 
 
 def test_says_so_where_there_is_nothing(tmp_path: Path) -> None:
-    page = write(tmp_path / "r.html", summary={}, rdt_points=np.zeros((0, 3)))
+    page = write(tmp_path / "r.html", summary={}, points=np.zeros((0, 3)))
     assert "Nothing was detected" in page.text
     assert "Nothing came near the end" in page.text
     assert "scene-rdt" not in [attributes.get("id") for _, attributes in page.elements]
     # Neither a body, which measured samples lack, nor pictures, a room, or costs.
     sections = [attributes["id"] for tag, attributes in page.elements if tag == "section"]
-    assert sections == ["rdt", "limits", "parameters"]
+    assert sections == ["rdt", "spatial", "limits", "parameters"]
 
 
 def test_the_same_gives_the_same_file(tmp_path: Path) -> None:
@@ -310,7 +314,7 @@ def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
         "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
     }
     page = write(tmp_path / "r.html", summary=summary() | {"room": room}, maps=[shown()])
-    names = ["rdt", "maps", "room", "limits", "parameters", "cost"]
+    names = ["rdt", "spatial", "maps", "room", "limits", "parameters", "cost"]
     assert [a["id"] for tag, a in page.elements if tag == "section"] == names
     assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
     # R^4 times the power is 1 m^2.
