@@ -129,18 +129,7 @@ def compare(
             occluded[name] = _occluded(results[name], *parts, own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
-        first, reference = results[names[0]].summary, results[names[-1]]
-        of_each = ("fidelity", "variant")
-        summary: dict[str, Any] = {
-            "reference": names[-1],
-            "parameters": {
-                key: value for key, value in first["parameters"].items() if key not in of_each
-            },
-            **{name: first[name] for name in ("seed", "noise_power_m2", "versions")},
-            "fidelities": {
-                name: _figures(one, occluded[name], reference) for name, one in results.items()
-            },
-        }
+        summary, reference = _summary(results, occluded), results[names[-1]]
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
             other = run_into(Path(again, "again"), *parts, own)
@@ -343,6 +332,22 @@ def _occluded(
         whole = finite(float(1 - seen.sum() / alone.sum()))
     by_part = zip(result.summary["part_power_m2"], map(finite, of_parts.tolist()), strict=True)
     return {"occluded_share": whole, "part_occluded_share": dict(by_part)}
+
+
+def _summary(
+    results: Mapping[str, Result], occluded: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return what models have in common, and the figures of each; the last is the reference."""
+    (first, *_, reference), of_each = results.values(), ("fidelity", "variant")
+    shared = first.summary["parameters"].items()
+    return {
+        "reference": [*results][-1],
+        "parameters": {key: value for key, value in shared if key not in of_each},
+        **{name: first.summary[name] for name in ("seed", "noise_power_m2", "versions")},
+        "fidelities": {
+            name: _figures(one, occluded[name], reference) for name, one in results.items()
+        },
+    }
 
 
 def _figures(result: Result, occluded: Mapping[str, Any], reference: Result) -> dict[str, Any]:
