@@ -86,6 +86,10 @@ def test_a_vertex_of_a_mesh_is_the_sum_of_its_rows() -> None:
         ("mesh_part", np.array([0, 1, 3]), "mesh points at"),
         ("power_m2", np.full((2, 4), -1.0), "negative"),
         ("walls", np.zeros((1, 4, 3)), "length 0"),
+        ("part_names", np.array(["two\nlines", "b", "c"]), "holds what is no line of text"),
+        ("range_m", np.full((2, 4), 1e300), "range_m holds a value above"),
+        ("poses", np.full((2, 3, 4, 3), 1e300), "poses holds a value above"),
+        ("times", np.array([0.1, 0.2], dtype=np.float16), "times holds float16"),
     ],
 )
 def test_refuses_what_has_no_meaning(field: str, value: Any, said: str) -> None:
