@@ -354,7 +354,7 @@ def draw_maps_and_clouds(
         if reference is not None:
             its = plots[reference]
             time_s = float(its.maps["time"][its.frame()[0]])
-        shown = {name: own.shown(time_s) for name, own in plots.items()}
+        shown = {name: own.maps_at(time_s) for name, own in plots.items()}
     for name, kind in (("Range-Doppler", "range_doppler"), ("Spectrogram", "spectrogram")):
         maps = {own: found[kind] for own, found in shown.items() if kind in found}
         if len(maps) == len(compared):

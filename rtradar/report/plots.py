@@ -341,7 +341,12 @@ class Plots:
 
     # -- the maps, for figures and pages -----------------------------------------------------------
 
-    def shown(self, time_s: float | None = None) -> dict[str, ShownMap]:
+    @property
+    def shown(self) -> list[ShownMap]:
+        """Maps as `maps_at` gives them, those of one frame in the frame of most energy."""
+        return [*self.maps_at().values()]
+
+    def maps_at(self, time_s: float | None = None) -> dict[str, ShownMap]:
         """Return maps as `range_time`, `spectrogram`, `range_doppler` and `range_angle` show them.
 
         Parameters

@@ -61,7 +61,7 @@ def write_report(
     data["spatial"] = spatial_data(plots.spatial_cloud, radar)
     clouds = dict(data)
     values = _summary(summary, radar) | _room(summary.get("room"), radar)
-    shown_maps = [_captioned(one) for one in plots.shown().values()]
+    shown_maps = [_captioned(one) for one in plots.shown]
     of_room = [] if room is None else _maps_of(room)
     # The script draws all maps by their numbers.
     data["maps"] = [*shown_maps, *of_room]

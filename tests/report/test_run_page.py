@@ -89,11 +89,10 @@ def summary() -> dict[str, Any]:
 
 
 def write(path: Path, **changes: Any) -> Elements:
-    given: dict[str, Any] = {"summary": summary(), "maps": []}
+    given: dict[str, Any] = {"summary": summary(), "shown": []}
     given |= {"points": np.array([[0.1, 4.0, -1.0]])} | changes
-    maps, nothing = dict(enumerate(given.pop("maps"))), np.zeros(0)
-    cloud = SpatialCloud(np.zeros((0, 3)), nothing, nothing, nothing)
-    plots: Any = SimpleNamespace(radar=RADAR, spatial_cloud=cloud, shown=lambda: maps, **given)
+    cloud = SpatialCloud(np.zeros((0, 3)), *np.zeros((3, 0)))
+    plots: Any = SimpleNamespace(radar=RADAR, spatial_cloud=cloud, **given)
     write_report(path, plots)
     return Elements(path.read_text(encoding="utf-8"))
 
@@ -112,7 +111,7 @@ def shown(title: str = "A map", note: str = "") -> ShownMap:
 
 
 def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
-    page = write(tmp_path / "r.html", maps=[shown(EVIL, note=EVIL)])
+    page = write(tmp_path / "r.html", shown=[shown(EVIL, note=EVIL)])
     tags = [tag for tag, _ in page.elements]
     # The data, plotly.js and the viewer.
     assert (tags.count("script"), tags.count("img")) == (3, 0)
@@ -122,7 +121,7 @@ def test_no_text_from_outside_becomes_markup(tmp_path: Path) -> None:
 
 
 def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(tmp_path: Path) -> None:
-    page = write(tmp_path / "r.html", maps=[shown()])
+    page = write(tmp_path / "r.html", shown=[shown()])
     policy = ""
     for tag, attributes in page.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
@@ -247,7 +246,7 @@ def test_refuses_what_is_no_cloud(points: NDArray[np.float64], said: str) -> Non
 
 
 def test_a_page_has_of_a_map_what_is_in_view(tmp_path: Path) -> None:
-    page = write(tmp_path / "r.html", maps=[shown()])
+    page = write(tmp_path / "r.html", shown=[shown()])
     (one,) = json.loads(page.scripts[0])["maps"]
     assert (one["shape"], one["x"], one["y"]) == ([6, 20], [0.0, 0.1], [3.0, 1.0])
     assert one["view"] == [pytest.approx([-0.05, 1.95]), [2.5, 8.5]]
@@ -313,7 +312,7 @@ def test_sections_come_in_order_and_are_linked(tmp_path: Path) -> None:
         | {"kept": [{"name": "left", "kind": "mirror", "power_m2": 1.0}], "dropped": []},
         "ghosts": {"time_s": 1.25, "paths": [ghost | {"power_m2": 5.25**-4}]},
     }
-    page = write(tmp_path / "r.html", summary=summary() | {"room": room}, maps=[shown()])
+    page = write(tmp_path / "r.html", summary=summary() | {"room": room}, shown=[shown()])
     names = ["rdt", "spatial", "maps", "room", "limits", "parameters", "cost"]
     assert [a["id"] for tag, a in page.elements if tag == "section"] == names
     assert [a["href"] for tag, a in page.elements if tag == "a"] == [f"#{name}" for name in names]
