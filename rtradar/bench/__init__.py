@@ -195,7 +195,7 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     runs = runner.measure(model_cases(plan), plan.repeats, "models")
     cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST}
     for case, own in runs.items():
-        row = _model_row(case, own, radars[case.radar])
+        row = _row(case, own, radars[case.radar])
         first = case.radar == plan.radars[0]
         row["first_use"] = _first_use(runner.first[case.fidelity], own) if first else None
         reference = cheapest.get(case.radar)
@@ -210,26 +210,21 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     found["growth"]["chirps"] = _chirp_rows(found["models"])
 
 
-def _model_row(case: Case, runs: list[Run], radar: Radar) -> Row:
+def _row(case: Case, runs: list[Run], radar: Radar) -> Row:
     """What was measured of one model with one radar, without comparisons."""
     summary = runs[0].summary
     return {
         "radar": radar.name,
         "fidelity": case.fidelity,
+        "duration_s": case.duration_s,
         "capture_s": summary["capture_s"],
         "chirps": summary["chirps"],
         "process_s": spread([run.process_s for run in runs]),
         "warmup_s": spread([run.summary["warmup_s"] for run in runs]),
-        **_costs(runs),
-        "stages": by_stage([run.stages for run in runs]),
-    }
-
-
-def _costs(runs: list[Run]) -> Row:
-    return {
         "to_cloud_s": spread([run.to_cloud_s for run in runs]),
         "whole_s": spread([run.whole_s for run in runs]),
         "peak_memory_mb": max(float(run.summary["peak_memory_mb"]) for run in runs),
+        "stages": by_stage([run.stages for run in runs]),
     }
 
 
@@ -281,14 +276,11 @@ def _chirp_rows(models: list[Row]) -> list[Row]:
 
 
 def with_duration(plan: Plan, runner: Runner) -> list[Row]:
-    """Runs of growing length, a row each: ``duration_s``, ``capture_s``, seconds and memory."""
-    fixed = plan.radars[0], plan.growing_fidelity
+    """Runs of growing length, a row each."""
+    fixed, radar = (plan.radars[0], plan.growing_fidelity), Radar.load(plan.radars[0])
     cases = [Case(*fixed, duration) for duration in plan.growing_durations_s]
     runs = runner.measure(cases, plan.repeats, "length")
-    return [
-        {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_costs(own)}
-        for case, own in runs.items()
-    ]
+    return [_row(case, own, radar) for case, own in runs.items()]
 
 
 # -- tables and figure -----------------------------------------------------------------------------
