@@ -179,7 +179,8 @@ class Sweep:
         """Return the figures as aligned text, one line for each run."""
         head = [*self.summary["keys"], *FIGURES]
         rows = [
-            [*map(str, run["values"]), *(_short(run["figures"][name]) for name in FIGURES)]
+            [*map(str, run["values"])]
+            + ["-" if (own := run["figures"][name]) is None else f"{own:.4g}" for name in FIGURES]
             for run in self.summary["runs"]
         ]
         return text_table([head, *rows])
@@ -270,10 +271,6 @@ def _figures(result: Result, first: Result) -> dict[str, float | None]:
         "of_room": None if source is None or not len(source) else float((source == -1).mean()),
         "cloud_bins": chamfer_bins(result.points, first.points, result.radar),
     }
-
-
-def _short(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
 
 
 def _draw(path: Path, summary: Mapping[str, Any]) -> None:

@@ -101,8 +101,7 @@ class ReceiverStage:
         still = self._add_leakage()
         of_room = room.clutter_if(np.arange(radar.n_tx)) if room else np.zeros(shape, np.complex64)
         around = of_room + self._still
-        window = np.hanning(shape[2] + 1)[:-1]
-        profiles = np.fft.fft(around * (window / window.sum()))
+        profiles = _profiles(around)
         # The strongest cell, of what is still or of what moves.
         strongest = max(mover.power_m2 for mover in expected.movers)
         self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), strongest)
@@ -197,8 +196,7 @@ class ReceiverStage:
         rows = np.unique(np.linspace(0, n_rows - 1, min(n_rows, _ROWS_LOOKED_AT)).astype(np.int64))
         samples = np.zeros((len(rows), radar.n_rx, radar.samples_per_chirp), np.complex64)
         self._add_ramps(rows, samples)
-        window = np.hanning(samples.shape[2] + 1)[:-1]
-        cells = np.abs(np.fft.fft(samples[:, 0] * (window / window.sum()))) ** 2
+        cells = np.abs(_profiles(samples[:, 0])) ** 2
         crossed = float((samples[:, 0] != 0).mean())
         note = (
             f"in the band of the IF for {crossed:.3%} of the samples; its peak over range, as if "
@@ -328,6 +326,12 @@ class ReceiverStage:
             add_ramps(*own, *sweep, ramps, self._steering, samples[some])
 
         _in_threads(fill, len(samples))
+
+
+def _profiles(samples: _Samples) -> NDArray[np.complex128]:
+    """Range profiles of samples, whose cells are amplitudes of echoes."""
+    window = np.hanning(samples.shape[-1] + 1)[:-1]
+    return np.asarray(np.fft.fft(samples * (window / window.sum())))
 
 
 def _passed(corners: tuple[float, ...], frequency: NDArray[np.float64]) -> NDArray[np.complex128]:

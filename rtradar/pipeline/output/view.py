@@ -199,12 +199,6 @@ def _sound(*given: Any) -> NDArray[Any]:
         raise ValueError(str(error)) from None
 
 
-def _whole(values: NDArray[Any]) -> NDArray[np.int64]:
-    if values.dtype.kind != "i":
-        raise ValueError("who returned a point is no whole number")
-    return values.astype(np.int64)
-
-
 # -- maps ----------------------------------------------------------------------------------------
 
 
@@ -292,7 +286,8 @@ def _of_points(
         if "source" not in maps:
             continue
         first = max(window - 1, 0)
-        sources = _whole(np.asarray(maps["source"][first : window + 2]))
+        near = np.asarray(maps["source"][first : window + 2])
+        sources = _sound("source", near, {}, "i8", _MAPS["range_doppler"])
         for step in nearest_first:
             lacking = own[found[own] < 0]
             at = [cells[axis][lacking] + step[axis] - 1 for axis in range(3)]
