@@ -218,13 +218,15 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 paper is a ``perfect-conductor``."""
 
 
-def material(name: str) -> Material:
-    """Find the material of a name among `MATERIALS`.
+def material(name: str, known: Mapping[str, Material] = MATERIALS) -> Material:
+    """Find the material of a name.
 
     Parameters
     ----------
     name : str
-        One of `MATERIALS`.
+        One of those that are known.
+    known : mapping of str to Material
+        Materials by their names: `MATERIALS`, or those and others of one's own.
 
     Returns
     -------
@@ -235,11 +237,12 @@ def material(name: str) -> Material:
     InputError
         Where there is no such material.
     """
-    if not isinstance(name, str) or name not in MATERIALS:
+    if not isinstance(name, str) or name not in known:
         raise InputError(
-            f"material {brief(name)} is unknown; allowed: {', '.join(sorted(MATERIALS))}"
+            f"material = {brief(name)} is unknown; allowed: {', '.join(sorted(known))}, or in a "
+            "scene file a table [materials.NAME] of your own"
         )
-    return MATERIALS[name]
+    return known[name]
 
 
 def own_material(

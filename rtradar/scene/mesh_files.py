@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief
@@ -63,6 +63,21 @@ class Triangles:
     def corners(self) -> NDArray[np.float64]:
         """Corners of each triangle, (face, 3, 3) [m]."""
         return self.vertices[self.faces]
+
+    def moved(self, vertices: NDArray[np.float64]) -> Triangles:
+        """Return a mesh of the same triangles with other positions of its vertices.
+
+        Parameters
+        ----------
+        vertices : (vertex, 3) float64
+            Positions [m].
+
+        Returns
+        -------
+        Triangles
+        """
+        vertices.setflags(write=False)
+        return Triangles(vertices, self.faces, self.closed)
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Tell whether points lie inside a closed mesh.
@@ -119,23 +134,18 @@ def read_mesh(path: Path) -> Triangles:
     try:
         with open_regular(path) as file:
             status = os.fstat(file.fileno())
+        return _read(path, status.st_mtime_ns, status.st_size)
     except OSError as error:
         raise InputError(f"{where}: {error.strerror}") from None
-    if status.st_size > MOST_BYTES:
-        raise InputError(
-            f"{where} has {status.st_size / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} MB are allowed"
-        )
-    return _read(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=32)
 def _read(path: Path, changed_ns: int, size: int) -> Triangles:
     where, ending = f"mesh '{path}'", path.suffix.lower()
     try:
-        content = read_bytes(path, MOST_BYTES)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{where}: {getattr(error, 'strerror', None) or error}") from None
-    content = _in_ascii(content, ending)
+        content = _in_ascii(read_bytes(path, MOST_BYTES), ending)
+    except ValueError as error:
+        raise InputError(f"{where} has {error}; no more are allowed") from None
     # Of the kinds of files only these two carry counts that a reader believes.
     if ending == ".ply":
         _check_ply_header(where, content)
@@ -201,7 +211,8 @@ def _in_ascii(content: bytes, ending: str) -> bytes:
     return content[:text].translate(_TO_ASCII) + content[text:] if text > 0 else content
 
 
-def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _load(where: str, ending: str, content: bytes) -> tuple[ArrayLike, ArrayLike]:
+    """Read one mesh of all that is in a file: vertices and faces."""
     import trimesh  # slow to import
 
     try:
@@ -214,7 +225,12 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
                 process=False,
                 skip_materials=True,
             )
-            mesh = _in_one(where, loaded)
+            # Every instance of every mesh counts.
+            names = [loaded.graph[node][1] for node in loaded.graph.nodes_geometry]
+            count = sum(len(getattr(loaded.geometry[name], "faces", ())) for name in names)
+            if not 0 < count <= MOST_FACES:
+                raise InputError(f"{where} has {count} triangles; 1 to {MOST_FACES} are allowed")
+            mesh = loaded.to_mesh()
     except InputError:
         raise
     except ImportError as error:  # trimesh looks for some packages only where a file needs them
@@ -225,29 +241,17 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
     except Exception as error:  # what trimesh raises at broken files is of any type
         reason = brief(str(error))[1:-1] or type(error).__name__
         raise InputError(f"{where} is broken or is no {ending[1:]} file: {reason}") from None
-    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+    return mesh.vertices, mesh.faces
 
 
-def _in_one(where: str, loaded: Any) -> Any:
-    """Make one mesh of every instance of every mesh in a scene of trimesh."""
-    names = [loaded.graph[node][1] for node in loaded.graph.nodes_geometry]
-    count = sum(len(getattr(loaded.geometry[name], "faces", ())) for name in names)
-    if count > MOST_FACES:
-        raise InputError(f"{where} has {count} triangles; {MOST_FACES} are allowed")
-    if not count:
-        raise InputError(f"{where} has no triangles")
-    return loaded.to_mesh()
-
-
-def checked_triangles(
-    where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]
-) -> Triangles:
+def checked_triangles(where: str, vertices: ArrayLike, faces: ArrayLike) -> Triangles:
     """Check a mesh, merge equal vertices, remove empty triangles and wind closed parts outward.
 
     Vertices may be in any unit; ``where`` begins the messages of each `InputError`.
     """
     import trimesh  # slow to import
 
+    vertices, faces = np.asarray(vertices, np.float64), np.asarray(faces, np.int64)
     if vertices.shape[1:] != (3,) or faces.ndim != 2 or (len(faces) and faces.shape[1] != 3):
         raise InputError(
             f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) "

@@ -11,14 +11,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.scene.materials import material
-from rtradar.scene.mesh_files import Triangles, checked_triangles
+from rtradar.scene.mesh_files import Triangles
 from rtradar.scene.objects import Furniture
 from rtradar.system.checks import Vector, brief, check_keys
 from rtradar.system.fields import Angle, Limits, Point, check_fields, keys_of
@@ -276,27 +276,10 @@ class Object(Furniture):
         RigidMotion | None, Limits(wanted="allowed: Turning, Swinging, FollowingPath")
     ] = None
 
-    _kind: ClassVar[str] = "object"
-    _meshes: ClassVar[str] = "a name, a file, or a trimesh.Trimesh"
-
     def __post_init__(self) -> None:
         if isinstance(self.material, str):
             object.__setattr__(self, "material", material(self.material))
         super().__post_init__()
-
-    @property
-    def _settled(self) -> bool:
-        return self._is_mesh or super()._settled
-
-    @property
-    def _is_mesh(self) -> bool:
-        return hasattr(self.mesh, "vertices") and hasattr(self.mesh, "faces")
-
-    def _read(self) -> Triangles:
-        if not self._is_mesh:
-            return super()._read()
-        vertices = np.asarray(self.mesh.vertices, dtype=np.float64)
-        return checked_triangles(self._where, vertices, np.asarray(self.mesh.faces, dtype=np.int64))
 
     @cached_property
     def shape(self) -> Triangles:
@@ -307,9 +290,7 @@ class Object(Furniture):
                 f"{self._where}: its mesh has {len(own.faces)} triangles; {_MOST_FACES} are "
                 "allowed of what moves: take a coarser one"
             )
-        vertices = own.vertices - np.array(self.pivot_m)
-        vertices.setflags(write=False)
-        return Triangles(vertices, own.faces, own.closed)
+        return own.moved(own.vertices - np.array(self.pivot_m))
 
     def pose(self, times: ArrayLike) -> tuple[Array, Array]:
         """Compute the pose of the object.
@@ -349,6 +330,4 @@ class Object(Furniture):
             As of `Furniture.triangles`.
         """
         (rotation,), (place,) = self.pose([time_s])
-        vertices = self.shape.vertices @ rotation.T + place
-        vertices.setflags(write=False)
-        return Triangles(vertices, self.shape.faces, self.shape.closed)
+        return self.shape.moved(self.shape.vertices @ rotation.T + place)

@@ -10,14 +10,20 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
-from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, read_mesh
+from rtradar.scene.mesh_files import (
+    MESH_ENDINGS,
+    Triangles,
+    checked_triangles,
+    mesh_names,
+    read_mesh,
+)
 from rtradar.system.checks import Vector, brief
 from rtradar.system.fields import Angle, Limits, Point, check_fields, read_value
 from rtradar.system.files import shipped_folder
@@ -274,9 +280,10 @@ class Furniture:
     ----------
     name : str
         Name that reports show.
-    mesh : str, Path or (float, float, float)
+    mesh : str, Path, (float, float, float) or trimesh.Trimesh
         Name of a mesh that comes with rtradar, or a file: ``.ply``, ``.obj``, ``.stl`` or ``.glb``;
-        or the lengths of a box along x, y and z [m], whose origin is in the middle of its bottom.
+        or the lengths of a box along x, y and z [m], whose origin is in the middle of its bottom;
+        or a mesh in metres.
     material : Material
         Material of the surface.
     position_m : tuple of float
@@ -299,7 +306,7 @@ class Furniture:
     """
 
     name: str
-    mesh: Any  # str, Path or lengths; an `Object` may have a mesh itself
+    mesh: Any  # str, Path, lengths or a mesh itself
     material: _Material
     _: KW_ONLY
     position_m: Point
@@ -308,39 +315,36 @@ class Furniture:
     metres_per_unit: Annotated[float | None, Limits(1e-6, 1e3)] = None
     sheet: bool = False
 
-    _kind: ClassVar[str] = "furniture"
-    _meshes: ClassVar[str] = "a name or a file"
-
     def __post_init__(self) -> None:
-        where = self._where
-        check_fields(self, f"{where}: ")
+        where = f"{self._where}: "
+        check_fields(self, where)
         if isinstance(self.mesh, list | tuple):
-            lengths = read_value(BOX, f"{where}: ", "box", self.mesh)
-            object.__setattr__(self, "mesh", lengths)
-        if not self._settled and not isinstance(self.mesh, str | Path):
-            raise InputError(f"{where}: mesh = {brief(self.mesh)}; it must be {self._meshes}")
+            object.__setattr__(self, "mesh", read_value(BOX, where, "box", self.mesh))
+        mesh = f"{where}mesh = {brief(self.mesh)}"
+        endings = " ".join(MESH_ENDINGS)
         if self._built_in and self.mesh not in mesh_names():
             raise InputError(
-                f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
-                f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
+                f"{mesh} is unknown; allowed: {', '.join(mesh_names())}, or a file of {endings}"
             )
-        endings = ", ".join(MESH_ENDINGS)
-        if not self._settled and self.path.suffix.lower() not in MESH_ENDINGS:
-            raise InputError(f"{where}: mesh = {brief(self.path.name)}; allowed endings: {endings}")
-        if self._settled and (self.metres_per_unit is not None or self.sheet):
+        if self._settled:
+            if self.metres_per_unit is not None or self.sheet:
+                raise InputError(
+                    f"{where}metres_per_unit and sheet belong to a file of one's own; "
+                    f"{brief(self.mesh)} has both settled"
+                )
+        elif not isinstance(self.mesh, str | Path):
+            raise InputError(f"{mesh}; it must be a name, a file, a box or a trimesh.Trimesh")
+        elif self.path.suffix.lower() not in MESH_ENDINGS:
+            raise InputError(f"{where}mesh = {brief(self.path.name)}; allowed: {endings}")
+        elif self.metres_per_unit is None:
             raise InputError(
-                f"{where}: metres_per_unit and sheet belong to a file of one's own; "
-                f"{brief(self.mesh)} has both settled"
-            )
-        if not self._settled and self.metres_per_unit is None:
-            raise InputError(
-                f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
+                f"{where}metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
                 "1 for m, 0.001 for mm"
             )
 
     @property
     def _where(self) -> str:
-        return f"{self._kind} {brief(self.name)}"
+        return f"{type(self).__name__.lower()} {brief(self.name)}"
 
     @property
     def _built_in(self) -> bool:
@@ -349,7 +353,7 @@ class Furniture:
     @property
     def _settled(self) -> bool:
         """Whether the mesh itself says its unit, and whether it is a sheet."""
-        return self._built_in or isinstance(self.mesh, tuple)
+        return self._built_in or isinstance(self.mesh, tuple) or hasattr(self.mesh, "faces")
 
     @property
     def path(self) -> Path:
@@ -377,9 +381,7 @@ class Furniture:
             impossible size.
         """
         own = self._own_triangles()
-        vertices = own.vertices @ self.axes.T + np.array(self.position_m)
-        vertices.setflags(write=False)
-        return Triangles(vertices, own.faces, own.closed)
+        return own.moved(own.vertices @ self.axes.T + np.array(self.position_m))
 
     def _own_triangles(self) -> Triangles:
         """Mesh in its own axes, scaled to metres, once it is checked."""
@@ -405,14 +407,15 @@ class Furniture:
                 f"{where}: its mesh measures {size:.3g} m; allowed are {SMALLEST_M:g} to "
                 f"{LARGEST_M:g} m: see to metres_per_unit and scale"
             )
-        return Triangles(vertices, read.faces, read.closed)
+        return read.moved(vertices)
 
     def _read(self) -> Triangles:
+        if hasattr(self.mesh, "faces"):
+            return checked_triangles(self._where, self.mesh.vertices, self.mesh.faces)
         if not isinstance(self.mesh, tuple):
             return read_mesh(self.path)
         import trimesh  # slow to import
 
         box = trimesh.creation.box(self.mesh)
-        vertices = np.array(box.vertices)
-        vertices[:, 2] += self.mesh[2] / 2
+        vertices = box.vertices + np.array([0, 0, self.mesh[2] / 2])
         return Triangles(vertices, np.array(box.faces, dtype=np.int64), closed=True)

@@ -20,16 +20,7 @@ from rtradar.scene import plan
 from rtradar.scene.materials import Material
 from rtradar.scene.moving import Object
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Wall
-from rtradar.scene.tables import (
-    ANGLES,
-    FURNITURE,
-    HEIGHT_M,
-    LENGTH_M,
-    WIDTH_M,
-    drawn,
-    fields_of,
-    rooted,
-)
+from rtradar.scene.tables import ANGLES, RandomRoom, drawn, fields_of, rooted
 from rtradar.system.checks import Table, Vector, brief, printable
 from rtradar.system.fields import Angle, Limits, MaybeEmpty, Point, check_fields
 from rtradar.system.registries import RANDOM_SCENE, scene_table
@@ -203,10 +194,10 @@ class Scene:
         cls,
         seed: int,
         *,
-        furniture: Sequence[int] = FURNITURE,
-        length_m: Sequence[float] = LENGTH_M,
-        width_m: Sequence[float] = WIDTH_M,
-        height_m: Sequence[float] = HEIGHT_M,
+        furniture: Sequence[int] = RandomRoom.furniture,
+        length_m: Sequence[float] = RandomRoom.length_m,
+        width_m: Sequence[float] = RandomRoom.width_m,
+        height_m: Sequence[float] = RandomRoom.height_m,
     ) -> Scene:
         """Draw a room: its size, the materials of its sides, its furniture, where the radar stands.
 

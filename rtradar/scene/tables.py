@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
-from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed
 from rtradar.recordings import SAID, SYNTHETIC, said_of
-from rtradar.scene.materials import MATERIALS, Material, own_material
+from rtradar.scene.materials import MATERIALS, Material, material, own_material
 from rtradar.scene.mesh_files import read_mesh
 from rtradar.scene.moving import Object, motion_of
 from rtradar.scene.objects import BOX, ROOM_SIDES, Furniture, Surface, Wall, room_walls
@@ -23,18 +22,18 @@ from rtradar.system.checks import (
     check_keys,
     check_number,
     inside,
+    printable,
     table_at,
     tables_at,
 )
-from rtradar.system.fields import Angle, Limits, Point, keys_of, read_value, within
+from rtradar.system.fields import check_fields, keys_of, read_table, read_value, within
 from rtradar.system.files import shipped_folder
-from rtradar.system.seeds import check_seed
+from rtradar.system.seeds import Seed
 
 if TYPE_CHECKING:
     from rtradar.body import Person
     from rtradar.motion import Motion
 
-_Place = Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])]
 _OF_PEOPLE = """\
 skeleton up unit rate_hz placement position_m heading_deg start_s body material breathing seed
 duration_s traits"""
@@ -48,26 +47,32 @@ Piece = TypeVar("Piece", Wall, Furniture, Object)
 
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
 
-FURNITURE, LENGTH_M, WIDTH_M, HEIGHT_M = (2, 7), (5.5, 8.0), (3.4, 6.5), (2.3, 3.0)
-"""Ranges from which a room is drawn: pieces of furniture, and sizes along x, y and z [m]."""
+_SHAPES = {"mesh": str, "box": BOX}
+"""Keys that say the shape of furniture or of an object, which has one of them."""
 
-RANDOM: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = {
-    "furniture": (FURNITURE, (0, 20)),
-    "length_m": (LENGTH_M, (5.5, 30.0)),
-    "width_m": (WIDTH_M, (3.0, 30.0)),
-    "height_m": (HEIGHT_M, (2.2, 10.0)),
-}
-"""Keys of ``[random]`` beside the seed, with these ranges and what they must be within."""
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RandomRoom:
+    """Ranges from which a room is drawn, of pieces of furniture and of sizes along the axes [m]."""
+
+    seed: Seed
+    furniture: Annotated[tuple[int, int], within(0, 20, "whole numbers")] = (2, 7)
+    length_m: Annotated[tuple[float, float], within(5.5, 30.0)] = (5.5, 8.0)
+    width_m: Annotated[tuple[float, float], within(3.0, 30.0)] = (3.4, 6.5)
+    height_m: Annotated[tuple[float, float], within(2.2, 10.0)] = (2.3, 3.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self, "[random] ")
 
 
 def _of_mesh(kind: type, *needed: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     own, others = keys_of(kind, without=("mesh", *needed))
-    return (*own, *needed), ("mesh", "box", *others)
+    return (*own, *needed), (*_SHAPES, *others)
 
 
 KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "top": ((), ("name", "description")),
-    "[random]": (("seed",), tuple(RANDOM)),
+    "[random]": keys_of(RandomRoom),
     "[radar]": ((), ("position_m", *ANGLES)),
     "[person]": ((), ("position_m", "heading_deg")),
     "[room]": (("size_m", "corner_m"), ()),
@@ -130,26 +135,18 @@ def fields_of(table: Table) -> dict[str, Any]:
         "objects": _pieces("objects", Object, table, materials),
         "people": people_of(table),
     }
-    if "radar" in table:
-        radar = table_at("radar", table)
-        check_keys("[radar] ", radar, *(KEYS["[radar]"] if radar else (("position_m",), ())))
-        for key, value in radar.items():
-            kind = Point if key == "position_m" else Angle
-            fields[f"radar_{key}"] = read_value(kind, "[radar] ", key, value)
-    person = dict(table_at("person", table))
-    check_keys("[person] ", person, *KEYS["[person]"])
-    if "position_m" in person:
-        place = person.pop("position_m")
-        fields["person_position_m"] = read_value(_Place, "[person] ", "position_m", place)
-    return fields | person
+    for kind in ("radar", "person"):
+        own = table_at(kind, table)
+        check_keys(f"[{kind}] ", own, *KEYS[f"[{kind}]"])
+        fields |= {key if key == "heading_deg" else f"{kind}_{key}": own[key] for key in own}
+    return fields
 
 
 def _own_materials(table: Table) -> dict[str, Material]:
     found = {}
     for name in table:
-        read_value(str, "[materials] ", "a name", name)
         constants = table_at(name, table, "materials.")
-        check_keys(f"[materials.{name}] ", constants, *KEYS["[materials.NAME]"])
+        check_keys(f"[materials.{printable(name)}] ", constants, *KEYS["[materials.NAME]"])
         found[name] = own_material(name, **constants)
     return found
 
@@ -163,8 +160,9 @@ def _room(table: Table, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
             wanted = f"[room.{side}]{', or [room.walls] for all four' * (key != side)}"
             raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
         surface = table_at(key, table, "room.")
-        check_keys(f"[room.{key}] ", surface, *KEYS["a side of a room"])
-        chosen = _material(f"[room.{key}] ", surface["material"], materials)
+        with prefixed(f"[room.{key}] "):
+            check_keys("", surface, *KEYS["a side of a room"])
+            chosen = material(surface["material"], materials)
         surfaces[side] = Surface(**{**surface, "material": chosen})
     return room_walls(table["size_m"], table["corner_m"], surfaces)
 
@@ -174,36 +172,19 @@ def _pieces(
 ) -> tuple[Piece, ...]:
     found = []
     for where, entry in tables_at(key, table):
-        check_keys(where, entry, *KEYS[f"[[{key}]]"])
-        own: dict[str, Any] = {}
-        if kind is not Wall:
-            own["mesh"] = _shape(where, entry)
-            entry = {name: value for name, value in entry.items() if name != "box"}
-        chosen = _material(where, entry["material"], materials)
+        own = dict(entry)
         with prefixed(where):
-            if "motion" in entry:
-                own["motion"] = motion_of(entry["motion"])
-            found.append(kind(**{**entry, **own, "material": chosen}))
+            check_keys("", own, *KEYS[f"[[{key}]]"])
+            if kind is not Wall:
+                given = [name for name in _SHAPES if name in own]
+                if len(given) != 1:
+                    raise InputError("give a mesh, or box = [x, y, z] in metres, one of them")
+                own["mesh"] = read_value(_SHAPES[given[0]], "", given[0], own.pop(given[0]))
+            if "motion" in own:
+                own["motion"] = motion_of(own["motion"])
+            own["material"] = material(own["material"], materials)
+            found.append(kind(**own))
     return tuple(found)
-
-
-def _shape(where: str, entry: Table) -> Any:
-    """Return the mesh of an entry, or the lengths of its box."""
-    if ("mesh" in entry) == ("box" in entry):
-        raise InputError(f"{where}give a mesh, or box = [x, y, z] in metres, one of them")
-    if "mesh" in entry:
-        return read_value(str, where, "mesh", entry["mesh"])
-    return read_value(BOX, where, "box", entry["box"])
-
-
-def _material(where: str, value: object, materials: Mapping[str, Material]) -> Material:
-    if not isinstance(value, str) or value not in materials:
-        allowed = ", ".join(sorted(materials))
-        raise InputError(
-            f"{where}material = {brief(value)} is unknown; allowed: {allowed}, or a table "
-            "[materials.NAME] of your own"
-        )
-    return materials[value]
 
 
 def people_of(table: Table, folder: Path = Path()) -> tuple[Person, ...]:
@@ -307,20 +288,8 @@ def random_room(table: Table) -> dict[str, Any]:
 
     An `InputError` is raised where a key is unknown or a range has no meaning.
     """
-    check_keys("[random] ", table, ("seed",), tuple(RANDOM))
-    check_seed("[random] ", table["seed"])
-    ranges = {
-        key: read_value(
-            Annotated[tuple[int, int], within(*limits, "whole numbers")]
-            if key == "furniture"
-            else Annotated[tuple[float, float], within(*limits)],
-            "[random] ",
-            key,
-            table.get(key, usual),
-        )
-        for key, (usual, limits) in RANDOM.items()
-    }
-    draw = np.random.default_rng(table["seed"])
+    ranges = read_table(RandomRoom, "[random] ", table)
+    draw = np.random.default_rng(ranges.seed)
 
     def between(low: float, high: float, digits: int = 2) -> float:
         return round(float(draw.uniform(low, high)), digits)
@@ -331,7 +300,7 @@ def random_room(table: Table) -> dict[str, Any]:
         rough_m = between(1e-4, 5e-4, digits=5)
         return {"material": material, "thickness_m": thickness_m, "roughness_m": rough_m}
 
-    size = [between(*ranges[key]) for key in ("length_m", "width_m", "height_m")]
+    size = [between(*own) for own in (ranges.length_m, ranges.width_m, ranges.height_m)]
     radar = [-between(2.6, 3.2), between(-0.5, 0.5), between(0.9, 1.5)]
     low = np.array([radar[0] - between(0.3, 0.4), between(-0.1, 0.1) - size[1] / 2])
     low = np.round(low, 2)
@@ -345,10 +314,10 @@ def random_room(table: Table) -> dict[str, Any]:
         up = min(between(0.9, 1.4), round(size[2] - sill - 0.2, 2))
         edges = {"corner_m": corner, "edge_u_m": [wide, 0.0, 0.0], "edge_v_m": [0.0, 0.0, up]}
         walls.append({"name": "window", **edges, "material": "glass", "thickness_m": 0.006})
-    least, most = ranges["furniture"]
+    least, most = ranges.furniture
     furniture = []
     taken = [_FREE_M, np.stack([np.subtract(radar[:2], _RADAR_M), np.add(radar[:2], _RADAR_M)], 1)]
-    for number in range(1, 1 + int(draw.integers(int(least), int(most) + 1))):
+    for number in range(1, 1 + int(draw.integers(least, most + 1))):
         for _ in range(_TRIES):
             mesh, at = str(draw.choice(list(_PIECES))), str(draw.choice(list(_SIDES)))
             place, box = _against(mesh, at, low, high, draw.random())

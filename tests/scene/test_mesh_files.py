@@ -265,9 +265,9 @@ def test_promises_of_a_header_are_not_believed(tmp_path: Path) -> None:
 def test_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cube().export(tmp_path / "cube.obj")
     monkeypatch.setattr(mesh_files, "MOST_FACES", 11)
-    assert "has 12 triangles; 11 are allowed" in refusal(tmp_path / "cube.obj")
+    assert "has 12 triangles; 1 to 11 are allowed" in refusal(tmp_path / "cube.obj")
     monkeypatch.setattr(mesh_files, "MOST_BYTES", 10)
-    assert "MB are allowed" in refusal(tmp_path / "cube.obj")
+    assert "MB; no more are allowed" in refusal(tmp_path / "cube.obj")
 
 
 def test_a_glb_that_repeats_its_mesh_is_counted_before_it_is_unfolded(
