@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene.objects import ROOM_SIDES, Wall
+from rtradar.scene.objects import Furniture, Wall
 from rtradar.system.checks import brief, printable
 from rtradar.system.figure_labels import Label, around, place_labels
 from rtradar.system.figure_style import (
@@ -25,9 +25,8 @@ from rtradar.system.figure_style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-    from rtradar.body import Person
-    from rtradar.scene.objects import Furniture, Wall
     from rtradar.scene.scene import Scene
 
 _UPRIGHT = 0.5
@@ -47,6 +46,10 @@ class Foot(NamedTuple):
     last: NDArray[np.float64]
     wall: Wall
 
+    def at(self, fractions: ArrayLike) -> NDArray[np.float64]:
+        """Return points (fraction, 2) at fractions of the way from the first end to the last."""
+        return self.first + np.asarray(fractions)[:, None] * (self.last - self.first)
+
 
 def feet_of_walls(scene: Scene) -> list[Foot]:
     """Find the feet of the upright walls."""
@@ -61,40 +64,46 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
 
 def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     """Ends (2, 2) [m] of what is left of the foot of a wall between its openings."""
-    way = foot.last - foot.first
-    edges = foot.wall.edge_u_m, foot.wall.edge_v_m
-    along_u, along_v = (np.array(edge[:2]) / np.linalg.norm(edge) for edge in edges)
-    corner = np.array(foot.wall.corner_m)[:2]
+    wall, way = foot.wall, foot.last - foot.first
+    edges = np.array([wall.edge_u_m, wall.edge_v_m])[:, :2]
     gaps = []
-    for u, v, wide, high in foot.wall.openings:
-        ends = [
-            (corner + a * along_u + b * along_v - foot.first) @ way / (way @ way)
-            for a, b in ((u, v), (u + wide, v), (u, v + high), (u + wide, v + high))
-        ]
-        gaps.append((min(ends), max(ends)))
+    for u, v, wide, high in wall.openings:
+        corners = np.array([(u, v), (u + wide, v), (u, v + high), (u + wide, v + high)])
+        points = wall.corner_m[:2] + corners / wall.size_m @ edges
+        along = ((points - foot.first) @ way / (way @ way)).tolist()
+        gaps.append((min(along), max(along)))
     start, left = 0.0, []
     for low, high in [*sorted(gaps), (1.0, 1.0)]:
         if low > start:
-            left.append(foot.first + np.array([[start], [low]]) * way)
+            left.append(foot.at([start, low]))
         start = max(start, high)
     return left
 
 
-def plot_scene(scene: Scene, radar: Radar | Axes | None, ax: Axes | None) -> Axes:
-    """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does."""
+def plot_scene(
+    scene: Scene,
+    radar: Radar | Axes | None,
+    ax: Axes | None,
+    make: Callable[[float], Figure] = figure_for,
+) -> Axes:
+    """Draw the plan of a scene with its radar and the person's place, as `Scene.plot` does.
+
+    Without axes a figure of the right height [inch] is made.
+    """
     radar, ax = axes_given(radar, ax)
     if not isinstance(radar, Radar | None):
         raise InputError(f"plot: radar = {brief(radar)}; it must be a Radar, such as a preset")
-    (x, y), limits = _place_and_limits(scene, radar)
-    axes = figure_for(height_of_plan(limits)).add_subplot() if ax is None else ax
-    theme = theme_of(axes)
-    draw_plan(axes, scene, limits)
-    draw_radar(axes, (x, y), radar)
+    x, y = scene.radar_place(Radar() if radar is None else radar)[:2]
     # Who are there, whoever may come.
     people = {
         f"{number}: {one.motion.name}": one.position_m
         for number, one in enumerate(scene.people, start=1)
     } or {"person": scene.person_position_m}
+    limits = plan_limits(scene, [(x, y), (x + _ARROW_M, y), *people.values()])
+    axes = make(height_of_plan(limits)).add_subplot() if ax is None else ax
+    theme = theme_of(axes)
+    draw_plan(axes, scene, limits)
+    draw_radar(axes, (x, y), radar)
     for place in people.values():
         axes.plot(*place, "o", color=theme.person, markersize=7)
     title = printable(f"{scene.name}: {scene.description}")
@@ -111,18 +120,8 @@ def plot_scene(scene: Scene, radar: Radar | Axes | None, ax: Axes | None) -> Axe
 
 def picture_of_plan(scene: Scene) -> bytes:
     """Draw the plan of a scene as a PNG file, for a card."""
-    figure = new_figure(height_of_plan(_place_and_limits(scene, None)[1]))
-    plot_scene(scene, None, figure.add_subplot())
+    figure: Any = plot_scene(scene, None, None, new_figure).figure
     return png_of(figure)
-
-
-def _place_and_limits(
-    scene: Scene, radar: Radar | None
-) -> tuple[tuple[float, float], NDArray[np.float64]]:
-    """Return the radar's place in a plan (2,) and the limits of the plan (2, 2) [m]."""
-    x, y = scene.radar_place(Radar() if radar is None else radar)[:2]
-    places = [one.position_m for one in scene.people] or [scene.person_position_m]
-    return (x, y), plan_limits(scene, [(x, y), (x + _ARROW_M, y), *places])
 
 
 def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:
@@ -208,11 +207,7 @@ def name_parts(
         colour = theme.furniture if closed else theme.reflector
         pieces.append((closed, -area, Label(piece.name, places, colour)))
     pieces.sort(key=lambda piece: piece[:2])
-    lines = [
-        _square(foot.first + fraction * (foot.last - foot.first))
-        for foot in feet
-        for fraction in np.linspace(0, 1, 100)
-    ]
+    lines = [_square(point) for foot in feet for point in foot.at(np.linspace(0, 1, 100))]
     labels = [*first, *(_wall_label(foot, theme.wall) for foot in feet)]
     labels += [label for *_, label in pieces[:MOST_NAMES]]
     left_out = len(place_labels(axes, labels, [*avoided, *lines])) + len(pieces[MOST_NAMES:])
@@ -243,15 +238,12 @@ def _square(point: ArrayLike) -> NDArray[np.float64]:
 
 def _wall_label(foot: Foot, colour: str) -> Label:
     """Make a label that stands outside its wall, along it."""
-    first, last, wall = foot
-    along = last - first
-    angle = float(np.degrees(np.arctan2(along[1], along[0])))
-    rotation = (angle + 89.9) % 180 - 89.9
+    wall, (x, y) = foot.wall, foot.last - foot.first
+    rotation = (float(np.degrees(np.arctan2(y, x))) + 89.9) % 180 - 89.9
     outward = -wall.normal[:2] / np.linalg.norm(wall.normal[:2])
     places = []
     for distance, depth in ((9, wall.thickness_m), (25, wall.thickness_m), (-10, 0), (-25, 0)):
-        for fraction in (0.5, 0.3, 0.7, 0.15, 0.85):
-            x, y = (first + fraction * along + depth * outward).tolist()
+        for x, y in (foot.at([0.5, 0.3, 0.7, 0.15, 0.85]) + depth * outward).tolist():
             places.append(((x, y), (distance * outward[0], distance * outward[1])))
     return Label(f"{wall.name}: {_slab(wall)}", places, colour, rotation)
 
@@ -259,50 +251,40 @@ def _wall_label(foot: Foot, colour: str) -> Label:
 _MOST_ROWS = 9
 """Most walls and most pieces of furniture that a card lists."""
 
+_KINDS = ("walls", "furniture", "objects")
+
 
 def brief_rows(scene: Scene) -> dict[str, str]:
     """Return the rows of a scene's ``repr``."""
     rows = room_rows(scene)
-    kinds: dict[str, Sequence[Wall | Furniture]]
-    kinds = {"Walls": scene.walls, "Furniture": scene.furniture, "Objects": scene.objects}
-    for kind, parts in kinds.items():
+    for kind in _KINDS:
+        names = [part.name for part in getattr(scene, kind)]
         # Few scenes have objects: the others need not say so.
-        if parts or kind != "Objects":
-            names = ", ".join(part.name for part in parts)
-            rows[kind] = f"{len(parts)}: {names}" if parts else "none"
-    if scene.people:
-        rows["People"] = f"{len(scene.people)}: {', '.join(map(_person, scene.people))}"
+        if names or kind != "objects":
+            rows[kind] = f"{len(names)}: {', '.join(names)}" if names else "none"
     if scene.materials:
-        rows["Materials"] = ", ".join(material.name for material in scene.materials)
+        rows["materials"] = ", ".join(material.name for material in scene.materials)
     return {label.lower(): value for label, value in rows.items()}
 
 
 def tables(scene: Scene) -> dict[str, dict[str, str]]:
     """Return the tables of a scene's card by their headings."""
-    walls = {
-        wall.name: f"{wall.material.name}, {1e3 * wall.thickness_m:g} mm, {_faces(wall)}"
-        for wall in scene.walls
-    }
-    furniture = {piece.name: _piece(piece) for piece in scene.furniture}
-    objects = {piece.name: _piece(piece) for piece in scene.objects}
     found = {"": room_rows(scene)}
-    if scene.people:
-        found[""]["People"] = ", ".join(map(_person, scene.people))
-    for kind, rows in (("Walls", walls), ("Furniture", furniture), ("Objects", objects)):
-        if rows:
-            shown = found[f"{kind} ({len(rows)})"] = dict(list(rows.items())[:_MOST_ROWS])
-            if len(rows) > _MOST_ROWS:
-                shown["..."] = f"and {len(rows) - _MOST_ROWS} more"
+    for kind in _KINDS:
+        parts = getattr(scene, kind)
+        if parts:
+            shown = {part.name: _part(part) for part in parts[:_MOST_ROWS]}
+            if len(parts) > _MOST_ROWS:
+                shown["..."] = f"and {len(parts) - _MOST_ROWS} more"
+            found[f"{kind.capitalize()} ({len(parts)})"] = shown
     return found
 
 
 def room_rows(scene: Scene) -> dict[str, str]:
     """Return what the scene is as a whole, as texts with units by their labels."""
     rows = {"Description": scene.description}
-    sides = [wall.corners for wall in scene.walls if wall.name in ROOM_SIDES]
-    if len(sides) == len(ROOM_SIDES):
-        size_m = np.ptp(np.concatenate(sides), axis=0)
-        rows["Room"] = f"{' × '.join(f'{length:.4g}' for length in size_m)} m"
+    if (box := scene.room_box()) is not None:
+        rows["Room"] = f"{' × '.join(f'{length:.4g}' for length in box[1] - box[0])} m"
     place = scene.radar_position_m
     rows["Radar"] = "at its own position" if place is None else f"at {_point(place)}"
     if place is not None and scene.is_outside(place):
@@ -310,25 +292,25 @@ def room_rows(scene: Scene) -> dict[str, str]:
     for name in ("yaw", "pitch", "roll"):
         if (angle := getattr(scene, f"radar_{name}_deg")) is not None:
             rows["Radar"] += f", {name} {angle:g}°"
-    turned = f", turned by {scene.heading_deg:g}°" if scene.heading_deg else ""
-    rows["Person"] = f"at {_point(scene.person_position_m)}{turned}"
+    rows["Person"] = _place(scene.person_position_m, scene.heading_deg)
+    if scene.people:
+        people = [
+            f"{one.motion.name} {_place(one.position_m, one.heading_deg)}" for one in scene.people
+        ]
+        rows["People"] = f"{len(people)}: {', '.join(people)}"
     return rows
-
-
-def _person(person: Person) -> str:
-    turned = f", turned by {person.heading_deg:g}°" if person.heading_deg else ""
-    return f"{person.motion.name} at {_point(person.position_m)}{turned}"
 
 
 def _point(position_m: Iterable[float]) -> str:
     return f"({', '.join(f'{value:g}' for value in position_m)}) m"
 
 
-def _faces(wall: Wall) -> str:
-    height_m, width_m = sorted(map(float, map(np.linalg.norm, (wall.edge_u_m, wall.edge_v_m))))
-    return f"{width_m:.4g} × {height_m:.4g} m"
+def _place(position_m: Iterable[float], turned_deg: float) -> str:
+    return f"at {_point(position_m)}{f', turned by {turned_deg:g}°' if turned_deg else ''}"
 
 
-def _piece(piece: Furniture) -> str:
-    turned = f", turned by {piece.yaw_deg:g}°" if piece.yaw_deg else ""
-    return f"{piece.material.name}, at {_point(piece.position_m)}{turned}"
+def _part(part: Wall | Furniture) -> str:
+    if isinstance(part, Wall):
+        low, high = sorted(part.size_m)
+        return f"{_slab(part)}, {high:.4g} × {low:.4g} m"
+    return f"{part.material.name}, {_place(part.position_m, part.yaw_deg)}"

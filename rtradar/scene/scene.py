@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, PERSON_LIMITS
@@ -373,9 +374,19 @@ class Scene:
         -------
         bool
         """
+        if (box := self.room_box()) is None:
+            return False
+        return bool((np.asarray(place) < box[0]).any() or (np.asarray(place) > box[1]).any())
+
+    def room_box(self) -> NDArray[np.float64] | None:
+        """Return the least and largest coordinates inside of the room.
+
+        Returns
+        -------
+        (2, 3) float64, optional
+            World [m]; None where there is no room.
+        """
         sides = [wall.corners for wall in self.walls if wall.name in ROOM_SIDES]
         if len(sides) < len(ROOM_SIDES):
-            return False
-        corners = np.concatenate(sides)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        return bool((np.asarray(place) < low).any() or (np.asarray(place) > high).any())
+            return None
+        return np.stack([np.min(sides, axis=(0, 1)), np.max(sides, axis=(0, 1))])
