@@ -17,6 +17,7 @@ import os
 import sys
 import threading
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from types import ModuleType
@@ -41,6 +42,11 @@ VARIANTS: dict[Kind, str] = {"llvm": "llvm_ad_rgb", "scalar": "scalar_rgb", "cud
 """Mitsuba's variant of each kind of backend."""
 
 TROUBLE = "no libLLVM that works with Dr.Jit was found"
+CURE = "install one: " + (
+    "brew install llvm"
+    if sys.platform == "darwin"
+    else f"pip install {WHEEL} (x86-64 Linux), or the system's libllvm 19 or newer"
+)
 
 
 class BackendWarning(UserWarning):
@@ -122,7 +128,9 @@ def use(backend: Backend) -> ModuleType:
 
         # Whoever imported Dr.Jit before us may have computed with it, and sets its threads.
         if first:
-            begin_with_one()
+            import drjit as dr
+
+            dr.set_thread_count(1)
         if mi.variant() != backend.variant:
             mi.set_variant(backend.variant)
     except ImportError as error:
@@ -139,14 +147,11 @@ def use(backend: Backend) -> ModuleType:
 
 def available() -> tuple[Kind, ...]:
     """The backends that work here, of llvm, scalar and cuda."""
-    return tuple(kind for kind in VARIANTS if _works(kind))
-
-
-def install_hint() -> str:
-    """What to install for a good libLLVM on this platform, in half a sentence."""
-    if sys.platform == "darwin":
-        return "install one: brew install llvm"
-    return f"install one: pip install {WHEEL} (x86-64 Linux), or the system's libllvm 19 or newer"
+    found: list[Kind] = []
+    for kind in VARIANTS:
+        with suppress(BackendError):
+            found.append(select(kind).kind)
+    return tuple(found)
 
 
 def loaded_llvm_version() -> str | None:
@@ -171,7 +176,7 @@ def _first_good() -> tuple[Library | None, ProbeResult | None, str]:
             return None, None, _loaded_before(loaded)
         named = f", named by {ENVIRONMENT_VARIABLE}" if library.origin == "environment" else ""
         refused.append(f"{library.path}{named}, {result.finding}")
-    return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {install_hint()}"
+    return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {CURE}"
 
 
 def _loaded_before(loaded: str | None) -> str:
@@ -182,27 +187,12 @@ def _loaded_before(loaded: str | None) -> str:
     )
 
 
-def _works(kind: Kind) -> bool:
-    try:
-        select(kind)
-    except BackendError:
-        return False
-    return True
-
-
 # -- threads of Dr.Jit -----------------------------------------------------------------------------
 
 MANY_RAYS = 1 << 16
 """Least number of rays traced at once that all cores share."""
 
 _ONE_AT_A_TIME = threading.Lock()
-
-
-def begin_with_one() -> None:
-    """Give Dr.Jit one thread; call it before Dr.Jit computes anything and has others."""
-    import drjit as dr
-
-    dr.set_thread_count(1)
 
 
 def grow_for(mi: Any, rays: int) -> None:

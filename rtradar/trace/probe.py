@@ -16,10 +16,10 @@ import signal
 import subprocess
 import sys
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections import ChainMap
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, temporary_folder
@@ -50,8 +50,7 @@ _SYSTEM_PATTERNS = {
 }
 
 
-@dataclass(frozen=True)
-class Library:
+class Library(NamedTuple):
     """A libLLVM that may or may not work, and who brought it.
 
     The path, for the dynamic loader, exists unless the environment variable names one that does
@@ -73,46 +72,37 @@ def candidates() -> list[Library]:
 
     The environment variable goes first, then the wheel, then what the system has, newest first.
     """
-    found: dict[str, Library] = {}
     named = os.environ.get(ENVIRONMENT_VARIABLE)
-    if named:
-        found[os.path.realpath(named)] = Library(named, "environment")
-    for path in _of_wheel():
-        found.setdefault(path, Library(path, "wheel"))
-    system = (Library(path, "system") for path in _of_system())
-    for library in sorted(system, key=_by_age):
-        found.setdefault(library.path, library)
+    found = {os.path.realpath(named): Library(named, "environment")} if named else {}
+    system = {path: Library(path, "system") for path in _libraries(_of_system())}
+    wheel = {path: Library(path, "wheel") for path in _libraries(_of_wheel())}
+    for path, library in [*wheel.items(), *sorted(system.items(), key=_newness, reverse=True)]:
+        found.setdefault(path, library)
     return list(found.values())
 
 
-def _by_age(library: Library) -> tuple[float, ...]:
+def _newness(item: tuple[str, Library]) -> list[float]:
     # A file without a number is what the package manager calls its current one.
-    return (
-        tuple(-float(number) for number in library.version.split("."))
-        if library.version
-        else (-float("inf"),)
-    )
+    return [float(number) for number in (item[1].version or "inf").split(".")]
 
 
-def _of_wheel() -> Iterator[str]:
+def _libraries(paths: Iterable[Path]) -> list[str]:
+    return [os.path.realpath(one) for one in paths if _NAME.fullmatch(one.name) and one.is_file()]
+
+
+def _of_wheel() -> list[Path]:
     try:
-        distribution = importlib.metadata.distribution(WHEEL)
+        wheel = importlib.metadata.distribution(WHEEL)
     except importlib.metadata.PackageNotFoundError:
-        return
-    for file in distribution.files or ():
-        path = Path(str(distribution.locate_file(file)))
-        if _NAME.fullmatch(path.name) and path.is_file():
-            yield os.path.realpath(path)
+        return []
+    return [Path(str(wheel.locate_file(file))) for file in wheel.files or ()]
 
 
-def _of_system() -> Iterator[str]:
-    patterns = _SYSTEM_PATTERNS.get(sys.platform, ())
+def _of_system() -> Iterator[Path]:
     # A Python of conda's has its libraries beside it.
-    own = tuple(f"{prefix}/lib/libLLVM*" for prefix in {sys.prefix, sys.base_prefix})
-    for pattern in (*own, *patterns):
-        for path in Path("/").glob(pattern.lstrip("/")):
-            if _NAME.fullmatch(path.name) and path.is_file():
-                yield os.path.realpath(path)
+    own = (f"{prefix}/lib/libLLVM*" for prefix in (sys.prefix, sys.base_prefix))
+    for pattern in (*own, *_SYSTEM_PATTERNS.get(sys.platform, ())):
+        yield from Path("/").glob(pattern.lstrip("/"))
 
 
 TIMEOUT_S = 120.0
@@ -120,11 +110,9 @@ TIMEOUT_S = 120.0
 
 _PROBE = Path(__file__).with_name("probe_script.py")
 
-_STOPPED = {
-    -number
-    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))
-}
-"""Signals by which somebody ended the probe, which says nothing about the library."""
+_SIGNALS = signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)
+_STOPPED = {None, *(-number for number in _SIGNALS)}
+"""Ends that say nothing about the library: none in time, and signals that somebody sent."""
 
 _FINDINGS = {
     "is too old": "refused by Dr.Jit: too old",
@@ -134,8 +122,7 @@ _FINDINGS = {
 """What it means that Dr.Jit says so."""
 
 
-@dataclass(frozen=True)
-class ProbeResult:
+class ProbeResult(NamedTuple):
     """What a probe found: ``good``, or in a few words what went wrong.
 
     ``version`` is that of the libLLVM in use; None without one, or where it does not say.
@@ -161,19 +148,15 @@ def probe_backend(variant: str, library: Library | None, *, fresh: bool = False)
     kept = {} if key is None else _read_cache()
     if key in kept and not fresh:
         return ProbeResult(**kept[key])
-    try:
-        result, ended = _probe(variant, library)
-    except subprocess.TimeoutExpired:
-        return ProbeResult(
-            f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None
-        )
+    result, ended = _probe(variant, library)
     if key is not None and ended not in _STOPPED:
-        _write_cache({**_read_cache(), key: {"finding": result.finding, "version": result.version}})
+        _write_cache({**_read_cache(), key: result._asdict()})
     return result
 
 
-def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
-    """What it found, and the status with which it ended."""
+def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int | None]:
+    """What it found, and the status with which it ended; None where it did not."""
+    version = library.version if library else None
     with temporary_folder() as kernels:
         # An empty kernel cache: the result must not come from what another libLLVM compiled.
         environment = {**os.environ, "DRJIT_CACHE_DIR": str(kernels)}
@@ -181,28 +164,21 @@ def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
         command = [sys.executable, "-P", str(_PROBE), variant]
-        done = subprocess.run(
-            command,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=TIMEOUT_S,
-        )
-    said: dict[str, Any] = {}
-    for line in done.stdout.splitlines():
-        if line.startswith("{"):
-            said |= json.loads(line)
-    found = said.get("llvm_version", [-1])
-    version = ".".join(map(str, found)) if found[0] > 0 else (library.version if library else None)
-    if done.returncode == 0 and said.get("works"):
-        return ProbeResult("good", version), 0
-    return ProbeResult(_what_went_wrong(done, said), version), done.returncode
+        options: dict[str, Any] = {"env": environment, "text": True, "errors": "replace"}
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, **options)
+        except subprocess.TimeoutExpired:
+            return ProbeResult(f"hangs: no answer in {TIMEOUT_S:.0f} s", version), None
+    lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    said = dict(ChainMap(*lines))
+    if (found := said.get("llvm_version", [-1]))[0] > 0:
+        version = ".".join(map(str, found))
+    return ProbeResult(_finding(done, said), version), done.returncode
 
 
-def _what_went_wrong(done: subprocess.CompletedProcess[str], said: dict[str, Any]) -> str:
+def _finding(done: subprocess.CompletedProcess[str], said: dict[str, Any]) -> str:
     if done.returncode == 0:
-        return "gives wrong results"
+        return "good" if said.get("works") else "gives wrong results"
     # A process that calls abort() ends by a signal, which Python tells by a negative status.
     if done.returncode < 0:
         return "aborts the process"

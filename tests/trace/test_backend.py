@@ -133,7 +133,7 @@ def test_environment_then_wheel_then_system_newest_first(
         file.touch()
     (tmp_path / "libLLVM-19.0.so").symlink_to(files["libLLVM-19.so.1"])
     monkeypatch.setattr(probe, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
-    monkeypatch.setattr(probe, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
+    monkeypatch.setattr(probe, "_of_wheel", lambda: [files["libLLVM.so.23.1"]])
     monkeypatch.setattr(sys, "prefix", str(tmp_path / "none"))
     monkeypatch.setattr(sys, "base_prefix", str(tmp_path / "none"))
     monkeypatch.setenv(ENVIRONMENT_VARIABLE, str(files["libLLVM-15.so.1"]))
@@ -159,7 +159,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> list[str]:
     probes: list[str] = []
 
-    def answer(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
+    def answer(variant: str, library: Library | None) -> tuple[ProbeResult, int | None]:
         probes.append(variant)
         return ProbeResult(finding), ended
 
