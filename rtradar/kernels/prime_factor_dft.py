@@ -261,19 +261,14 @@ def _transform_line(cosines, sines, store, line, to_power):
     first, step, factor, at_half = line
     pairs, one = (factor - 1) // 2, np.float32(1)
     # Frequencies without a partner: 0, and half of an even factor.
-    _put(_row(store.alone, 0), store.total)
-    _add_signed(store.even, pairs, one, store.total)
-    if to_power:
-        _add_squares(store.total, _powers(store.sums, first))
-    else:
-        _put(store.total, _row(store.grid, first))
-    if factor % 2 == 0:
-        _put(_row(store.alone, factor // 2 % 2), store.total)
-        _add_signed(store.even, pairs, -one, store.total)
+    for half in range(2 - factor % 2):
+        place, sign = (at_half, -one) if half else (first, one)
+        _put(_row(store.alone, half * (factor // 2 % 2)), store.total)
+        _add_signed(store.even, pairs, sign, store.total)
         if to_power:
-            _add_squares(store.total, _powers(store.sums, at_half))
+            _add_squares(store.total, _powers(store.sums, place))
         else:
-            _put(store.total, _row(store.grid, at_half))
+            _put(store.total, _row(store.grid, place))
     # All others in pairs, some pairs together.
     for group in range(0, pairs, _TOGETHER):
         for k in range(_TOGETHER):
