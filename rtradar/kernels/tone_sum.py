@@ -73,33 +73,6 @@ def tone_tables(kind: type[np.floating]) -> ToneTables:
     return ToneTables(first, middles.astype(kind), sines[:_TERMS], cosines[:_TERMS])
 
 
-class _Store(NamedTuple):
-    """Arrays that one thread works on, of the tones of one chirp at one receiver.
-
-    ``start``, ``step (tone,)`` are turns at the first sample and per sample, ``lanes`` the powers
-    of each tone, ``middle_re``, ``middle_im (pair * tone,)`` its values in the middle of each pair
-    of blocks of lanes, and ``weighted_re``, ``weighted_im`` the same times its amplitude.
-    ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real
-    and imaginary * tone)`` how much more they are at the others, ``now`` coefficients of a power.
-    ``sum_re``, ``sum_im (sample,)`` are the result.
-    """
-
-    start: NDArray[np.float64]
-    step: NDArray[np.float64]
-    lanes: NDArray[np.floating]
-    sums: NDArray[np.floating]
-    middle_re: NDArray[np.floating]
-    middle_im: NDArray[np.floating]
-    weighted_re: NDArray[np.floating]
-    weighted_im: NDArray[np.floating]
-    first: NDArray[np.float64]
-    change: NDArray[np.float64]
-    weight: NDArray[np.float64]
-    now: NDArray[np.floating]
-    sum_re: NDArray[np.floating]
-    sum_im: NDArray[np.floating]
-
-
 @inlined(fastmath={"contract"})
 def _lanes(row, rest, tables, out):
     """Powers of a tone side by side: of the next step on the grid, rotated by the rest [rad]."""
@@ -119,21 +92,20 @@ def _together(w, x, i):
 
 
 @inlined(fastmath={"contract"})
-def _add_constants(pairs, store):
-    """Add tones of constant amplitude to the result, two blocks of lanes at a time.
+def _add_constants(pairs, weighted, lanes, sums, total):
+    """Add tones of constant amplitude to the total, two blocks of lanes at a time.
 
-    As far before the middle of a pair as after it a power is the conjugate, so the ``sums`` of the
-    products of real and imaginary parts serve both. All sums are one array and the lanes another,
-    because each loop first checks whether its arrays overlap.
+    Real and imaginary parts are the sums ``total (sample,)`` and ``weighted (pair * tone,)``, the
+    values of tones in the middle of each pair of blocks. As far before it as after it a power is
+    the conjugate, so the ``sums`` of the products of real and imaginary parts serve both. All sums
+    are one array and the lanes another, because each loop first checks whether its arrays overlap.
     """
-    lanes, sums = store.lanes, store.sums
-    tones = len(store.weighted_re) // pairs
+    tones = len(weighted[0]) // pairs
     for pair in range(pairs):
         sums[:] = 0.0
         for tone in range(0, tones, _TOGETHER):
             at = pair * tones + tone
-            re = store.weighted_re[at : at + _TOGETHER]
-            im = store.weighted_im[at : at + _TOGETHER]
+            re, im = weighted[0][at : at + _TOGETHER], weighted[1][at : at + _TOGETHER]
             real = re[0], re[1], re[2], re[3], re[4], re[5]
             imaginary = im[0], im[1], im[2], im[3], im[4], im[5]
             some = lanes[tone * _NEXT : (tone + _TOGETHER) * _NEXT]
@@ -144,8 +116,8 @@ def _add_constants(pairs, store):
                 sums[i + 3 * LANES] += _together(imaginary, some, i + LANES)
         # Slices, because the compiler must see that indices are not negative to use vectors.
         early, late, end = 2 * pair * LANES, (2 * pair + 1) * LANES, 2 * (pair + 1) * LANES
-        early_re, early_im = store.sum_re[early:late], store.sum_im[early:late]
-        late_re, late_im = store.sum_re[late:end], store.sum_im[late:end]
+        early_re, early_im = total[0][early:late], total[1][early:late]
+        late_re, late_im = total[0][late:end], total[1][late:end]
         for i in range(LANES):
             late_re[i] += sums[i] - sums[i + 3 * LANES]
             late_im[i] += sums[i + LANES] + sums[i + 2 * LANES]
@@ -155,19 +127,20 @@ def _add_constants(pairs, store):
 
 
 @inlined()
-def _weigh(power, powers, store):
-    """Fill the coefficients of a power of the sample number; whether any is other than 0.
+def _weigh(power, powers, first, change, weight, now):
+    """Fill ``now``, the coefficients of a power of the sample number; whether any is other than 0.
 
+    ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real
+    and imaginary * tone)`` how much more they are at the others, and ``weight`` is room for sums.
     The weights of all powers but the first add up to 0 over the nodes, so constant amplitudes have
     no part in them.
     """
-    first, weight, now = store.first, store.weight, store.now
     for i in range(len(first)):
         weight[i] = first[i] if power == 0 else 0.0
     for node in range(1, powers.shape[1]):
-        change = store.change[node - 1]
+        own = change[node - 1]
         for i in range(len(first)):
-            weight[i] += powers[power, node] * change[i]
+            weight[i] += powers[power, node] * own[i]
     any_there = False
     for i in range(len(first)):
         now[i] = weight[i]
@@ -176,10 +149,13 @@ def _weigh(power, powers, store):
 
 
 @inlined(fastmath={"contract"})
-def _take(tones, chirp, receiver, store, received):
-    """Fill start, step and amplitudes of the visible tones in the band, and count them."""
+def _take(tones, chirp, receiver, received, start, step, first, change):
+    """Fill what `_weigh` reads of visible tones in the band, and count them.
+
+    ``start`` and ``step (tone,)`` are turns at the first sample and per sample.
+    """
     length, amplitude = tones.length[chirp, receiver], tones.amplitude[:, chirp, receiver]
-    size, count = len(store.start), 0
+    size, count = len(start), 0
     for echo in range(len(length)):
         beat = tones.slope / SPEED_OF_LIGHT_MPS * length[echo]
         if beat >= 0 and beat < tones.sample_rate:
@@ -188,18 +164,17 @@ def _take(tones, chirp, receiver, store, received):
                     received[count] = echo
                     count += 1
                     break
-    store.first[:] = 0.0
-    store.change[:] = 0.0
+    first[:] = 0.0
+    change[:] = 0.0
     for i in range(count):
         delay = length[received[i]] / SPEED_OF_LIGHT_MPS
-        store.start[i] = delay * (tones.start_frequency - 0.5 * tones.slope * delay)
-        store.step[i] = tones.slope * delay / tones.sample_rate
+        start[i] = delay * (tones.start_frequency - 0.5 * tones.slope * delay)
+        step[i] = tones.slope * delay / tones.sample_rate
         here = amplitude[0, received[i]]
-        store.first[i], store.first[size + i] = here.real, here.imag
+        first[i], first[size + i] = here.real, here.imag
         for node in range(1, amplitude.shape[0]):
             there = amplitude[node, received[i]] - here
-            store.change[node - 1, i] = there.real
-            store.change[node - 1, size + i] = there.imag
+            change[node - 1, i], change[node - 1, size + i] = there.real, there.imag
     return count
 
 
@@ -213,62 +188,53 @@ def add_tones(begin, end, tones, tables, out):
     pairs = (samples + 2 * LANES - 1) // (2 * LANES)
     size = (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
     like = tables.middles
-    store = _Store(
-        np.zeros(size),
-        np.zeros(size),
-        on_cache_lines(size * _NEXT, like),
-        on_cache_lines(2 * _NEXT, like),
-        np.empty(pairs * size, dtype=like.dtype),
-        np.empty(pairs * size, dtype=like.dtype),
-        np.empty(pairs * size, dtype=like.dtype),
-        np.empty(pairs * size, dtype=like.dtype),
-        np.empty(2 * size),
-        np.empty((nodes - 1, 2 * size)),
-        np.empty(2 * size),
-        np.empty(2 * size, dtype=like.dtype),
-        np.empty(pairs * 2 * LANES, dtype=like.dtype),
-        np.empty(pairs * 2 * LANES, dtype=like.dtype),
-    )
+    start, step = np.zeros(size), np.zeros(size)
+    first, weight = np.empty(2 * size), np.empty(2 * size)
+    change, now = np.empty((nodes - 1, 2 * size)), np.empty(2 * size, dtype=like.dtype)
+    lanes, sums = on_cache_lines(size * _NEXT, like), on_cache_lines(2 * _NEXT, like)
+    # Real and imaginary parts of tones in each middle, the same times amplitudes, and the result.
+    middle_re, middle_im = np.empty(pairs * size, like.dtype), np.empty(pairs * size, like.dtype)
+    weighted = np.empty_like(middle_re), np.empty_like(middle_re)
+    total = np.empty(2 * pairs * LANES, like.dtype), np.empty(2 * pairs * LANES, like.dtype)
+    sum_re, sum_im = total
     received = np.empty(echoes, np.int64)
     fraction = np.empty(samples, dtype=like.dtype)
     for sample in range(samples):
         fraction[sample] = 2 * (sample - samples // 2) / samples
     # Whatever a chirp does not fill is left over from the one before, and silent.
-    store.lanes[:] = 0.0
+    lanes[:] = 0.0
     for chirp in range(begin, end):
         for receiver in range(receivers):
-            count = _take(tones, chirp, receiver, store, received)
+            count = _take(tones, chirp, receiver, received, start, step, first, change)
             # Powers of each tone about a middle, and its phasor in each middle.
             for i in range(count):
-                row = int(store.step[i] * _GRID + 0.5)
-                rest = like.dtype.type((store.step[i] - row / _GRID) * (2 * math.pi))
-                own = store.lanes[i * _NEXT : (i + 1) * _NEXT]
-                _lanes(tables.first[row], rest, tables, own)
+                row = int(step[i] * _GRID + 0.5)
+                rest = like.dtype.type((step[i] - row / _GRID) * (2 * math.pi))
+                _lanes(tables.first[row], rest, tables, lanes[i * _NEXT : (i + 1) * _NEXT])
             for pair in range(pairs):
                 middle = (2 * pair + 1) * LANES - 0.5
-                re = store.middle_re[pair * size : (pair + 1) * size]
-                im = store.middle_im[pair * size : (pair + 1) * size]
+                re = middle_re[pair * size : (pair + 1) * size]
+                im = middle_im[pair * size : (pair + 1) * size]
                 for i in range(size):
-                    re[i], im[i] = phasor(store.start[i] + store.step[i] * middle)
-            store.sum_re[:] = 0.0
-            store.sum_im[:] = 0.0
+                    re[i], im[i] = phasor(start[i] + step[i] * middle)
+            sum_re[:] = 0.0
+            sum_im[:] = 0.0
             # Horner's scheme over powers of the sample number: for each a sum of constant tones.
             for power in range(nodes - 1, -1, -1):
                 for sample in range(samples if power < nodes - 1 else 0):
-                    store.sum_re[sample] *= fraction[sample]
-                    store.sum_im[sample] *= fraction[sample]
-                if not _weigh(power, tones.weights, store):
+                    sum_re[sample] *= fraction[sample]
+                    sum_im[sample] *= fraction[sample]
+                if not _weigh(power, tones.weights, first, change, weight, now):
                     continue
-                now_re, now_im = store.now[:size], store.now[size:]
+                now_re, now_im = now[:size], now[size:]
                 for pair in range(pairs):
-                    re = store.middle_re[pair * size : (pair + 1) * size]
-                    im = store.middle_im[pair * size : (pair + 1) * size]
-                    own_re = store.weighted_re[pair * size : (pair + 1) * size]
-                    own_im = store.weighted_im[pair * size : (pair + 1) * size]
+                    own = slice(pair * size, (pair + 1) * size)
+                    re, im = middle_re[own], middle_im[own]
+                    own_re, own_im = weighted[0][own], weighted[1][own]
                     for i in range(size):
                         own_re[i] = re[i] * now_re[i] - im[i] * now_im[i]
                         own_im[i] = re[i] * now_im[i] + im[i] * now_re[i]
-                _add_constants(pairs, store)
+                _add_constants(pairs, weighted, lanes, sums, total)
             samples_there = out[chirp, receiver]
             for sample in range(samples):
-                samples_there[sample] = complex(store.sum_re[sample], store.sum_im[sample])
+                samples_there[sample] = complex(sum_re[sample], sum_im[sample])
