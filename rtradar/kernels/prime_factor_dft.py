@@ -128,32 +128,14 @@ def _read_only(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
 # each were an array, every loop would first have to check whether any two of them overlap.
 
 
-class _Store(NamedTuple):
-    """Rows that one thread works on; the arrays stay the same from line to line.
-
-    ``grid`` has a row for each cycle and one of zeros, ``sums`` the power of each bin, ``even`` and
-    ``odd`` the folded terms of a line, ``alone`` the sum and the difference of the two terms that
-    have no partner, ``total`` one frequency, and the ``parts`` three frequencies.
-    """
-
-    grid: NDArray[np.float32]
-    sums: NDArray[np.float32]
-    even: NDArray[np.float32]
-    odd: NDArray[np.float32]
-    alone: NDArray[np.float32]
-    total: NDArray[np.float32]
-    cosine_parts: NDArray[np.float32]
-    sine_parts: NDArray[np.float32]
+@inlined()
+def _row(rows, number):
+    return rows[number * _ROW : (number + 1) * _ROW]
 
 
 @inlined()
-def _row(store, number):
-    return store[number * _ROW : (number + 1) * _ROW]
-
-
-@inlined()
-def _powers(store, number):
-    return store[number * _COLUMNS : (number + 1) * _COLUMNS]
+def _powers(sums, number):
+    return sums[number * _COLUMNS : (number + 1) * _COLUMNS]
 
 
 @inlined(fastmath={"contract"})
@@ -243,57 +225,59 @@ def _add_unfolded_squares(cosine, sine, low, high):
 
 
 @inlined()
-def _fold_line(store, line):
+def _fold_line(grid, even, odd, alone, line):
     """Fold the terms of one line (first place, step, factor, place of its half) in pairs."""
     first, step, factor, at_half = line
-    own, middle = _row(store.grid, first), _row(store.grid, at_half)
-    _unfold(own, middle, _row(store.alone, 0), _row(store.alone, 1))
+    own, middle = _row(grid, first), _row(grid, at_half)
+    _unfold(own, middle, _row(alone, 0), _row(alone, 1))
     for k in range((factor - 1) // 2):
         low, high = first + (k + 1) * step, first + (factor - k - 1) * step
-        _fold(
-            _row(store.grid, low), _row(store.grid, high), _row(store.even, k), _row(store.odd, k)
-        )
+        _fold(_row(grid, low), _row(grid, high), _row(even, k), _row(odd, k))
 
 
 @inlined()
-def _transform_line(cosines, sines, store, line, to_power):
-    """Sum the folded terms of one line to its frequencies, in the grid or as added power."""
+def _transform_line(cosines, sines, rows, line, to_power):
+    """Sum the folded terms of one line to its frequencies, in the grid or as added power.
+
+    Of ``rows`` the ``grid`` has one for each cycle and one of zeros, ``sums`` the power of each
+    bin, ``even`` and ``odd`` the folded terms of a line, ``alone`` the sum and the difference of
+    the two terms that have no partner, ``total`` one frequency, and the ``parts`` three.
+    """
+    grid, sums, even, odd, alone, total, cosine_parts, sine_parts = rows
     first, step, factor, at_half = line
     pairs, one = (factor - 1) // 2, np.float32(1)
     # Frequencies without a partner: 0, and half of an even factor.
     for half in range(2 - factor % 2):
         place, sign = (at_half, -one) if half else (first, one)
-        _put(_row(store.alone, half * (factor // 2 % 2)), store.total)
-        _add_signed(store.even, pairs, sign, store.total)
+        _put(_row(alone, half * (factor // 2 % 2)), total)
+        _add_signed(even, pairs, sign, total)
         if to_power:
-            _add_squares(store.total, _powers(store.sums, place))
+            _add_squares(total, _powers(sums, place))
         else:
-            _put(store.total, _row(store.grid, place))
+            _put(total, _row(grid, place))
     # All others in pairs, some pairs together.
     for group in range(0, pairs, _TOGETHER):
         for k in range(_TOGETHER):
-            _put(_row(store.alone, (group + k + 1) % 2), _row(store.cosine_parts, k))
-        store.sine_parts[:] = 0
-        _add_products(cosines, group, store.even, store.cosine_parts)
-        _add_products(sines, group, store.odd, store.sine_parts)
+            _put(_row(alone, (group + k + 1) % 2), _row(cosine_parts, k))
+        sine_parts[:] = 0
+        _add_products(cosines, group, even, cosine_parts)
+        _add_products(sines, group, odd, sine_parts)
         for k in range(min(_TOGETHER, pairs - group)):
             low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
-            cosine, sine = _row(store.cosine_parts, k), _row(store.sine_parts, k)
+            cosine, sine = _row(cosine_parts, k), _row(sine_parts, k)
             if to_power:
-                _add_unfolded_squares(
-                    cosine, sine, _powers(store.sums, low), _powers(store.sums, high)
-                )
+                _add_unfolded_squares(cosine, sine, _powers(sums, low), _powers(sums, high))
             else:
-                _unfold(cosine, sine, _row(store.grid, low), _row(store.grid, high))
+                _unfold(cosine, sine, _row(grid, low), _row(grid, high))
 
 
 @inlined()
-def _pick(store, cells, begin, end, channel_begin, channel_end, values):
+def _pick(grid, cells, begin, end, channel_begin, channel_end, values):
     """Fill values of these channels that lie in these lanes from the transformed grid."""
     places, at, lanes = cells
     bins = len(lanes) // (channel_end - channel_begin)
     for cell in range(len(places)):
-        row = _row(store.grid, places[cell])
+        row = _row(grid, places[cell])
         for offset in range(at.shape[1]):
             for channel in range(channel_begin, channel_end):
                 c = (channel - channel_begin) * bins + at[cell, offset] - begin
@@ -313,24 +297,21 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
     n_lanes, passes = (n_range, channel_end - channel_begin) if to_power else (len(cells[2]), 1)
     n_1, n_2 = dft.factors
     terms = max(dft.cosines[0].shape[1], dft.cosines[1].shape[1])
-    store = _Store(
-        on_cache_lines((cycles + 1) * _ROW, weights),
-        on_cache_lines(cycles * _COLUMNS, weights),
-        on_cache_lines(terms * _ROW, weights),
-        on_cache_lines(terms * _ROW, weights),
-        on_cache_lines(2 * _ROW, weights),
-        on_cache_lines(_ROW, weights),
-        on_cache_lines(_TOGETHER * _ROW, weights),
-        on_cache_lines(_TOGETHER * _ROW, weights),
-    )
-    store.grid[:], store.even[:], store.odd[:] = 0, 0, 0
+    grid = on_cache_lines((cycles + 1) * _ROW, weights)
+    sums = on_cache_lines(cycles * _COLUMNS, weights)
+    even, odd = on_cache_lines(terms * _ROW, weights), on_cache_lines(terms * _ROW, weights)
+    alone, total = on_cache_lines(2 * _ROW, weights), on_cache_lines(_ROW, weights)
+    cosine_parts = on_cache_lines(_TOGETHER * _ROW, weights)
+    sine_parts = on_cache_lines(_TOGETHER * _ROW, weights)
+    rows = grid, sums, even, odd, alone, total, cosine_parts, sine_parts
+    grid[:], even[:], odd[:] = 0, 0, 0
     for begin in range(0, n_lanes, _COLUMNS):
         # What lanes beyond the last ones hold is transformed, too, and not read.
         end = min(begin + _COLUMNS, n_lanes)
-        store.sums[:] = 0
+        sums[:] = 0
         for channel in range(channel_begin, channel_begin + passes):
             for place in range(cycles):
-                cycle, row = dft.cycle_at[place], _row(store.grid, place)
+                cycle, row = dft.cycle_at[place], _row(grid, place)
                 if to_power:
                     _read(spectra[cycle, channel, begin:end], weights[cycle], row)
                 else:
@@ -341,18 +322,18 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
                 factor, step = (n_1, n_2) if last else (n_2, 1)
                 cosines, sines = dft.cosines[0 if last else 1], dft.sines[0 if last else 1]
                 padding = slice((factor - 1) // 2 * _ROW, cosines.shape[1] * _ROW)
-                store.even[padding] = 0
-                store.odd[padding] = 0
+                even[padding] = 0
+                odd[padding] = 0
                 for number in range(cycles // factor):
                     first = number if last else number * n_2
                     # A term at half of an even factor has no partner; else the row of zeros is it.
                     at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
                     line = first, step, factor, at_half
-                    _fold_line(store, line)
-                    _transform_line(cosines, sines, store, line, to_power and last)
+                    _fold_line(grid, even, odd, alone, line)
+                    _transform_line(cosines, sines, rows, line, to_power and last)
         if not to_power:
-            _pick(store, cells, begin, end, channel_begin, channel_end, values)
+            _pick(grid, cells, begin, end, channel_begin, channel_end, values)
         for place in range(cycles if to_power else 0):
-            own, out = _powers(store.sums, place), power[dft.bin_at[place], begin:end]
+            own, out = _powers(sums, place), power[dft.bin_at[place], begin:end]
             for c in range(len(out)):
                 out[c] += own[c]
