@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from rtradar.errors import InputError
-from rtradar.full_wave.antennas import Polarization, antenna_moments, wavenumber
+from rtradar.full_wave.antennas import Dipole, Polarization, antenna_moments, wavenumber
 from rtradar.full_wave.surfaces_mesh import ClosedMesh
-from rtradar.kernels.surface_integrals import Equation, Rules, fill_matrices, fill_moments
+from rtradar.kernels.surface_integrals import Equation, Rules, fill_matrices
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -154,12 +154,24 @@ class ConductingSurface:
         return np.asarray(np.sum(currents[ends[0]] * received[ends[1]], axis=1))
 
     def _products(self, antennas: Array, polarization: Polarization) -> Field:
-        """Products of each current with the fields of antennas, see `fill_moments`."""
+        """Products (2, antenna, edge) of each current with the fields of antennas.
+
+        First is that with the electric field, then that with the field that the equation has on its
+        other side.
+        """
+        triangles, rule = self.mesh.triangles, rules(_ORDER)
+        points = np.einsum("pc,tcx->tpx", rule.places, triangles.corners)
+        currents = points[:, None] - triangles.corners[:, :, None]
+        currents *= triangles.scales[..., None, None] * triangles.areas[:, None, None, None]
+        currents *= rule.weights[:, None]
         out = np.zeros((2, len(antennas), self.mesh.unknowns), dtype=np.complex128)
-        dipoles = np.stack([antennas, antenna_moments(antennas, polarization)], axis=1)
-        fill_moments(
-            self.mesh.triangles, self.mesh.edge_of, rules(_ORDER), self._equation, dipoles, out
-        )
+        moments = antenna_moments(antennas, polarization)
+        for number, dipole in enumerate(map(Dipole, antennas, moments)):
+            field, magnetic = dipole.fields(points, self._equation.wavenumber)
+            jump = np.cross(triangles.normals[:, None], magnetic)
+            for side, own in enumerate((field, _ELECTRIC * field + (1 - _ELECTRIC) * jump)):
+                products = np.einsum("tipx,tpx->ti", currents, own)
+                np.add.at(out[side, number], self.mesh.edge_of, products)
         return out
 
 

@@ -1,4 +1,4 @@
-"""Currents over the edges of flat triangles: their fields on each other, and those of antennas.
+"""Currents over the edges of flat triangles, and their fields on each other.
 
 A current flows across each edge, from one triangle into the other (S. M. Rao, D. R. Wilton, A. W.
 Glisson, IEEE Trans. Antennas Propag. 30, 1982). Triangles far apart have one product rule. Where
@@ -322,46 +322,3 @@ def _shared_first(triangles, t, s, one, other):
             one[i, axis] = corners[t, ones[i], axis]
             other[i, axis] = corners[s, others[i], axis]
     return shared
-
-
-# -- products with the fields of antennas ----------------------------------------------------------
-
-
-@compiled(fastmath=_FAST)
-def fill_moments(triangles, edge_of, rules, equation, antennas, out):
-    """Add to ``out (2, antenna, edge)`` the products of each current with the field of a dipole.
-
-    The ``antennas (antenna, 2, 3)`` are positions [m] and unit moments; their fields are those of
-    `rtradar.full_wave.antennas.Dipole`. First is the product with the electric field, then that
-    with the field that the equation has on its other side.
-    """
-    k, electric = equation.wavenumber, equation.electric
-    for antenna in range(len(antennas)):
-        position, moment = antennas[antenna, 0], antennas[antenna, 1]
-        from_origin = math.sqrt(dot(position, position))
-        for t in range(len(triangles.areas)):
-            corners, normal = triangles.corners[t], triangles.normals[t]
-            n_moment = dot(normal, moment)
-            for p in range(len(rules.weights)):
-                point = turned_back(corners, rules.places[p])
-                away = minus(point, position)
-                distance = math.sqrt(dot(away, away))
-                # The path beyond that to the origin, without the cancellation of far antennas.
-                squares = dot(point, point) - 2 * dot(point, position)
-                cosine, sine = fast_phasor(-k * squares / (distance + from_origin))
-                wave = complex(cosine, sine) * (from_origin / distance)
-                inverse = 1 / (k * distance)
-                n_unit, along = dot(normal, away) / distance, dot(moment, away) / distance
-                # Parts along the moment and along the ray, of both fields.
-                magnetic = (1 - electric) * complex(1.0, -inverse)
-                by_moment = complex(1 - inverse**2, -inverse)
-                by_ray = -along * complex(1 - 3 * inverse**2, -3 * inverse)
-                weight = rules.weights[p] * triangles.areas[t]
-                for i in range(3):
-                    place = minus(point, corners[i])
-                    m, u = dot(place, moment), dot(place, away) / distance
-                    shape = wave * (weight * triangles.scales[t, i])
-                    field = by_moment * m + by_ray * u
-                    jump = magnetic * (u * n_moment - m * n_unit)
-                    out[0, antenna, edge_of[t, i]] += shape * field
-                    out[1, antenna, edge_of[t, i]] += shape * (electric * field + jump)

@@ -9,7 +9,7 @@ import numpy as np
 from references.cases import Pair, filled, kernel_case
 from rtradar.full_wave.surfaces import rules
 from rtradar.full_wave.surfaces_mesh import ClosedMesh
-from rtradar.kernels.surface_integrals import DEEPEST, FAR, Equation, fill_matrices, fill_moments
+from rtradar.kernels.surface_integrals import DEEPEST, FAR, Equation, fill_matrices
 
 
 def _octahedron() -> Any:
@@ -98,40 +98,3 @@ def _fill_matrices() -> Pair:
     count = 1 + int(mesh.orbits.unknown.max())
     out = (np.zeros((4, count, count), dtype=np.complex128),)
     return filled(fill_matrices, *given, out=out, adds=True), matrices_reference(*given)
-
-
-def moments_reference(triangles, edge_of, rules, equation, antennas):
-    """Products of `fill_moments`, antenna by antenna in plain NumPy."""
-    electric = equation.electric
-    out = np.zeros((2, len(antennas), int(edge_of.max()) + 1), dtype=np.complex128)
-    points = np.einsum("pc,tcx->tpx", rules.places, triangles.corners)
-    currents = (points[:, None] - triangles.corners[:, :, None]) * triangles.scales[..., None, None]
-    for antenna, (position, moment) in enumerate(antennas):
-        field, magnetic = _dipole_reference(points, position, moment, equation.wavenumber)
-        jump = np.cross(triangles.normals[:, None], magnetic)
-        both = np.stack([field, electric * field + (1 - electric) * jump])
-        products = np.einsum("tipx,ftpx,p,t->fti", currents, both, rules.weights, triangles.areas)
-        for side in range(2):
-            np.add.at(out[side, antenna], edge_of, products[side])
-    return out
-
-
-def _dipole_reference(points, position, moment, k):
-    """Electric field of a dipole, and magnetic field times the impedance of free space."""
-    ray = points - position
-    distance = np.linalg.norm(ray, axis=-1, keepdims=True)
-    ray, j_by_kr = ray / distance, 1j / (k * distance)
-    wave = np.exp(-1j * k * (distance - np.linalg.norm(position)))
-    wave = wave * np.linalg.norm(position) / distance
-    along = (ray @ moment)[..., None] * ray
-    field = (1 - j_by_kr + j_by_kr**2) * moment - (1 - 3 * j_by_kr + 3 * j_by_kr**2) * along
-    return wave * field, wave * (1 - j_by_kr) * np.cross(ray, moment)
-
-
-@kernel_case(fill_moments, 1e-9)
-def _fill_moments() -> Pair:
-    mesh = _octahedron()
-    dipoles = np.array([[[2.0, 1.0, 1.0], [0.0, 0.6, 0.8]], [[30.0, 20.0, -1.0], [1.0, 0.0, 0.0]]])
-    given = mesh.triangles, mesh.edge_of, rules(3), Equation(3.0, 0.8), dipoles
-    out = (np.zeros((2, 2, mesh.unknowns), dtype=np.complex128),)
-    return filled(fill_moments, *given, out=out, adds=True), moments_reference(*given)
