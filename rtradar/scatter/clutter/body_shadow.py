@@ -31,7 +31,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -114,11 +113,7 @@ class ClutterShadow:
     """
 
     def __init__(
-        self,
-        clutter: Clutter,
-        body: Body,
-        objects: Sequence[Object] = (),
-        allowed_m2: float = 0.0,
+        self, clutter: Clutter, body: Body, objects: Sequence[Object] = (), allowed_m2: float = 0.0
     ) -> None:
         self._radar, self._body = clutter.radar, body
         # Triangles of objects about their pivots, in their own axes.
@@ -259,27 +254,30 @@ class ClutterShadow:
 
         The sum of their powers is that of the mean sample.
         """
-        legs = self._legs
-        some = np.flatnonzero(legs.channel == self._radar.n_channels // 2)
-        geometry = tuple(array[some] for array in legs.geometry)
-        lost = lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, np.ones(1))
-        kept = np.ones(len(self.mirrors), dtype=np.complex128)
-        np.multiply.at(kept, legs.mirror[some], 1 - lost[:, 0])
+        middle = self._radar.n_channels // 2
+        some = np.flatnonzero(self._legs.channel == middle)
+        of_mirrors = 1 - self._mirrors_kept(self._legs.some(some), posed, np.ones(1))[:, middle, 0]
         of_points = points.samples(fields, posed)
         mean = of_points.ravel() / np.sqrt(of_points.size)
-        return np.concatenate([mean, (1 - kept) * self._mirror_m])
+        return np.concatenate([mean, of_mirrors * self._mirror_m])
 
     def _of_mirrors(self, posed: Posed) -> tuple[Indices, Field]:
         """Which mirrors are occluded, and what of each is lost (mirror, tx, rx, node)."""
-        legs, radar = self._legs, self._radar
-        scales = self.frequency / radar.centre_frequency_hz
-        lost = lost_on_legs(radar, legs.geometry, posed, REACH, MIRROR_LINES, scales)
-        kept = np.ones((len(self.mirrors), radar.n_channels, SWEEP_NODES), dtype=np.complex128)
-        some = np.flatnonzero(lost.any(axis=1))
-        np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
+        radar = self._radar
+        kept = self._mirrors_kept(self._legs, posed, self.frequency / radar.centre_frequency_hz)
         hidden = np.flatnonzero((kept != 1).any(axis=(1, 2)))
         shape = len(hidden), radar.n_tx, radar.n_rx, SWEEP_NODES
         return np.array(self.mirrors, dtype=np.int64)[hidden], 1 - kept[hidden].reshape(shape)
+
+    def _mirrors_kept(self, legs: _Legs, posed: Posed, scales: Array) -> Field:
+        """What mirrors keep over some legs (mirror, channel, node), at scales of the frequency."""
+        geometry = legs[:4]
+        lost = lost_on_legs(self._radar, geometry, posed, REACH, MIRROR_LINES, scales)
+        some = np.flatnonzero(lost.any(axis=1))
+        shape = len(self.mirrors), self._radar.n_channels, len(scales)
+        kept = np.ones(shape, dtype=np.complex128)
+        np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
+        return kept
 
 
 def _apart_s(
@@ -331,34 +329,36 @@ def _fields(clutter: Clutter, starts: Indices, numbers: Indices, tx: Indices) ->
 class _Legs(NamedTuple):
     """Legs of the paths over walls of every channel.
 
-    ``geometry`` is starts and ends (leg, 3), the path from the Tx to the start and the whole path
-    (leg,) [m]; ``mirror`` is the number among the mirrors and ``channel (leg,)`` that of the path.
+    ``start`` and ``end (leg, 3)``, the path from the Tx to the start and the whole path (leg,) [m];
+    ``mirror`` is the number among the mirrors and ``channel (leg,)`` that of the path.
     """
 
-    geometry: tuple[Array, Array, Array, Array]
+    start: Array
+    end: Array
+    before: Array
+    length: Array
     mirror: Indices
     channel: Indices
+
+    def some(self, which: Indices | Bools) -> _Legs:
+        """Return some of them."""
+        return _Legs(*(array[which] for array in self))
 
 
 def _mirror_legs(mirrors: list[RoomEchoes], radar: Radar) -> _Legs:
     places, numbers = np.empty((0, 3)), np.empty(0, dtype=np.int64)
-    found = [(places, places, np.empty(0), np.empty(0), numbers, numbers)]
+    found = [_Legs(places, places, np.empty(0), np.empty(0), numbers, numbers)]
+    rx = radar.rx[radar.rx_of_tx]
+    tx = np.broadcast_to(radar.tx[:, None], rx.shape)
     for number, own in enumerate(mirrors):
         # The echoes of one object are delays in the walls, on one path.
         received = (own.amplitude != 0).any(axis=(0, 3))
-        channel = np.flatnonzero(received)
-        rx = radar.rx[radar.rx_of_tx]
-        tx = np.broadcast_to(radar.tx[:, None], rx.shape)
         stops = [array[received] for array in (tx, *np.moveaxis(own.points[:, :, 0], 2, 0), rx)]
-        sizes = [np.linalg.norm(end - start, axis=1) for start, end in pairwise(stops)]
-        before, length = np.zeros(len(channel)), np.sum(sizes, axis=0)
-        for (start, end), size in zip(pairwise(stops), sizes, strict=True):
-            # In the crease of a corner a path goes from wall to wall at one place.
-            long = size > _SHORTEST_M
-            arrays = (start, end, before, length, np.full(len(channel), number), channel)
-            found.append(tuple(array[long] for array in arrays))
-            before = before + size
-    starts, ends, before, length, mirror, channel = (
-        np.concatenate(arrays) for arrays in zip(*found, strict=True)
-    )
-    return _Legs((starts, ends, before, length), mirror, channel)
+        size = np.linalg.norm(np.diff(stops, axis=0), axis=2)
+        before = np.cumsum(np.concatenate([np.zeros((1, size.shape[1])), size]), axis=0)
+        of_path = size.sum(axis=0), number, np.flatnonzero(received)
+        each = np.broadcast_arrays(before[:-1], *of_path)
+        # In the crease of a corner a path goes from wall to wall at one place.
+        legs = _Legs(np.array(stops[:-1]), np.array(stops[1:]), *each)
+        found.append(legs.some(size > _SHORTEST_M))
+    return _Legs(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))

@@ -14,7 +14,7 @@ that is left over the sweep is small enough for a polynomial through `FURNITURE_
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -257,8 +257,28 @@ def _returns(
     groups = FacetGroups(places[:, 3], radar)
     chains = [PathGroups(places, radar, order) for order in range(2, bounces + 1)]
     nodes = sweep_nodes(radar, FURNITURE_NODES)
-    given = surfaces, piece.material, radar, groups, chains, nodes
-    shots = [_shot(*given, shooter.shoot(tx), index) for index, tx in enumerate(radar.tx)]
+
+    def shot(tx: Array, rx: Array) -> tuple[Array, NDArray[np.complex128]]:
+        """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
+        lengths = [
+            np.linalg.norm(rx[:, None] - groups.centres, axis=-1)
+            + np.linalg.norm(tx - groups.centres, axis=-1)
+        ]
+        sums = []
+        for order, footprints in enumerate(shooter.shoot(tx)):
+            if order:
+                group = chains[order - 1].of(footprints, tx)
+                lengths.append(chains[order - 1].lengths(footprints, group, tx, rx))
+            else:
+                group = groups.of(footprints.places[:, 3])
+            visible = exits(surfaces, footprints, rx)
+            turn, lit = _reflected(footprints, piece.material, radar.centre_frequency_hz)
+            lit, k = replace(lit, surface=group), 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
+            own = radiate(lit, visible, rx, k, lengths[-1], polarization=polarization)
+            sums.append(turn * own)
+        return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
+
+    shots = list(map(shot, radar.tx, radar.rx[radar.rx_of_tx]))
     amplitude = np.stack([amplitude for _, amplitude in shots], axis=1)
     if not amplitude.any():
         return None
@@ -280,39 +300,6 @@ def _returns(
     if returns.n_echoes == 0:
         return None
     return behind_walls(returns, radar, scene).received(radar)
-
-
-def _shot(
-    surfaces: Surfaces,
-    material: Material,
-    radar: Radar,
-    groups: FacetGroups,
-    chains: Sequence[PathGroups],
-    nodes: Array,
-    sets: list[Footprints],
-    index: int,
-) -> tuple[Array, NDArray[np.complex128]]:
-    """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
-    polarization = Polarization(radar.polarization, radar.axes)
-    tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
-    wavenumber = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
-    lengths = [
-        np.linalg.norm(rx[:, None] - groups.centres, axis=-1)
-        + np.linalg.norm(tx - groups.centres, axis=-1)
-    ]
-    sums = []
-    for order, footprints in enumerate(sets):
-        if order:
-            group = chains[order - 1].of(footprints, tx)
-            lengths.append(chains[order - 1].lengths(footprints, group, tx, rx))
-        else:
-            group = groups.of(footprints.places[:, 3])
-        visible = exits(surfaces, footprints, rx)
-        turn, lit = _reflected(footprints, material, radar.centre_frequency_hz)
-        lit = replace(lit, surface=group)
-        own = radiate(lit, visible, rx, wavenumber, lengths[-1], polarization=polarization)
-        sums.append(turn * own)
-    return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
 
 
 def _reflected(

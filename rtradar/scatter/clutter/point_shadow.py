@@ -109,11 +109,7 @@ class PointShadow:
     """
 
     def __init__(
-        self,
-        radar: Radar,
-        points: SharedPoints,
-        precision: Precision,
-        tx: Indices | None = None,
+        self, radar: Radar, points: SharedPoints, precision: Precision, tx: Indices | None = None
     ) -> None:
         self.precision, self._radar, self._points = precision, radar, points
         if precision.along_tx:
@@ -165,12 +161,7 @@ class PointShadow:
 
 
 def lost_on_legs(
-    radar: Radar,
-    geometry: tuple[Array, ...],
-    posed: Posed,
-    reach: float,
-    lines: int,
-    scales: Array,
+    radar: Radar, geometry: tuple[Array, ...], posed: Posed, reach: float, lines: int, scales: Array
 ) -> Field:
     """Fraction of the field that is taken from each leg (leg, node), as `occluded_fractions`."""
     out = np.zeros((len(geometry[0]), len(scales)), dtype=np.complex128)
