@@ -114,10 +114,8 @@ _UNUSED_S = 30 * 86400.0  # after which code of other versions goes
 def _read_sources() -> bytes:
     """Digest of the texts of all compiled functions and of the constants that they use."""
     here = Path(__file__).parent
-    found = hashlib.sha256()
-    for file in sorted([*here.rglob("*.py"), here.parent / "conventions.py"]):
-        found.update(hashlib.sha256(file.read_bytes()).digest())
-    return found.digest()
+    files = sorted([*here.rglob("*.py"), here.parent / "conventions.py"])
+    return hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).digest()
 
 
 # Modules may be edited while a process runs. This is what it has imported.

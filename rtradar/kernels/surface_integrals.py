@@ -75,9 +75,8 @@ def fill_matrices(triangles, orbits, rules, equation, out):
         corners = triangles.corners[s]
         radii[s] = _middle(corners, centroids[s])
         for q in range(points):
-            place = minus(turned_back(corners, rules.places[q]), centroids[s])
-            for axis in range(3):
-                places[q, axis, s] = place[axis]
+            x, y, z = minus(turned_back(corners, rules.places[q]), centroids[s])
+            places[q, 0, s], places[q, 1, s], places[q, 2, s] = x, y, z
     sums, block = np.empty((_ROWS, _LANES)), np.empty((3, 3), dtype=np.complex128)
     stack = np.empty((15 * DEEPEST + 16, 2, 3, 3))
     for row in range(len(orbits.tested)):
@@ -221,9 +220,9 @@ def _far_sums(t, first, lanes, triangles, centroids, places, rules, equation, su
     normal, area = triangles.normals[t], triangles.areas[t]
     normal = normal[0], normal[1], normal[2]
     away = np.empty((3, _LANES))
-    for axis in range(3):
-        for lane in range(lanes):
-            away[axis, lane] = centroids[t, axis] - centroids[first + lane, axis]
+    for lane in range(lanes):
+        x, y, z = minus(centroids[t], centroids[first + lane])
+        away[0, lane], away[1, lane], away[2, lane] = x, y, z
     for row in range(_ROWS):
         for lane in range(lanes):
             sums[row, lane] = 0.0

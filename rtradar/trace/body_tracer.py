@@ -21,6 +21,7 @@ from rtradar.trace.rays import any_met, ball_around
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_Groups = tuple[Indices, Indices, Indices, Poses]
 
 _LINES_A_THREAD = 1 << 14
 """For fewer, waking threads costs more than the work."""
@@ -80,7 +81,7 @@ class BodyTracer:
         the pose ``pose (group,)`` among ``poses``.
         """
         seen = np.ones(len(origins), dtype=bool)
-        seen[self._met(origins, targets, group, own, pose, poses)[0]] = False
+        seen[self._met(origins, targets, (group, own, pose, poses))[0]] = False
         return seen
 
     def meets(
@@ -90,7 +91,7 @@ class BodyTracer:
         centre, ball = ball_around(self._posed[0], self._longest)
         reach = np.linalg.norm(points - centre, axis=1) + ball
         ends = points + reach[:, None] * directions
-        line, part = self._met(points, ends, *self._groups(own))
+        line, part = self._met(points, ends, self._groups(own))
         entry, exit_ = self._crossings(part, points[line], directions[line])
         far = np.where(entry > 0, entry, exit_)
         nearest = np.lexsort((far, line))
@@ -138,7 +139,7 @@ class BodyTracer:
 
     # -- rays --------------------------------------------------------------------------------------
 
-    def _groups(self, own: Indices) -> tuple[Indices, Indices, Indices, Poses]:
+    def _groups(self, own: Indices) -> _Groups:
         """Groups of lines by the part ``own (ray,)``, -1 for none, as `clear` takes them."""
         parts = len(self._semi_axes)
         centres, frames = self._posed
@@ -146,16 +147,9 @@ class BodyTracer:
         whose = np.append(np.arange(parts), -1), np.zeros(parts + 1, dtype=np.int64)
         return own % (parts + 1), *whose, Poses(centres[None], frames[None], self._semi_axes)
 
-    def _met(
-        self,
-        origins: Array,
-        targets: Array,
-        group: Indices,
-        own: Indices,
-        pose: Indices,
-        poses: Poses,
-    ) -> Indices:
+    def _met(self, origins: Array, targets: Array, groups: _Groups) -> Indices:
         """Lines and the parts that they meet (2, hit), of lines and groups as of `clear`."""
+        group, own, pose, poses = groups
         maps = np.swapaxes(poses.frames, -1, -2) / self._semi_axes[:, :, None]
         floats = (origins, targets, poses.centres, maps, self._longest)
         starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
@@ -173,11 +167,7 @@ class BodyTracer:
         return np.asarray(whose[:, self._sphere.meets(rays)])
 
     def _crossings(
-        self,
-        part: Indices,
-        origins: Array,
-        directions: Array,
-        missed: float = 0.0,
+        self, part: Indices, origins: Array, directions: Array, missed: float = 0.0
     ) -> tuple[Array, Array]:
         """Where lines (..., 3) enter and leave parts [m]; half a chord is ``missed`` where none."""
         o = self._stretched(part, origins - self._posed[0][part])

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body import Body
+from rtradar.body.body import Poses
 from rtradar.scene import Object, Scene
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.mesh_tracer import MeshTracer
@@ -34,7 +35,7 @@ class Occluders:
         self._still = MeshTracer(mi, np.concatenate(pieces)) if pieces else None
         self._moving = [(own, MeshTracer(mi, own.shape.corners)) for own in scene.objects]
         people = () if body is None else body.people
-        self._with_mesh = [person for person in people if person.mesh is not None]
+        self._meshes = [(one, one.mesh) for one in people if one.mesh is not None]
         if body is not None:
             others = [n for n, person in enumerate(people) if person.mesh is None]
             self._parts = np.flatnonzero(np.isin(body.owner, others))
@@ -71,10 +72,8 @@ class Occluders:
                 if moving is not but:
                     left = np.flatnonzero(clear)
                     rotation, place = (own[moment[left]] for own in moving.pose(moments))
-                    ways = (
-                        np.einsum("ri,rij->rj", points[left] - place, rotation)
-                        for points in (starts, ends)
-                    )
+                    ways = (points[left] - place for points in (starts, ends))
+                    ways = (np.einsum("ri,rij->rj", way, rotation) for way in ways)
                     clear[left] = ~tracer.between(*ways)
             if self._body is not None:
                 left = np.flatnonzero(clear)
@@ -89,15 +88,12 @@ class Occluders:
         moments = np.clip(moments, 0.0, self._body.duration_s)
         clear = np.ones(len(origins), dtype=bool)
         if len(self._parts):
-            poses, numbers = self._body.at(moments), np.arange(len(moments))
-            own = poses._replace(
-                centres=poses.centres[:, self._parts],
-                frames=poses.frames[:, self._parts],
-                semi_axes=poses.semi_axes[self._parts],
-            )
+            (centres, frames, semi_axes), parts = self._body.at(moments), self._parts
+            own = Poses(centres[:, parts], frames[:, parts], semi_axes[parts])
+            numbers = np.arange(len(moments))
             none = np.full_like(numbers, -1)
             clear = self._ellipsoids.clear(origins, targets, moment, none, numbers, own)
-        for number in np.unique(moment) if self._with_mesh else ():
+        for number in np.unique(moment) if self._meshes else ():
             for skin in self._skins_at(float(moments[number])):
                 left = np.flatnonzero(clear & (moment == number))
                 clear[left] = ~skin.between(origins[left], targets[left])
@@ -105,11 +101,10 @@ class Occluders:
 
     def _skins_at(self, time: float) -> list[MeshTracer]:
         if time not in self._skins:
-            while len(self._skins) >= _KEPT:
+            if len(self._skins) >= _KEPT:
                 self._skins.pop(next(iter(self._skins)))
             self._skins[time] = [
-                MeshTracer(self.mi, person.skin([time])[0][person.mesh.faces()])
-                for person in self._with_mesh
-                if person.mesh is not None
+                MeshTracer(self.mi, person.skin([time])[0][mesh.faces()])
+                for person, mesh in self._meshes
             ]
         return self._skins[time]

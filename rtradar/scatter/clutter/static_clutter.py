@@ -37,7 +37,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise, product
@@ -72,6 +72,7 @@ from rtradar.scatter.multipath.slabs import (
 )
 from rtradar.scatter.multipath.wall_edges import WallEdges
 from rtradar.scene import Scene
+from rtradar.system.checks import check_order
 from rtradar.system.seeds import stream
 from rtradar.trace.backend import Backend, select, use
 from rtradar.trace.occluders import Occluders
@@ -258,7 +259,6 @@ def _rough_face(
 # -- all clutter of a room -------------------------------------------------------------------------
 
 
-MOST_ORDER = 3
 KEPT_ROOMS = 2
 """Rooms that stay in memory once they are traced; a furnished one may take 100 MB, to which
 `rtradar.signal.clutter` adds its echoes once more, in groups."""
@@ -282,15 +282,18 @@ class ClutterItem:
     cell_m2: float
     reason: str = ""
 
+    @classmethod
+    def of(cls, echoes: RoomEchoes, radar: Radar) -> ClutterItem:
+        """Describe the echoes of an object."""
+        own = int(echoes.bounces.max()), echoes.n_echoes, echoes.power_m2()
+        return cls(echoes.name, echoes.kind, *own, echoes.strongest_cell_m2(radar))
+
 
 def _meshes(scene: Scene) -> bytes:
     """Hash the triangles of furniture, whose files may change."""
-    digest = hashlib.sha256()
-    for piece in scene.furniture:
-        triangles = piece.triangles()
-        digest.update(triangles.vertices.tobytes())
-        digest.update(triangles.faces.tobytes())
-    return digest.digest()
+    shapes = [piece.triangles() for piece in scene.furniture]
+    arrays = b"".join(one.vertices.tobytes() + one.faces.tobytes() for one in shapes)
+    return hashlib.sha256(arrays).digest()
 
 
 @lru_cache(maxsize=KEPT_ROOMS)
@@ -309,7 +312,7 @@ def _returns(
         *furniture_returns(mi, radar, scene),
         *rough_returns(radar, scene, occluders),
     )
-    return tuple((_item(echoes, radar), echoes) for echoes in found)
+    return tuple((ClutterItem.of(echoes, radar), echoes) for echoes in found)
 
 
 class Clutter:
@@ -329,20 +332,25 @@ class Clutter:
     def __init__(
         self, radar: Radar, scene: Scene, *, variant: str = "auto", order: int = 2
     ) -> None:
-        if isinstance(order, bool) or not (isinstance(order, int) and 0 <= order <= MOST_ORDER):
-            raise InputError(
-                f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
-            )
+        check_order(order)
         self.radar = radar
         # Without what does not stand still.
         still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
         found = _returns(radar, still, _meshes(scene), select(variant), order)
         _refuse_not_followed([echoes for _, echoes in found], scene)
         ranked = sorted(found, key=lambda one: -one[0].cell_m2)
-        self.objects = tuple(echoes for item, echoes in ranked if item.cell_m2 > 0)
-        self.kept = tuple(item for item, _ in ranked if item.cell_m2 > 0)
+        self.objects = tuple(echoes for _, echoes in ranked)
+        self.kept, self.dropped = tuple(item for item, _ in ranked), tuple[ClutterItem, ...]()
         far = f"farther than the {radar.max_range_m:.3g} m that the sampling reaches"
-        self.dropped = tuple(replace(item, reason=far) for item, _ in ranked if item.cell_m2 == 0)
+        self._drop(lambda item: far if item.cell_m2 == 0 else "")
+
+    def _drop(self, reason: Callable[[ClutterItem], str]) -> None:
+        """Leave out the objects for which there is a reason."""
+        reasons = [reason(item) for item in self.kept]
+        self.objects = tuple(one for one, why in zip(self.objects, reasons, strict=True) if not why)
+        dropped = [replace(item, reason=why) for item, why in zip(self.kept, reasons, strict=True)]
+        self.kept = tuple(item for item in dropped if not item.reason)
+        self.dropped = (*self.dropped, *(item for item in dropped if item.reason))
 
     @property
     def n_echoes(self) -> int:
@@ -357,19 +365,16 @@ class Clutter:
         range bin after the gain of all samples of a frame and of all channels.
         """
         gain = self.radar.samples_per_chirp * self.radar.cycles_per_frame * self.radar.n_channels
-        kept, dropped = [], []
-        for item, own in zip(self.kept, self.objects, strict=True):
+
+        def reason(item: ClutterItem) -> str:
             ratio = item.cell_m2 * gain / noise_power_m2 if noise_power_m2 > 0 else math.inf
             if ratio >= 10 ** (-margin_db / 10):
-                kept.append((item, own))
-                continue
+                return ""
             below = -10 * math.log10(ratio)
-            reason = f"{below:.0f} dB below the noise in its strongest cell, after all gain"
-            dropped.append(replace(item, reason=reason))
+            return f"{below:.0f} dB below the noise in its strongest cell, after all gain"
+
         pruned = copy.copy(self)
-        pruned.kept = tuple(item for item, _ in kept)
-        pruned.objects = tuple(own for _, own in kept)
-        pruned.dropped = (*self.dropped, *dropped)
+        pruned._drop(reason)
         return pruned
 
     def behind(self) -> tuple[float, str]:
@@ -413,9 +418,3 @@ def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:
                 f"{FREQUENCY_ERROR:g}; take a thinner wall, one of a permittivity that changes "
                 "less over the sweep, or a narrower sweep"
             )
-
-
-def _item(echoes: RoomEchoes, radar: Radar) -> ClutterItem:
-    power, cell = echoes.power_m2(), echoes.strongest_cell_m2(radar)
-    most = int(echoes.bounces.max())
-    return ClutterItem(echoes.name, echoes.kind, most, echoes.n_echoes, power, cell)
