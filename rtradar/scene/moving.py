@@ -54,13 +54,7 @@ class RigidMotion:
         shift : (time, 3) float64
             Vector from the position of the object to its pivot, world axes [m].
         """
-        return self._rotations(times), self._shifts(times)
-
-    def _rotations(self, times: Array) -> Array:
-        return np.tile(np.eye(3), (len(times), 1, 1))
-
-    def _shifts(self, times: Array) -> Array:
-        return np.zeros((len(times), 3))
+        return np.tile(np.eye(3), (len(times), 1, 1)), np.zeros((len(times), 3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,12 +74,13 @@ class _AboutAxis(RigidMotion, ABC):
     def _angle_rad(self, times: Array) -> Array:
         """Angles at some times (time,), of any number of turns."""
 
-    def _rotations(self, times: Array) -> Array:
+    def pose(self, times: Array) -> tuple[Array, Array]:
+        """Compute rotation about the pivot and shift of it, as `RigidMotion.pose`."""
         from scipy.spatial.transform import Rotation  # slow to import
 
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         turns: Any = Rotation.from_rotvec(self._angle_rad(times)[:, None] * axis)
-        return np.asarray(turns.as_matrix(), dtype=np.float64)
+        return np.asarray(turns.as_matrix(), dtype=np.float64), super().pose(times)[1]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,14 +186,16 @@ class FollowingPath(RigidMotion):
                 "points_m"
             )
 
-    def _shifts(self, times: Array) -> Array:
+    def pose(self, times: Array) -> tuple[Array, Array]:
+        """Compute rotation about the pivot and shift of it, as `RigidMotion.pose`."""
+        still, _ = super().pose(times)
         if self.velocity_mps is not None:
-            return times[:, None] * np.array(self.velocity_mps)
+            return still, times[:, None] * np.array(self.velocity_mps)
         from scipy.interpolate import PchipInterpolator  # slow to import
 
         ends = self.times_s or ()
         course = PchipInterpolator(np.array(ends), np.array(self.points_m))
-        return np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
+        return still, np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
 
 
 _KINDS: Mapping[str, tuple[type[RigidMotion], tuple[str, ...]]] = {
@@ -216,12 +213,11 @@ def kind_of(motion: RigidMotion) -> str | None:
 
 def motion_of(table: object) -> RigidMotion:
     """Make a motion of the ``motion`` table of a scene file."""
-    kind = table.get("kind") if isinstance(table, dict) else None
-    if not isinstance(table, dict) or not isinstance(kind, str) or kind not in _KINDS:
+    if not isinstance(table, dict) or table.get("kind") not in tuple(_KINDS):
         raise InputError(
             f"motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
         )
-    motion, needed = _KINDS[kind]
+    motion, needed = _KINDS[table["kind"]]
     check_keys("motion: ", table, ("kind", *needed), keys_of(motion)[1])
     return motion(**{key: value for key, value in table.items() if key != "kind"})
 

@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
 Polarization = Literal["te", "tm"]
 
 
-def reflection(
-    eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
-) -> NDArray[np.complex128]:
+def reflection(eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization) -> Field:
     """Compute the Fresnel reflection of a plane wave in air by a half-space (:eq:`half-space`).
 
     Parameters
@@ -54,7 +54,7 @@ def slab(
     frequency_hz: ArrayLike,
     cos_incidence: ArrayLike,
     polarization: Polarization,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+) -> tuple[Field, Field]:
     """Compute the reflection and transmission of a plane wave by a slab in air.
 
     All reflections inside the slab are summed (:eq:`slab`).
@@ -90,7 +90,8 @@ def slab(
     for key, values in (("thickness_m", thickness_m), ("frequency_hz", frequency_hz)):
         if not np.all((np.asarray(values) > 0) & np.isfinite(values)):
             raise InputError(f"slab: {key} must be positive and finite")
-    face, through = _waves(eta, cosine, thickness_m, frequency_hz, polarization)
+    face, inner = _face(eta, cosine, polarization)
+    through = _through(inner, thickness_m, frequency_hz)
     loop = 1 - (face * through) ** 2
     # At exactly grazing incidence a lossless slab of whole half waves has 0 / 0: it is transparent,
     # as at other angles.
@@ -111,7 +112,7 @@ def slab_passes(
     passes: int,
     *,
     rest: bool = False,
-) -> NDArray[np.complex128]:
+) -> Field:
     """Compute the field that leaves a slab after some passes, a term of the series of `slab`.
 
     It is the field over the incident one, between points opposite each other on the faces: ``r``,
@@ -120,7 +121,8 @@ def slab_passes(
     four more, and so on, are added. The other arguments are those of `slab`.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    face, through = _waves(eta, cosine, thickness_m, frequency_hz, polarization)
+    face, inner = _face(eta, cosine, polarization)
+    through = _through(inner, thickness_m, frequency_hz)
     # The reflection at the face itself is followed by the series that begins with two passes.
     number = passes or 2
     term = (1 - face**2) * (-face) ** (number - 1) * through**number
@@ -135,7 +137,7 @@ def slab_passes(
 
 def _checked(
     eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
-) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[Field, Array, NDArray[np.bool_]]:
     if polarization not in ("te", "tm"):
         raise InputError(f"polarization = {polarization!r}; allowed: te, tm")
     cosine = np.asarray(cos_incidence, dtype=np.float64)
@@ -154,9 +156,7 @@ def _checked(
     return values, np.minimum(cosine, 1.0), conducts
 
 
-def _face(
-    eta: NDArray[np.complex128], cosine: NDArray[np.float64], polarization: Polarization
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _face(eta: Field, cosine: Array, polarization: Polarization) -> tuple[Field, Field]:
     """Reflection at a face, and the normal wave number behind it relative to that of free space.
 
     The latter is sqrt(eta - sin^2), the decaying root; ``cosine`` is that outside.
@@ -169,17 +169,10 @@ def _face(
     return np.where(total == 0, 0.0, (outer - inner) / np.where(total == 0, 1.0, total)), inner
 
 
-def _waves(
-    eta: NDArray[np.complex128],
-    cosine: NDArray[np.float64],
-    thickness_m: ArrayLike,
-    frequency_hz: ArrayLike,
-    polarization: Polarization,
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Reflection at the front face, and the factor of one pass through the slab."""
-    face, inner = _face(eta, cosine, polarization)
+def _through(inner: Field, thickness_m: ArrayLike, frequency_hz: ArrayLike) -> Field:
+    """Compute the factor of one pass through the slab."""
     k = 2 * pi * np.asarray(frequency_hz, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    return face, np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner)
+    return np.asarray(np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner))
 
 
 def _perfect(polarization: Polarization) -> float:

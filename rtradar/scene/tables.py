@@ -241,13 +241,10 @@ def _motion(entry: Table, folder: Path) -> Motion:
             return synthetic_motion(activity, **given)
         except TypeError:  # a trait that is none, or of another kind
             raise InputError(f"traits = {brief(traits)}: no such traits of {name}") from None
-    paths = {
-        key: folder / read_value(str, "people: ", key, entry[key])
-        for key in ("motion", "skeleton")
-        if key in entry
-    }
-    said = said_of("people", entry)
-    recording = load_motion(paths["motion"], skeleton=paths.get("skeleton"), **said)
+    given = said_of("people", entry)
+    if "skeleton" in entry:
+        given["skeleton"] = folder / read_value(str, "people: ", "skeleton", entry["skeleton"])
+    recording = load_motion(folder / name, **given)
     if "duration_s" not in entry:
         return recording
     start_s = read_value(float, "person: ", "start_s", entry.get("start_s", 0.0))
