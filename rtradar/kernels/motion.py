@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 
 from rtradar.kernels.elementary import cross, scaled
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.jit import compiled, inlined
+
+
+@inlined(fastmath={"contract"})
+def _fill_cubics(t, powers, interval, out):
+    a, b, c, d = powers[0, interval], powers[1, interval], powers[2, interval], powers[3, interval]
+    for i in range(len(out)):
+        out[i] = d[i] + t * (c[i] + t * (b[i] + t * a[i]))
 
 
 @compiled(fastmath={"contract"})
@@ -23,23 +30,13 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
         t = times[which[k]] - knots[interval]
         own, place = quaternions[which[k]], positions[which[k]]
         # Evaluate the cubics of all quaternions, and of the root's position.
-        c3, c2, c1, c0 = (
-            rotation[0, interval],
-            rotation[1, interval],
-            rotation[2, interval],
-            rotation[3, interval],
-        )
-        for i in range(len(own)):
-            own[i] = c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i]))
-        r3, r2, r1, r0 = root[0, interval], root[1, interval], root[2, interval], root[3, interval]
-        for axis in range(3):
-            place[0, axis] = r0[axis] + t * (r1[axis] + t * (r2[axis] + t * r3[axis]))
+        _fill_cubics(t, rotation, interval, own)
+        _fill_cubics(t, root, interval, place[0])
         for joint in range(len(parents)):
             # Normalise the quaternion.
             four = own[4 * joint : 4 * joint + 4]
-            scale = 1 / math.sqrt(
-                four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]
-            )
+            square = four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]
+            scale = 1 / math.sqrt(square)
             for i in range(4):
                 four[i] *= scale
             if joint > 0:

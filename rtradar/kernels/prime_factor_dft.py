@@ -225,27 +225,22 @@ def _add_unfolded_squares(cosine, sine, low, high):
 
 
 @inlined()
-def _fold_line(grid, even, odd, alone, line):
-    """Fold the terms of one line (first place, step, factor, place of its half) in pairs."""
-    first, step, factor, at_half = line
-    own, middle = _row(grid, first), _row(grid, at_half)
-    _unfold(own, middle, _row(alone, 0), _row(alone, 1))
-    for k in range((factor - 1) // 2):
-        low, high = first + (k + 1) * step, first + (factor - k - 1) * step
-        _fold(_row(grid, low), _row(grid, high), _row(even, k), _row(odd, k))
-
-
-@inlined()
 def _transform_line(cosines, sines, rows, line, to_power):
-    """Sum the folded terms of one line to its frequencies, in the grid or as added power.
+    """Sum the terms of one line (first place, step, factor, place of its half) to its frequencies.
 
-    Of ``rows`` the ``grid`` has one for each cycle and one of zeros, ``sums`` the power of each
-    bin, ``even`` and ``odd`` the folded terms of a line, ``alone`` the sum and the difference of
-    the two terms that have no partner, ``total`` one frequency, and the ``parts`` three.
+    They are put in its places, or their power is added. Of ``rows`` the ``grid`` has one for each
+    cycle and one of zeros, ``sums`` the power of each bin, ``even`` and ``odd`` the folded terms of
+    a line, ``alone`` the sum and the difference of the two terms that have no partner, ``total``
+    one frequency, and the ``parts`` three.
     """
     grid, sums, even, odd, alone, total, cosine_parts, sine_parts = rows
     first, step, factor, at_half = line
     pairs, one = (factor - 1) // 2, np.float32(1)
+    # Fold the terms in pairs.
+    _unfold(_row(grid, first), _row(grid, at_half), _row(alone, 0), _row(alone, 1))
+    for k in range(pairs):
+        low, high = first + (k + 1) * step, first + (factor - k - 1) * step
+        _fold(_row(grid, low), _row(grid, high), _row(even, k), _row(odd, k))
     # Frequencies without a partner: 0, and half of an even factor.
     for half in range(2 - factor % 2):
         place, sign = (at_half, -one) if half else (first, one)
@@ -329,7 +324,6 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
                     # A term at half of an even factor has no partner; else the row of zeros is it.
                     at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
                     line = first, step, factor, at_half
-                    _fold_line(grid, even, odd, alone, line)
                     _transform_line(cosines, sines, rows, line, to_power and last)
         if not to_power:
             _pick(grid, cells, begin, end, channel_begin, channel_end, values)
