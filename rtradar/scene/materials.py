@@ -165,9 +165,8 @@ class Material:
             At frequencies for which the source gives nothing.
         """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
-        held = self.holds(frequency)
-        if not held.all():
-            self._refuse(float(frequency[~held].flat[0]))
+        for outside in frequency[~self.holds(frequency)]:
+            self._refuse(float(outside))
         eta = np.empty(frequency.shape, dtype=np.complex128)
         for band in reversed(self.bands):
             inside = _inside(band, frequency)

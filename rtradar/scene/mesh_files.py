@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief
@@ -211,7 +211,7 @@ def _in_ascii(content: bytes, ending: str) -> bytes:
     return content[:text].translate(_TO_ASCII) + content[text:] if text > 0 else content
 
 
-def _load(where: str, ending: str, content: bytes) -> tuple[ArrayLike, ArrayLike]:
+def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[Any], NDArray[Any]]:
     """Read one mesh of all that is in a file: vertices and faces."""
     import trimesh  # slow to import
 
@@ -244,7 +244,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[ArrayLike, ArrayLike
     return mesh.vertices, mesh.faces
 
 
-def checked_triangles(where: str, vertices: ArrayLike, faces: ArrayLike) -> Triangles:
+def checked_triangles(where: str, vertices: NDArray[Any], faces: NDArray[Any]) -> Triangles:
     """Check a mesh, merge equal vertices, remove empty triangles and wind closed parts outward.
 
     Vertices may be in any unit; ``where`` begins the messages of each `InputError`.

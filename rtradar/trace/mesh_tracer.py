@@ -6,6 +6,7 @@ around it: Mitsuba works in float32.
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -34,8 +35,7 @@ class MeshTracer:
     flat = True
 
     def __init__(self, mi: Any, corners: Array, *, same: float = 1e-6) -> None:
-        self._same = same
-        self._mi = mi
+        self._mi, self._same, self._bouncing = mi, same, range(len(corners))
         self._centre, self._ball = ball_around(corners.reshape(-1, 3))
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # A face without area has no normal and is never met: any unit vector serves.
@@ -70,7 +70,15 @@ class MeshTracer:
         self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], Array]:
         """As `Surfaces.meets`; the distance is of float32 quality."""
-        return self._first_hits(points + _LIFT * self._ball * normals, directions)
+        face, distance = self._first_hits(points + _LIFT * self._ball * normals, directions)
+        own = (face >= self._bouncing.start) & (face < self._bouncing.stop)
+        return np.where(own, face, -1), np.where(own, distance, np.inf)
+
+    def of_piece(self, first: int, last: int) -> MeshTracer:
+        """Return the mesh, of which rays bounce on these faces only: others absorb them."""
+        piece = copy.copy(self)
+        piece._bouncing = range(first, last)
+        return piece
 
     def way_out(
         self, points: Array, normals: Array, antenna: Array, own: NDArray[np.int64]

@@ -342,7 +342,7 @@ class _Legs(NamedTuple):
 
     def some(self, which: Indices | Bools) -> _Legs:
         """Return some of them."""
-        return _Legs(*(array[which] for array in self))
+        return _Legs._make(array[which] for array in self)
 
 
 def _mirror_legs(mirrors: list[RoomEchoes], radar: Radar) -> _Legs:
@@ -361,4 +361,4 @@ def _mirror_legs(mirrors: list[RoomEchoes], radar: Radar) -> _Legs:
         # In the crease of a corner a path goes from wall to wall at one place.
         legs = _Legs(np.array(stops[:-1]), np.array(stops[1:]), *each)
         found.append(legs.some(size > _SHORTEST_M))
-    return _Legs(*(np.concatenate(arrays) for arrays in zip(*found, strict=True)))
+    return _Legs._make(np.concatenate(arrays) for arrays in zip(*found, strict=True))

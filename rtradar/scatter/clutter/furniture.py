@@ -57,24 +57,6 @@ Seen from the ends of the array, the group stays within its half bin.
 """
 
 
-class _Piece:
-    """Surfaces of all furniture, of which rays bounce on one piece only: others absorb them."""
-
-    flat = True
-
-    def __init__(self, surfaces: MeshTracer, first: int, last: int) -> None:
-        self._all, self._first, self._last = surfaces, first, last
-        self.sees, self.distance, self.normal = surfaces.sees, surfaces.distance, surfaces.normal
-
-    def meets(
-        self, points: Array, normals: Array, directions: Array, own: Indices
-    ) -> tuple[Indices, Array]:
-        """Find what rays meet, as `Surfaces.meets`."""
-        face, distance = self._all.meets(points, normals, directions, own)
-        other = (face < self._first) | (face >= self._last)
-        return np.where(other, -1, face), np.where(other, np.inf, distance)
-
-
 def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoes]:
     """Yield the returns of every piece of furniture that some channel sees.
 
@@ -92,7 +74,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     for piece, triangles in bar:
         last = first + len(triangles.faces)
         grid = small_facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
-        own = _Piece(surfaces, first, last)
+        own = surfaces.of_piece(first, last)
         returns = _returns(piece, triangles.closed, own, grid, radar, scene)
         if returns is not None:
             yield returns
