@@ -35,7 +35,7 @@ from rtradar.scatter.common.poses import (
 from rtradar.scatter.specular_points import sees, solve_specular_points
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.system.threads import in_threads
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -46,7 +46,7 @@ from rtradar.kernels.scatter.triangles import Tubes, radiate_tubes
 from rtradar.scatter.common.polarization import Polarization, sent_field
 from rtradar.scatter.target import Grid
 from rtradar.system.threads import in_threads
-from rtradar.trace.rays import Surfaces
+from rtradar.trace.tracers import Surfaces
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from rtradar.scatter.ray_tubes import Footprints, Shooter, exits, radiate
 from rtradar.scatter.rigid_echoes import PolynomialsInTime, RigidEchoes, far_apart
 from rtradar.scatter.target import MeshGrid
 from rtradar.scene import Object
-from rtradar.trace.mesh_tracer import MeshTracer
 from rtradar.trace.occluders import Occluders
+from rtradar.trace.tracers import MeshTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -40,7 +40,7 @@ from rtradar.scatter.common.poses import (
     keyframe_time,
 )
 from rtradar.system.threads import in_threads
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

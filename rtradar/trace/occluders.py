@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.scene import Object, Scene
-from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import BodyTracer, MeshTracer
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from rtradar.scatter.common.polarization import Polarization
 from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart, solve_doubles
 from rtradar.settings import RunSettings
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 V = Polarization("v")
 K = 2 * np.pi * 12e9 / SPEED_OF_LIGHT_MPS

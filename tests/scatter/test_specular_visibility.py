@@ -15,7 +15,7 @@ from rtradar.scatter.specular_points import (
     unobstructed,
 )
 from rtradar.trace.backend import Backend, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 

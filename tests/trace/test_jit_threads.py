@@ -15,7 +15,7 @@ from rtradar.body import Body
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, thread_map
 from rtradar.trace.backend import Backend, use
-from rtradar.trace.body_tracer import UnitSphere
+from rtradar.trace.tracers import UnitSphere
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
 
@@ -82,7 +82,7 @@ def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
     program = f"""
 import numpy as np
 from rtradar.trace.backend import select, use
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import MeshTracer
 from rtradar.trace.backend import MANY_RAYS
 mi = use(select("{backend.kind}"))
 import drjit as dr

@@ -13,8 +13,8 @@ import rtradar as rt
 from rtradar.body import Bodies, Body, HumanMesh
 from rtradar.scene import Furniture, Object, Scene, Turning, material
 from rtradar.trace.backend import Backend, select, use
-from rtradar.trace.mesh_tracer import CLEAR_M
 from rtradar.trace.occluders import Occluders
+from rtradar.trace.tracers import CLEAR_M
 
 Array = NDArray[np.float64]
 CORNER, SIZE = np.array([0.5, -0.4, 0.2]), np.array([0.6, 0.9, 0.7])

@@ -14,8 +14,7 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.scatter import build_model
 from rtradar.trace.backend import Backend, use
-from rtradar.trace.body_tracer import BodyTracer, UnitSphere
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import BodyTracer, MeshTracer, UnitSphere
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ import rtradar as rt
 from rtradar.body import unit_sphere
 from rtradar.body.body import Poses
 from rtradar.trace.backend import available, select, use
-from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.rays import rays_of
+from rtradar.trace.tracers import BodyTracer
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]

@@ -30,8 +30,7 @@ from rtradar.body.body import ellipsoid_meshes, unit_sphere
 from rtradar.kernels.jit import compiled
 from rtradar.system.threads import in_threads
 from rtradar.trace.backend import available, select, use
-from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import BodyTracer, MeshTracer
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]

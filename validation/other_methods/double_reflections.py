@@ -51,7 +51,7 @@ from rtradar.scatter.double_reflections import DoubleReflections, pairs_apart
 from rtradar.scatter.models.rays import Rays
 from rtradar.settings import RunSettings
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 

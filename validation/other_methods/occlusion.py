@@ -39,7 +39,7 @@ from rtradar.scatter.common.poses import keyframe_step
 from rtradar.scatter.specular_points import SpecularVisibility
 from rtradar.system.threads import in_threads
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 

@@ -31,8 +31,7 @@ from rtradar.scatter.common.polarization import POLARIZATIONS, Polarization, app
 from rtradar.scatter.ray_tubes import Footprints, Shooter, exits, radiate
 from rtradar.scatter.target import MeshGrid
 from rtradar.scene import Furniture, Material, Scene, reflection
-from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.rays import Surfaces
+from rtradar.trace.tracers import MeshTracer, Surfaces
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -27,7 +27,7 @@ from rtradar.scatter.facets.radiation import (
 )
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.trace.backend import Backend, select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -45,7 +45,7 @@ from rtradar.scatter.facets.radiation import (
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scatter.target import in_four
 from rtradar.trace.backend import select, use
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import MeshTracer
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -41,7 +41,7 @@ from rtradar.scatter.facets.radiation import (
 from rtradar.scatter.target import in_four, target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backend import select, use
-from rtradar.trace.mesh_tracer import MeshTracer
+from rtradar.trace.tracers import MeshTracer
 
 if TYPE_CHECKING:
     import trimesh

@@ -35,7 +35,7 @@ from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.system.threads import thread_map
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 if TYPE_CHECKING:
     import trimesh

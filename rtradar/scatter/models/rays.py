@@ -34,9 +34,7 @@ from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.scatter.target import EllipsoidGrid, Grid, MeshGrid, target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.mesh_tracer import MeshTracer
-from rtradar.trace.rays import Surfaces
+from rtradar.trace.tracers import BodyTracer, MeshTracer, Surfaces
 
 if TYPE_CHECKING:
     import trimesh

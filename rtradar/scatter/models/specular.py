@@ -29,7 +29,7 @@ from rtradar.scatter.specular_points import (
 )
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Visibility = Literal["sharp", "gradual"]
 

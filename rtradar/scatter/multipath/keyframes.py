@@ -38,7 +38,7 @@ from rtradar.scatter.multipath.slabs import WallResponse
 from rtradar.scatter.multipath.solid_edges import SolidEdges
 from rtradar.scatter.specular_points import solve_specular_points
 from rtradar.system.threads import thread_map
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]

@@ -50,8 +50,8 @@ from rtradar.scene import Scene
 from rtradar.system.checks import check_order
 from rtradar.system.threads import in_threads
 from rtradar.trace.backend import select, use
-from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.occluders import Occluders
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -21,7 +21,7 @@ from rtradar.scatter.facets.radiation import (
 )
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backend import use
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
