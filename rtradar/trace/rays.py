@@ -33,71 +33,75 @@ def rays_traced() -> int:
     return _counted
 
 
-def any_met(mi: Any, scene: Any, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Whether rays (7, ray) meet anything: start, unit direction, and length."""
-    count = _count(rays.shape[1])
-    if count == 0:
-        return np.zeros(0, dtype=np.bool_)
-    if mi.variant().startswith("scalar"):
-        found = []
-        for x, y, z, *direction, length in rays.T.tolist():
-            ray = mi.Ray3f(mi.Point3f(x, y, z), mi.Vector3f(*direction))
-            ray.maxt = length
-            found.append(bool(scene.ray_test(ray)))
-        return np.array(found)
-    padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
-    padded[:, :count] = rays
-    padded[3, count:] = 1  # from the middle, no way at all
-    with _ONE_AT_A_TIME:
-        met = scene.ray_test(rays_of(mi, padded), coherent=True)
-        return np.asarray(met.numpy())[:count]
+class Shapes:
+    """Shapes in a scene of Mitsuba, ``mi``, which has its variant set and takes them by name."""
 
+    def __init__(self, mi: Any, **shapes: Any) -> None:
+        self._mi, self._scene = mi, mi.load_dict({"type": "scene", **shapes})
 
-def first_met(
-    mi: Any, scene: Any, starts: NDArray[np.float64], directions: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Number of the triangle that rays (ray, 3) meet first, and how far it is.
+    @classmethod
+    def of_triangles(cls, mi: Any, corners: Array) -> Shapes:
+        """Make a scene of triangles (face, 3, 3), of which only the hits of rays are used.
 
-    It is -1 and infinite where nothing is met.
-    """
-    count = _count(len(starts))
-    if count == 0:
-        return np.empty(0, dtype=np.int64), np.empty(0)
-    if mi.variant().startswith("scalar"):
-        number, distance = np.full(count, -1, dtype=np.int64), np.full(count, np.inf)
-        for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
-            found = scene.ray_intersect_preliminary(
-                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
-            )
-            if found.is_valid():
-                number[ray], distance[ray] = int(found.prim_index), found.t
-        return number, distance
-    import drjit as dr
+        They should lie near the origin, because they are rounded to float32.
+        """
+        mesh = mi.Mesh(
+            *("triangles", corners.size // 3, len(corners)),
+            has_vertex_normals=False,
+            has_vertex_texcoords=False,
+        )
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = np.ravel(corners).astype(np.float32)
+        parameters["faces"] = np.arange(corners.size // 3, dtype=np.uint32)
+        parameters.update()
+        return cls(mi, triangles=mesh)
 
-    grow_for(mi, count)
-    rays = rays_of(mi, np.concatenate([starts.T, directions.T]))
-    found = scene.ray_intersect_preliminary(rays, coherent=False)
-    dr.eval(found.t, found.prim_index)
-    distance = found.t.numpy().astype(np.float64)
-    number = found.prim_index.numpy().astype(np.int64)
-    return np.where(np.isfinite(distance), number, -1), distance
+    def any_met(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Whether rays (7, ray) meet anything: start, unit direction, and length."""
+        mi, scene = self._mi, self._scene
+        count = _count(rays.shape[1])
+        if count == 0:
+            return np.zeros(0, dtype=np.bool_)
+        if mi.variant().startswith("scalar"):
+            found = []
+            for x, y, z, *direction, length in rays.T.tolist():
+                ray = mi.Ray3f(mi.Point3f(x, y, z), mi.Vector3f(*direction))
+                ray.maxt = length
+                found.append(bool(scene.ray_test(ray)))
+            return np.array(found)
+        padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
+        padded[:, :count] = rays
+        padded[3, count:] = 1  # from the middle, no way at all
+        with _ONE_AT_A_TIME:
+            met = scene.ray_test(rays_of(mi, padded), coherent=True)
+            return np.asarray(met.numpy())[:count]
 
+    def first_met(self, starts: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Number of the triangle that rays (ray, 3) meet first, and how far it is.
 
-def triangle_scene(mi: Any, corners: NDArray[np.float64]) -> Any:
-    """Make a scene of Mitsuba of triangles (face, 3, 3), of which only the hits of rays are used.
+        It is -1 and infinite where nothing is met.
+        """
+        mi, scene, count = self._mi, self._scene, _count(len(starts))
+        if count == 0:
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        if mi.variant().startswith("scalar"):
+            number, distance = np.full(count, -1, dtype=np.int64), np.full(count, np.inf)
+            for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
+                found = scene.ray_intersect_preliminary(
+                    mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
+                )
+                if found.is_valid():
+                    number[ray], distance[ray] = int(found.prim_index), found.t
+            return number, distance
+        import drjit as dr
 
-    They should lie near the origin, because they are rounded to float32.
-    """
-    mesh = mi.Mesh(
-        *("triangles", corners.size // 3, len(corners)),
-        has_vertex_normals=False,
-        has_vertex_texcoords=False,
-    )
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ravel(corners).astype(np.float32)
-    parameters["faces"] = np.arange(corners.size // 3, dtype=np.uint32)
-    parameters.update()
-    return mi.load_dict({"type": "scene", "triangles": mesh})
+        grow_for(mi, count)
+        rays = rays_of(mi, np.concatenate([starts.T, directions.T]))
+        found = scene.ray_intersect_preliminary(rays, coherent=False)
+        dr.eval(found.t, found.prim_index)
+        distance = found.t.numpy().astype(np.float64)
+        number = found.prim_index.numpy().astype(np.int64)
+        return np.where(np.isfinite(distance), number, -1), distance
 
 
 def ball_around(places: Array, radii: Array | float = 0.0) -> tuple[Array, float]:

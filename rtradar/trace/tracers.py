@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.rays import facet_rays, first_occluders, near_rays
 from rtradar.system.threads import thread_map
-from rtradar.trace.rays import any_met, ball_around, ball_chord, first_met, triangle_scene
+from rtradar.trace.rays import Shapes, ball_around, ball_chord
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -41,18 +41,6 @@ _LIFT = 1e-5
 """Fraction of a mesh's radius by which rays are lifted off it: a hundred steps of float32."""
 
 
-class UnitSphere:
-    """The unit sphere in a scene of its own of Mitsuba, ``mi``, which has its variant set."""
-
-    def __init__(self, mi: Any) -> None:
-        self._mi = mi
-        self._scene = mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
-
-    def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Which rays (7, ray) meet it: start, unit direction and length in its axes."""
-        return any_met(self._mi, self._scene, rays)
-
-
 class BodyTracer:
     """A body of ellipsoids with ``semi_axes (part, 3)`` [m], posed again and again.
 
@@ -64,7 +52,7 @@ class BodyTracer:
     def __init__(self, mi: Any, semi_axes: Array) -> None:
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         self._longest = self._semi_axes.max(axis=1)
-        self._sphere = UnitSphere(mi)
+        self._sphere = Shapes(mi, sphere={"type": "sphere"})
         self._posed: tuple[Array, Array]
 
     def pose(self, centres: Array, frames: Array) -> None:
@@ -182,7 +170,7 @@ class BodyTracer:
         if not found:
             return np.empty((2, 0), dtype=np.int64)
         rays, whose = (np.concatenate(arrays, axis=-1) for arrays in zip(*found, strict=True))
-        return np.asarray(whose[:, self._sphere.meets(rays)])
+        return np.asarray(whose[:, self._sphere.any_met(rays)])
 
     def _crossings(
         self, part: Indices, origins: Array, directions: Array, missed: float = 0.0
@@ -215,14 +203,14 @@ class MeshTracer:
     flat = True
 
     def __init__(self, mi: Any, corners: Array, *, same: float = 1e-6) -> None:
-        self._mi, self._same, self._bouncing = mi, same, range(len(corners))
+        self._same, self._bouncing = same, range(len(corners))
         self._centre, self._ball = ball_around(corners.reshape(-1, 3))
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # A face without area has no normal and is never met: any unit vector serves.
         size = np.linalg.norm(across, axis=1, keepdims=True)
         self._normals = np.where(size > 0, across / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
         self._places = corners[:, 0]
-        self._scene = triangle_scene(mi, corners - self._centre)
+        self._scene = Shapes.of_triangles(mi, corners - self._centre)
 
     def between(self, origins: Array, targets: Array) -> NDArray[np.bool_]:
         """Whether any face is between two points (ray, 3), both drawn in by `CLEAR_M`."""
@@ -237,7 +225,7 @@ class MeshTracer:
         met = np.zeros(len(starts), dtype=bool)
         entry = starts[asked] + first[asked, None] * ways[asked]
         rays = np.concatenate([entry.T, ways[asked].T, (last - first)[None, asked]])
-        met[asked] = any_met(self._mi, self._scene, rays.astype(np.float32))
+        met[asked] = self._scene.any_met(rays.astype(np.float32))
         return met
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -251,8 +239,8 @@ class MeshTracer:
     ) -> tuple[NDArray[np.int64], Array]:
         """As `BodyTracer.meets`; the distance is of float32 quality."""
         face, distance = self._first_hits(points + _LIFT * self._ball * normals, directions)
-        own = (face >= self._bouncing.start) & (face < self._bouncing.stop)
-        return np.where(own, face, -1), np.where(own, distance, np.inf)
+        bounces = (face >= self._bouncing.start) & (face < self._bouncing.stop)
+        return np.where(bounces, face, -1), np.where(bounces, distance, np.inf)
 
     def of_piece(self, first: int, last: int) -> MeshTracer:
         """Return the mesh, of which rays bounce on these faces only: others absorb them."""
@@ -295,7 +283,7 @@ class MeshTracer:
         # Rays start where they enter the ball.
         ahead = np.maximum(along - np.sqrt(np.maximum(square, 0.0)), 0.0)
         starts += ahead[:, None] * directions
-        face, distance = first_met(self._mi, self._scene, starts, directions)
+        face, distance = self._scene.first_met(starts, directions)
         return face, distance + ahead
 
 

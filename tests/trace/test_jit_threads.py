@@ -15,7 +15,7 @@ from rtradar.body import Body
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, thread_map
 from rtradar.trace.backend import Backend, use
-from rtradar.trace.tracers import UnitSphere
+from rtradar.trace.rays import Shapes
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
 
@@ -34,13 +34,13 @@ def test_any_number_of_rays_from_anywhere_in_memory_is_one_kernel_in_all_threads
         pytest.skip("the scalar backend has no kernels")
     import drjit as dr
 
-    sphere, kernels = UnitSphere(use(backend)), []
+    sphere, kernels = Shapes(use(backend), sphere={"type": "sphere"}), []
 
     def trace() -> None:
         for count, first in ((2, 0), (4095, 3), (4096, 0), (4097, 3), (9999, 0)):
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
                 dr.kernel_history_clear()
-                met = sphere.meets(rays(count + first)[:, first:])
+                met = sphere.any_met(rays(count + first)[:, first:])
                 np.testing.assert_array_equal(met, np.arange(first, count + first) % 2 == 0)
                 kernels.extend(
                     entry["hash"]
@@ -58,9 +58,9 @@ def test_any_number_of_rays_from_anywhere_in_memory_is_one_kernel_in_all_threads
 
 @pytest.mark.usefixtures("four_threads")
 def test_many_threads_trace_at_once(backend: Backend) -> None:
-    sphere = UnitSphere(use(backend))
+    sphere = Shapes(use(backend), sphere={"type": "sphere"})
     count = 40 if backend.kind == "scalar" else 4000
-    found = thread_map(lambda item: int(sphere.meets(rays(count + item)).sum()), range(32))
+    found = thread_map(lambda item: int(sphere.any_met(rays(count + item)).sum()), range(32))
     assert found == [(count + item + 1) // 2 for item in range(32)]
 
 

@@ -14,7 +14,8 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.scatter import build_model
 from rtradar.trace.backend import Backend, use
-from rtradar.trace.tracers import BodyTracer, MeshTracer, UnitSphere
+from rtradar.trace.rays import Shapes
+from rtradar.trace.tracers import BodyTracer, MeshTracer
 
 Array = NDArray[np.float64]
 
@@ -111,10 +112,10 @@ def test_the_tracer_decides(
     before = power()
     assert (before > 0).sum() > 15
 
-    def every_ray_hits(_: UnitSphere, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def every_ray_hits(_: Shapes, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         return np.ones(rays.shape[1], dtype=bool)
 
-    monkeypatch.setattr(UnitSphere, "meets", every_ray_hits)
+    monkeypatch.setattr(Shapes, "any_met", every_ray_hits)
     if without:
         assert (power() != before).sum() > 15
     else:
