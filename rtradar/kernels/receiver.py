@@ -162,11 +162,9 @@ def _settle(corner, n_samples, weight):
 @compiled(fastmath={"contract"})
 def mirror(own, image, out):
     """Make own z + image conj(z) of each z of ``out (row, rx, sample)``."""
-    for row in range(len(out)):
-        for receiver in range(out.shape[1]):
-            samples = out[row, receiver]
-            for i in range(len(samples)):
-                samples[i] = own * samples[i] + image * samples[i].conjugate()
+    samples = out.reshape(-1)
+    for i in range(len(samples)):
+        samples[i] = own * samples[i] + image * samples[i].conjugate()
 
 
 def convert(dc, step, limit, out):

@@ -133,8 +133,7 @@ class Wall(Surface):
     def _check_openings(self, where: str) -> None:
         """Refuse openings that do not lie in the wall, or lie in each other."""
         width, height = self.size_m
-        found: list[Opening] = []
-        for u, v, wide, high in self.openings:
+        for number, (u, v, wide, high) in enumerate(self.openings):
             inside = min(u, v) >= 0 and u + wide <= width + 1e-9 and v + high <= height + 1e-9
             if not inside or min(wide, high) < _SHORTEST_M:
                 raise InputError(
@@ -142,13 +141,12 @@ class Wall(Surface):
                     f"metres; it must lie in the wall of {width:g} by {height:g} m, and measure "
                     f"{_SHORTEST_M} m or more"
                 )
-            for a, b, c, d in found:
+            for a, b, c, d in self.openings[:number]:
                 if u < a + c and a < u + wide and v < b + d and b < v + high:
                     raise InputError(
                         f"{where}: openings {brief([a, b, c, d])} and "
                         f"{brief([u, v, wide, high])} overlap; make them one, or two apart"
                     )
-            found.append((u, v, wide, high))
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:

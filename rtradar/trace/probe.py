@@ -7,6 +7,7 @@ process, and the answer is kept on disk.
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -15,7 +16,6 @@ import re
 import signal
 import subprocess
 import sys
-import zlib
 from collections import ChainMap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -144,13 +144,17 @@ def probe_backend(variant: str, library: Library | None, *, fresh: bool = False)
     library, Dr.Jit, Mitsuba and the probe are the same. Answers on GPUs, which come and go without
     a trace in a file, and probes that took too long are not kept.
     """
-    key = None if variant.startswith("cuda") else _key(variant, library)
-    kept = {} if key is None else _read_cache()
-    if key in kept and not fresh:
-        return ProbeResult(**kept[key])
+    kept = None if variant.startswith("cuda") else _kept_in(variant, library)
+    if kept is not None and not fresh:
+        with contextlib.suppress(OSError, ValueError, TypeError):  # none, or a damaged one
+            return ProbeResult(**json.loads(kept.read_bytes()))
     result, ended = _probe(variant, library)
-    if key is not None and ended not in _STOPPED:
-        _write_cache({**_read_cache(), key: result._asdict()})
+    if kept is not None and ended not in _STOPPED:
+        # A read-only home costs the next start half a second, no more.
+        with contextlib.suppress(OSError, InputError):
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            with atomic_file(kept) as file:
+                file.write(json.dumps(result._asdict()).encode())
     return result
 
 
@@ -203,29 +207,12 @@ def cache_dir() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rtradar"
 
 
-def _key(variant: str, library: Library | None) -> str | None:
-    """All that an answer depends on; None where that is unknown."""
+def _kept_in(variant: str, library: Library | None) -> Path | None:
+    """File of an answer, named by all that it depends on; None where that is unknown."""
     try:
-        versions = [f"{name} {importlib.metadata.version(name)}" for name in ("mitsuba", "drjit")]
-        about = [] if library is None else [library.path, str(os.stat(library.path).st_mtime_ns)]
-        about.append(f"probe {zlib.crc32(_PROBE.read_bytes()):08x}")
+        versions = [importlib.metadata.version(name) for name in ("mitsuba", "drjit")]
+        about = () if library is None else (library.path, os.stat(library.path).st_mtime_ns)
+        asked = variant, platform.machine(), sys.executable, *versions, *about, _PROBE.read_bytes()
     except (importlib.metadata.PackageNotFoundError, OSError):
         return None
-    return "; ".join([variant, platform.machine(), sys.executable, *versions, *about])
-
-
-def _read_cache() -> dict[str, Any]:
-    try:
-        kept = json.loads((cache_dir() / "probes.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return kept if isinstance(kept, dict) else {}
-
-
-def _write_cache(kept: dict[str, Any]) -> None:
-    # A read-only home costs the next start half a second, no more.
-    with contextlib.suppress(OSError, InputError):
-        folder = cache_dir()
-        folder.mkdir(parents=True, exist_ok=True)
-        with atomic_file(folder / "probes.json") as file:
-            file.write(json.dumps(kept, indent=1).encode())
+    return cache_dir() / f"probe-{hashlib.sha256(repr(asked).encode()).hexdigest()[:16]}.json"
