@@ -116,9 +116,8 @@ class Triangles:
         find: Any = triangles.closest_point  # has no types
         corners = self.corners
         nearest = find(corners, np.broadcast_to(point, (len(corners), 3)))
-        if self.closed and _winding(corners - point) > 0.5:
-            return 0.0
-        return float(np.linalg.norm(nearest - point, axis=1).min())
+        inside = self.closed and _winding(corners - point) > 0.5
+        return 0.0 if inside else float(np.linalg.norm(nearest - point, axis=1).min())
 
 
 def mesh_names() -> tuple[str, ...]:

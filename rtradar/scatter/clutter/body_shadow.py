@@ -301,14 +301,12 @@ def _apart_s(
 
 def _shared_points(clutter: Clutter, starts: Indices) -> SharedPoints:
     """Points of all echoes whose points all antennas share."""
-    points, numbers, powers = [np.empty((0, 3))], [np.empty(0, dtype=np.int64)], [np.empty(0)]
+    found = [(np.empty((0, 3)), np.empty(0, dtype=np.int64), np.empty(0))]
     for own, first in zip(clutter.objects, starts[:-1], strict=True):
         if own.kind != "mirror":
-            points.append(own.points[0, 0, :, 0])
-            numbers.append(np.arange(own.n_echoes) + first)
-            middle = own.amplitude[len(own.frequency) // 2]
-            powers.append((np.abs(middle) ** 2).mean(axis=(0, 1)))
-    return SharedPoints(np.concatenate(points), np.concatenate(numbers), np.concatenate(powers))
+            power = (np.abs(own.amplitude[len(own.frequency) // 2]) ** 2).mean(axis=(0, 1))
+            found.append((own.points[0, 0, :, 0], np.arange(own.n_echoes) + first, power))
+    return SharedPoints._make(np.concatenate(arrays) for arrays in zip(*found, strict=True))
 
 
 def _fields(clutter: Clutter, starts: Indices, numbers: Indices, tx: Indices) -> Field:
