@@ -75,7 +75,20 @@ class _AboutAxis(RigidMotion, ABC):
         """Angles at some times (time,), of any number of turns."""
 
     def pose(self, times: Array) -> tuple[Array, Array]:
-        """Compute rotation about the pivot and shift of it, as `RigidMotion.pose`."""
+        """Compute rotation about the pivot and shift of it.
+
+        Parameters
+        ----------
+        times : (time,) float64
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        rotation : (time, 3, 3) float64
+            Rotation in the mesh's own axes.
+        shift : (time, 3) float64
+            Vector from the position of the object to its pivot, world axes [m].
+        """
         from scipy.spatial.transform import Rotation  # slow to import
 
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
@@ -187,7 +200,20 @@ class FollowingPath(RigidMotion):
             )
 
     def pose(self, times: Array) -> tuple[Array, Array]:
-        """Compute rotation about the pivot and shift of it, as `RigidMotion.pose`."""
+        """Compute rotation about the pivot and shift of it.
+
+        Parameters
+        ----------
+        times : (time,) float64
+            Times since the start of the capture [s].
+
+        Returns
+        -------
+        rotation : (time, 3, 3) float64
+            Rotation in the mesh's own axes.
+        shift : (time, 3) float64
+            Vector from the position of the object to its pivot, world axes [m].
+        """
         still, _ = super().pose(times)
         if self.velocity_mps is not None:
             return still, times[:, None] * np.array(self.velocity_mps)
