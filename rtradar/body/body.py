@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -412,7 +412,8 @@ def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int
     faces = np.concatenate([upright, turned])
     faces = faces + len(weights) * np.arange(20)[:, None, None]
     # Neighbouring faces of the icosahedron have the points of their edge in common.
-    chosen, number = trimesh.grouping.unique_rows(points, digits=9)
+    unique_rows: Any = trimesh.grouping.unique_rows
+    chosen, number = unique_rows(points, digits=9)
     vertices, faces = points[chosen], number[faces.reshape(-1, 3)].astype(np.int64)
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     a, b, c = (vertices[faces[:, k]] for k in range(3))

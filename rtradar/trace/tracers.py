@@ -140,7 +140,7 @@ class BodyTracer:
         places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
         asked = np.ascontiguousarray(parts, dtype=np.int64)
         rays, whose = facet_rays(places, asked, *body, vertices, first, float(margin))
-        first_occluders(self._sphere.meets(rays[:7]), rays[7], whose, found.ravel())
+        first_occluders(self._sphere.any_met(rays[:7]), rays[7], whose, found.ravel())
         return found
 
     # -- rays --------------------------------------------------------------------------------------
