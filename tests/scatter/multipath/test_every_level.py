@@ -17,6 +17,7 @@ from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter import build_model
 from rtradar.scatter.common.interpolation import interpolation_weights
+from rtradar.scatter.facets.radiation import body_facets
 from rtradar.scene import Scene, Surface, room_walls
 from rtradar.scene.materials import Material, PowerLaw
 from rtradar.system.registries import MODELS
@@ -103,6 +104,10 @@ def by_hand(body: Any, tx: Array, rx: Array) -> complex:
     return total
 
 
+_ALIKE = np.sqrt(0.08 * 0.2)
+"""Radius of a ball that takes as many facets as a limb with these semi-axes [m]."""
+
+
 def from_images(fidelity: str, body: Any, tx: Array, rx: Array, polarization: str) -> complex:
     """Field at the centre of the sweep, exp(+j omega t), of the level in free space."""
     if fidelity == "analytic-paper":
@@ -111,7 +116,11 @@ def from_images(fidelity: str, body: Any, tx: Array, rx: Array, polarization: st
     target = rt.Ellipsoids(at.centres[0], at.frames[0], body.semi_axes)
     known = "reference" if fidelity == "auto" else fidelity
     given = target, tx, rx, frequency, known, polarization
-    length = rt.scattering_length(*given, **OPTIONS.get(known, {}))[0]  # type: ignore[arg-type]
+    options: Any = OPTIONS.get(known, {})
+    if fidelity == "auto":  # which has its facets by the sizes of parts
+        wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
+        options = {"facets": int(body_facets(body.semi_axes, wavenumber).max())}
+    length = rt.scattering_length(*given, **options)[0]
     ranges = np.linalg.norm(tx), np.linalg.norm(rx)
     turns = frequency / SPEED_OF_LIGHT_MPS * (ranges[0] + ranges[1])
     return complex(length / (ranges[0] * ranges[1]) * np.exp(-2j * np.pi * turns))
@@ -135,7 +144,7 @@ def test_before_one_mirror_stand_the_radar_and_its_image(
 ) -> None:
     # The ball is seen past the limb's edge.
     frames = Rotation.from_rotvec([[0.3, 0.2, 0.4], [0, 0, 0]]).as_matrix()
-    axes = np.array([[0.08, 0.06, 0.2], [0.1, 0.1, 0.1]])
+    axes = np.array([[0.08, 0.06, 0.2], [_ALIKE, _ALIKE, _ALIKE]])
     body = make.still(np.array([[0.0, 0.3, 1.0], [0.9, 0.15, 1.0]]), axes, frames)
     one = {"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "polarization": polarization}
     radar = replace(Radar(), **one, position_m=(-3.0, 0.2, 1.0))
