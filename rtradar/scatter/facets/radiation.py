@@ -62,7 +62,8 @@ def body_facets(semi_axes: NDArray[np.float64], wavenumber: float) -> Indices:
     0.1 rad, with the geometric mean of the middle and the longest semi-axis for a: a long part is
     as large as it is long to a wave from its end. Of walking, kicking and punching people that
     leaves 0.7 to 0.9 % of the field at 12 GHz, and 1 to 2 % where an edge of a shadow crosses a
-    part; where Tx and Rx are 60 degrees apart, as over a floor, 3 to 4 %. Of a grown person they are 1280 to 4500 at 12 to 16 GHz, 8000 to 21 000 at 77 to 81 GHz.
+    part; where Tx and Rx are 60 degrees apart, as over a floor, 3 to 4 %. Of a grown person they
+    are 1280 to 4500 at 12 to 16 GHz, 8000 to 21 000 at 77 to 81 GHz.
     """
     _, middle, longest = np.sort(semi_axes, axis=1).T
     wanted = np.ceil(100 * wavenumber * np.sqrt(middle * longest))
