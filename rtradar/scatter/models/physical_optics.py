@@ -82,8 +82,8 @@ class PhysicalOptics(TwoBounceModel):
     Parameters
     ----------
     facets : int, optional
-        Least number per ellipsoid, 20 to 1 310 720; None: by the wavelength, 5120 at 12 GHz and
-        20 480 at 77 GHz for a grown person. A mesh is always divided by the wavelength.
+        Least number per ellipsoid, 20 to 1 310 720; None: by wavelength and size, 1280 to 4500 at
+        12 GHz and 8000 to 21 000 at 77 GHz. A mesh is always divided by the wavelength.
     anchor_s : float
         Time between keyframes [s], above 0; where the echo bends it comes down to an eighth of it.
     tolerance : float
@@ -188,8 +188,8 @@ class Reference(BuiltInModel):
     Parameters
     ----------
     facets : int, optional
-        Least number per part, 20 to 1 310 720; None: by the wavelength, 5120 at 12 GHz and 20 480
-        at 77 GHz for a grown person. A mesh is always divided by the wavelength.
+        Least number per part, 20 to 1 310 720; None: by wavelength and size, 1280 to 4500 at 12 GHz
+        and 8000 to 21 000 at 77 GHz. A mesh is always divided by the wavelength.
     """
 
     accepts_meshes = True
