@@ -97,7 +97,7 @@ def cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def quantity(value: float, unit: str) -> str:
+def quantity(value: float, unit: str, digits: int = 4) -> str:
     """Format a quantity with the prefix of its unit, such as ``62.5 µs`` or ``4 GHz``.
 
     Parameters
@@ -106,16 +106,18 @@ def quantity(value: float, unit: str) -> str:
         Value in the unit without prefix.
     unit : str
         Symbol of a unit that takes prefixes, such as ``Hz``, ``s`` or ``m``.
+    digits : int
+        Significant digits.
 
     Returns
     -------
     str
-        Four digits, and the unit.
+        The digits, and the unit.
     """
-    value = float(f"{value:.4g}")  # 999.99 µs are 1 ms
+    value = float(f"{value:.{digits}g}")  # 999.99 µs are 1 ms
     power = 3 * math.floor(math.log10(abs(value)) / 3) if value and math.isfinite(value) else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
-    return f"{value / 10.0**power:.4g} {_PREFIXES[power]}{unit}"
+    return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"
 
 
 def text_table(rows: Sequence[Sequence[str]]) -> str:

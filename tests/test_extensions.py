@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import json
 import os
@@ -366,3 +367,30 @@ def test_two_of_one_name_are_refused_by_that_name(
     said = "'threshold' is claimed by 'other' and by 'outside'"
     with pytest.raises(rt.ExtensionError, match=said):
         DETECTORS.find("threshold")
+
+
+class Imaginary:
+    """`analytic` with its amplitudes times j, which says that it is fast and has no formula."""
+
+    fast_over_walls = True
+    variant = None
+
+    def __init__(self, radar: rt.Radar, body: rt.Body, *, spreading: bool) -> None:
+        self._model = MODELS["analytic"](radar, body, spreading=spreading)
+
+    def echoes(self, chirps: np.ndarray) -> rt.Echoes:
+        good = self._model.echoes(chirps)
+        return dataclasses.replace(good, amplitude=1j * good.amplitude)
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_model_without_a_formula_keeps_its_phase_behind_a_pattern() -> None:
+    rt.register_model("imaginary", Imaginary)
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
+    beam = rt.Antenna(pattern="cosine", exponent=2.0)
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_antenna=beam)
+    known, own = (
+        build_model(level, radar, body).echoes(np.arange(4)) for level in ("analytic", "imaginary")
+    )
+    assert np.abs(known.amplitude).max() > 0
+    np.testing.assert_allclose(own.amplitude, 1j * known.amplitude, rtol=1e-6)

@@ -198,19 +198,43 @@ def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> Non
     assert max(np.abs(np.log(found))) < 0.3
 
 
-def test_directions_are_those_of_the_specular_points() -> None:
-    plain = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0))
+TURNS = {"path_times_s": (0.0, 0.2), "path_angles_deg": ((-36, 0, 0), (36, 0, 0))}
+
+
+def through_patterns(
+    level: str, plain: rt.Radar, chirps: NDArray[np.int64]
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Amplitudes (node, chirp, rx, part) through cosine patterns: found, and by the directions of
+    the specular points at every chirp."""
     beam = Antenna(pattern="cosine", exponent=6.0)
     shaped = dataclasses.replace(plain, tx_antenna=beam, rx_antenna=beam)
-    chirps = np.arange(2)
-    before, after = (
-        build_model("analytic", radar, BODY).echoes(chirps) for radar in (plain, shaped)
-    )
+    before, after = (build_model(level, radar, BODY).echoes(chirps) for radar in (plain, shaped))
     at = chirp_poses(plain, BODY, chirps)
     points = solve_specular_points(at, points=True)[2]
+    ahead = np.broadcast_to(at.axes, (len(chirps), 3, 3))[:, None, None, :, 0]
     ways = [unit(points - place) for place in (at.tx[:, None, None], at.rx[:, :, None])]
-    expected = before.amplitude[0] * ways[0][..., 0] ** 3 * ways[1][..., 0] ** 3
-    np.testing.assert_allclose(after.amplitude[0], expected, rtol=1e-3)
+    cosines = [np.sum(way * ahead, axis=-1) for way in ways]
+    return after.amplitude, before.amplitude * cosines[0] ** 3 * cosines[1] ** 3
+
+
+def test_directions_are_those_of_the_specular_points() -> None:
+    plain = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0))
+    found, expected = through_patterns("analytic", plain, np.arange(2))
+    np.testing.assert_allclose(found, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("moves", [{}, TURNS], ids=["at-rest", "turns"])
+@pytest.mark.parametrize("level", ["analytic", "specular", "physical-optics"])
+def test_patterns_are_followed_between_keyframes_and_antennas(
+    level: str, moves: dict[str, Any]
+) -> None:
+    plain = rt.Radar(tx_y=6, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0), **moves)
+    cycles = np.round(np.linspace(0, 0.15, 7) / plain.cycle_duration_s).astype(int)
+    chirps = (plain.n_tx * cycles[:, None] + np.arange(plain.n_tx)).ravel()
+    found, expected = through_patterns(level, plain, chirps)
+    error = np.linalg.norm(found - expected) / np.linalg.norm(expected)
+    # A part takes the specular point for the middle of the receivers, and a straight line in time.
+    assert error < 1e-3
 
 
 def test_a_part_straight_between_tx_and_rx_has_no_echo_and_no_nan() -> None:

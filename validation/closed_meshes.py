@@ -15,6 +15,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from rtradar.body import body
+
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -23,21 +25,7 @@ _FINE = 2001
 
 def geodesic_sphere(radius_m: float, divisions: int) -> Any:
     """Sphere of 30 n^2 edges, n divisions of each edge of an icosahedron; its volume is exact."""
-    solid = trimesh.creation.icosahedron()
-    steps = [(i, j) for i in range(divisions + 1) for j in range(divisions + 1 - i)]
-    number = {step: place for place, step in enumerate(steps)}
-    small = [
-        [number[i, j], number[i + 1, j], number[i, j + 1]] for i, j in steps if i + j < divisions
-    ] + [
-        [number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]]
-        for i, j in steps
-        if i + j < divisions - 1
-    ]
-    places = np.array([[divisions - i - j, i, j] for i, j in steps]) / divisions
-    corners = np.einsum("pc,tcx->tpx", places, solid.vertices[solid.faces]).reshape(-1, 3)
-    corners *= radius_m / np.linalg.norm(corners, axis=1, keepdims=True)
-    faces = np.array(small) + len(steps) * np.arange(len(solid.faces))[:, None, None]
-    mesh = trimesh.Trimesh(corners, faces.reshape(-1, 3))
+    mesh = trimesh.Trimesh(*body.geodesic_sphere(divisions))
     mesh.apply_scale((4 / 3 * np.pi * radius_m**3 / mesh.volume) ** (1 / 3))
     return mesh
 

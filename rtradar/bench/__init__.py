@@ -289,14 +289,14 @@ def with_duration(plan: Plan, runner: Runner) -> list[Row]:
 def tables(found: dict[str, Any]) -> str:
     """All tables of what `measure` found."""
     template = templates(Path(__file__).parent, escaped=False).get_template("tables.md")
-    given = {"not_to_cloud": NOT_TO_CLOUD, "cheapest": CHEAPEST}
+    given = {"not_to_cloud": NOT_TO_CLOUD, "cheapest": CHEAPEST, "by_radar": _by_radar(found)}
     return aligned(template.render(found | given)).rstrip()
 
 
 def draw(found: dict[str, Any], file: BinaryIO) -> None:
     """Draw what `measure` found, as PNG."""
     growth = found["growth"]
-    radars = {radar: [*own] for radar, own in groupby(found["models"], itemgetter("radar"))}
+    radars = _by_radar(found)
     rows = max(1, len(radars) + bool(growth["duration"]))
     figure = new_figure(3.4 * rows, width_in=11)
     places = list(figure.subplots(rows, 1, squeeze=False)[:, 0])
@@ -305,6 +305,11 @@ def draw(found: dict[str, Any], file: BinaryIO) -> None:
     if growth["duration"]:
         _growing(places[-1], growth["duration"], growth["fidelity"])
     save_figure(figure, file)
+
+
+def _by_radar(found: dict[str, Any]) -> dict[str, list[Row]]:
+    """Rows of models by radar, in their order."""
+    return {radar: [*own] for radar, own in groupby(found["models"], itemgetter("radar"))}
 
 
 def _bars(axes: Any, models: list[Row], radar: str) -> None:

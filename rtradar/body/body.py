@@ -352,7 +352,7 @@ MAXIMUM_SUBDIVISIONS = 8
 
 
 def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Make an icosphere of 20 x 4^subdivisions triangles, closed, with the mean radius 1.
+    """Make a geodesic sphere of 20 x 4^subdivisions triangles, closed, with the mean radius 1.
 
     Its vertices lie a little outside the unit sphere, so that the mean of ``|x|^2`` over its
     surface is 1.
@@ -402,7 +402,7 @@ def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int
     solid = trimesh.creation.icosahedron()
     rows, places = np.tril_indices(frequency + 1)
     weights = np.stack([frequency - rows, rows - places, places], axis=1) / frequency
-    points = (weights @ solid.vertices[solid.faces]).reshape(-1, 3)
+    points = (weights @ np.asarray(solid.vertices)[solid.faces]).reshape(-1, 3)
     # Below each point but the last row's a triangle, and beside it one that stands on its head.
     first = np.flatnonzero(rows < frequency)
     below = first + rows[first] + 1
@@ -436,7 +436,7 @@ def ellipsoid_meshes(
     ellipsoids : Ellipsoids
         One pose.
     subdivisions : int
-        Subdivisions of the icosphere that each part is made from.
+        Subdivisions of the `unit_sphere` that each part is made from.
 
     Returns
     -------

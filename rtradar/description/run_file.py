@@ -358,8 +358,8 @@ def _fields(piece: Any) -> list[dataclasses.Field[Any]]:
 def _shape(piece: Furniture, missing: list[str]) -> Plain:
     if isinstance(piece.mesh, tuple | list):
         return {"box": plain(piece.mesh)}
-    if hasattr(piece.mesh, "vertices"):
-        missing.append(f"the mesh of object '{piece.name}', which was made in Python")
+    if piece.in_memory:
+        missing.append(f"the mesh of '{piece.name}', which was made in Python")
         return {"mesh": "in memory"}
     built_in = isinstance(piece.mesh, str) and piece.metres_per_unit is None
     return {"mesh": piece.mesh if built_in else str(piece.path.absolute())}

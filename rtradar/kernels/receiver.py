@@ -167,17 +167,22 @@ def mirror(own, image, out):
         samples[i] = own * samples[i] + image * samples[i].conjugate()
 
 
+@compiled(fastmath={"contract"})
 def convert(dc, step, limit, out):
     """Add ``dc`` to ``out (row, rx, sample)``, round both parts to steps, and clip them.
 
     There are no steps if ``step`` is 0. The highest value is a step below ``limit``, the lowest its
     negative.
     """
-    out += dc
-    parts = out.view(np.float32)
-    if step > 0:
-        parts[:] = step * np.floor(parts / step + _HALF)
-    np.clip(parts, -limit, limit - step, out=parts)
+    half, samples = np.float32(0.5), out.reshape(-1)
+    for i in range(len(samples)):
+        real, imaginary = samples[i].real + dc.real, samples[i].imag + dc.imag
+        if step > 0:
+            real = step * np.floor(real / step + half)
+            imaginary = step * np.floor(imaginary / step + half)
+        samples[i] = complex(
+            min(max(real, -limit), limit - step), min(max(imaginary, -limit), limit - step)
+        )
 
 
 @compiled(fastmath={"contract"})

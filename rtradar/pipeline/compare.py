@@ -232,9 +232,9 @@ def compare_recordings(
     return Comparison(summary, place)
 
 
-_LONGER_STEPS, _PATIENCE_S = (24, 1), 20.0
+_LONGER_STEPS, _PATIENCE_S = 24, 20.0
 """Steps from frame to frame by which the second of two short runs is longer than the first, and the
-fewer where the first took more than a time [s]."""
+time [s] from which on the first is the only one."""
 
 
 @takes_settings
@@ -250,7 +250,8 @@ def plan_levels(
     """Estimate what a run by each level will take, and which level keeps a tolerance.
 
     Each level runs for two frames, into a folder that goes again, and for a few frames more; what
-    the longer run adds is drawn on to the whole capture.
+    the longer run adds is drawn on to the whole capture. A level whose two frames take long runs
+    once, and all its time is drawn on: rather too much than too little.
 
     Parameters
     ----------
@@ -292,14 +293,12 @@ def plan_levels(
                 return run_into(Path(place, "short"), *parts, own).summary
 
         found = took(first_s)
-        steps = _LONGER_STEPS[found["wall_s"] > _PATIENCE_S]
-        if steps > 1:
+        longer_s = min(first_s + _LONGER_STEPS * placed.frame_hop_s, capture_s)
+        rate = found["wall_s"] / first_s
+        if found["wall_s"] <= _PATIENCE_S and longer_s > first_s:
             found = took(first_s)  # without what the first run of a process loads
-        longer_s = min(first_s + steps * placed.frame_hop_s, capture_s)
-        wall_s = found["wall_s"]
-        if longer_s > first_s:
-            added_s = max(took(longer_s)["wall_s"] - wall_s, 0.0)
-            wall_s += added_s * (capture_s - first_s) / (longer_s - first_s)
+            rate = max(took(longer_s)["wall_s"] - found["wall_s"], 0.0) / (longer_s - first_s)
+        wall_s = found["wall_s"] + rate * (capture_s - first_s)
         levels[name] = {"wall_s": wall_s, "peak_memory_mb": found["peak_memory_mb"]}
     return {"capture_s": capture_s, "levels": levels, "advice": advice}
 
@@ -322,15 +321,16 @@ def _occluded(
 
     They are those of the power that the same level has of each part alone.
     """
-    seen = _budget(result).power_at
-    traced = result.summary["occlusion"] != "none"
-    alone = power_alone(motion, radar, scene, settings) if traced else seen
+    seen, names = _budget(result).power_at, result.summary["part_power_m2"]
+    if result.summary["occlusion"] == "none":
+        return {"occluded_share": 0.0, "part_occluded_share": dict.fromkeys(names, 0.0)}
+    alone = power_alone(motion, radar, scene, settings)
     if alone is None:
         alone = np.full(seen.shape, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
         of_parts = 1 - seen.sum(axis=0) / alone.sum(axis=0)
         whole = finite(float(1 - seen.sum() / alone.sum()))
-    by_part = zip(result.summary["part_power_m2"], map(finite, of_parts.tolist()), strict=True)
+    by_part = zip(names, map(finite, of_parts.tolist()), strict=True)
     return {"occluded_share": whole, "part_occluded_share": dict(by_part)}
 
 

@@ -347,15 +347,16 @@ def draw_maps_and_clouds(
     drawn = {name: place / file for name, file in MAP_PICTURES.items()}
     with ExitStack() as stack:
         plots = {
-            name: plots_of(one, stack.enter_context(open_run_maps(one)), relative=reference is None)
+            name: plots_of(one, stack.enter_context(open_run_maps(one)))
             for name, one in compared.items()
         }
         time_s = None
         if reference is not None:
             its = plots[reference]
             time_s = float(its.maps["time"][its.frame()[0]])
-        shown = {name: own.maps_at(time_s) for name, own in plots.items()}
-    for name, kind in (("Range-Doppler", "range_doppler"), ("Spectrogram", "spectrogram")):
+        kinds = "range_doppler", "spectrogram"
+        shown = {name: own.maps_at(time_s, kinds) for name, own in plots.items()}
+    for name, kind in zip(("Range-Doppler", "Spectrogram"), kinds, strict=True):
         maps = {own: found[kind] for own, found in shown.items() if kind in found}
         if len(maps) == len(compared):
             comparison.draw_maps(drawn[name], maps, title, reference)

@@ -97,6 +97,7 @@ def process_samples(
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
     given = replace(Processing.of(radar, settings), unit=unit)
     source = Samples(samples, given, in_memory=out is None)
+    # A background is read only where the samples are sound.
     source.processing = with_background(given)
     return results_of(source, None if out is None else Path(out), overwrite, pictures)
 
@@ -132,7 +133,7 @@ class Samples:
                 "of complex numbers, or blocks of them"
             )
 
-    def stream(self, sink: SpectraSink, kept: None = None) -> None:
+    def stream(self, sink: SpectraSink) -> None:
         """Make the range spectra of all samples, which the sink receives; samples are not kept."""
         together = chirps_together(self._radar)
         # The same pieces as those of a run, so that the maps are the same to the last bit.

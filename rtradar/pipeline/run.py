@@ -218,7 +218,8 @@ def _streamed(
     # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
     table = EchoTable(source) if isinstance(source, Capture) else None
     with RunWriter(file, source.processing, source.title, source.frame_starts, table) as writer:
-        source.stream(writer, kept)
+        # Only what is simulated may be kept.
+        source.stream(writer, *([] if kept is None else [kept]))
         clouds = writer.finish()
     simulated: dict[str, Any] = {}
     if table is not None:

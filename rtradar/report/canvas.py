@@ -87,17 +87,13 @@ def field_unit(
     spreading: bool = True,
     range_m: ArrayLike | None = None,
     strongest_m2: float = 1.0,
-    relative: bool = False,
 ) -> FieldUnit:
     """Choose the unit of power in the pictures of a run, as this module's docstring explains.
 
     ``spreading`` tells whether amplitudes include the spreading loss. ``range_m`` are the ranges of
     the powers [m], of a shape that broadcasts with them, or None for sums over ranges.
-    ``strongest_m2`` is the reference of ``dB re maximum`` [m^2], which is taken always if
-    ``relative``.
+    ``strongest_m2`` is the reference of ``dB re maximum`` [m^2].
     """
-    if relative:
-        return FieldUnit("dB re maximum", 1 / max(strongest_m2, float(np.finfo(np.float32).tiny)))
     if not spreading:
         return FieldUnit("dBsm", 1.0)
     if radar.transmit_power_dbm is not None:

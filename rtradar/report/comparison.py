@@ -84,31 +84,32 @@ def draw_maps(
 ) -> None:
     """Draw the same map of each model in the same colours and limits, one above another.
 
-    Levels below a maximum are all below that of the ``reference``, if there is one.
+    They are in the unit and within the limits of the ``reference``; without one each is below its
+    own maximum, and all are within limits that hold all.
     """
-    levels = {name: one.level_db for name, one in maps.items()}
-    if reference is not None:
-        its = maps[reference].unit.scale
-        for name, one in maps.items():
-            levels[name] = one.level_db + 10 * np.log10(its / one.unit.scale)
+    # The level of the power itself, whatever the unit of each map.
+    levels = {name: one.level_db - 10 * np.log10(one.unit.scale) for name, one in maps.items()}
+    if reference is None:
+        unit = FieldUnit("dB re maximum", 1.0)
+        levels = {name: level - level.max() for name, level in levels.items()}
+        ends = np.array([one.limits for one in maps.values()])
+        limits_of = np.stack([ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)], axis=1)
+    else:
+        unit, limits_of = maps[reference].unit, np.array(maps[reference].limits)
+        levels = {name: level + 10 * np.log10(unit.scale) for name, level in levels.items()}
     figure = new_figure(1.0 + 2.6 * len(maps))
     panels = figure.subplots(len(maps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     limits = colour_limits(np.concatenate([np.ravel(level) for level in levels.values()]))
+    alike = len({one.made for one in maps.values()}) == 1
     for axes, (name, one) in zip(panels, maps.items(), strict=True):
         image = draw_levels(axes, levels[name], one.across, one.up, limits)
         axes.set_ylabel(one.labels[1])
         shown = f"{name}: {one.title}".replace("\n", " ")
-        lines = (title, one.made, shown) if axes is panels[0] else (shown,)
+        made = one.made if axes is panels[0] or not alike else ""
+        lines = (title, made, shown) if axes is panels[0] else (made, shown)
         dress(axes, title="\n".join(filter(None, lines)), grid=False)
-    across, up = (
-        np.array(ends) for ends in zip(*(one.limits for one in maps.values()), strict=True)
-    )
-    panels[-1].set(
-        xlabel=one.labels[0],
-        xlim=(across[:, 0].min(), across[:, 1].max()),
-        ylim=(up[:, 0].min(), up[:, 1].max()),
-    )
-    add_colour_bar(image, list(panels), one.unit.label(one.qualifier))
+    panels[-1].set(xlabel=one.labels[0], xlim=limits_of[0], ylim=limits_of[1])
+    add_colour_bar(image, list(panels), unit.label(one.qualifier))
     save_figure(figure, path, pdf=path.with_suffix(".pdf"))
 
 

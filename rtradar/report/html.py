@@ -20,6 +20,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rtradar.cards import quantity as with_prefix
 from rtradar.errors import InputError
 from rtradar.scatter.validity import WARN_FRACTION
 from rtradar.system.files import atomic_file, open_regular
@@ -217,9 +218,7 @@ def with_unit(value: object, unit: str) -> str:
         return grouped(value)
     if isinstance(value, int | float):
         if unit in _PREFIXED and value:
-            from matplotlib.ticker import EngFormatter
-
-            return EngFormatter(unit=unit, places=None)(value)
+            return with_prefix(value, unit, digits=6)
         shown = f"{value:.5g}"
     else:
         shown = str(value)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
@@ -77,8 +77,6 @@ class Plots:
         Contents of ``summary.json``, of which ``parameters`` and ``detected_range_m`` are read.
     new_figure : callable
         Function that makes the figure, from its height [inch].
-    relative : bool
-        Whether powers are in decibels below the strongest of each map, whatever its unit is.
     """
 
     maps: xr.Dataset | h5py.File
@@ -87,7 +85,6 @@ class Plots:
     radar: Radar
     summary: Mapping[str, Any]
     new_figure: Callable[[float], Figure] = field(default=figure_for)
-    relative: bool = False
 
     def range_doppler(self, time_s: float | Axes | None = None, ax: Axes | None = None) -> Axes:
         """Draw the range-Doppler map of one frame, and its detections in a second panel beside it.
@@ -346,24 +343,30 @@ class Plots:
         """Maps as `maps_at` gives them, those of one frame in the frame of most energy."""
         return [*self.maps_at().values()]
 
-    def maps_at(self, time_s: float | None = None) -> dict[str, ShownMap]:
+    def maps_at(
+        self, time_s: float | None = None, names: Collection[str] | None = None
+    ) -> dict[str, ShownMap]:
         """Return maps as `range_time`, `spectrogram`, `range_doppler` and `range_angle` show them.
 
         Parameters
         ----------
         time_s : float, optional
             Time of the frame, as for `range_doppler`.
+        names : collection of str, optional
+            Names in ``maps.h5`` of the maps that are wanted; all by default.
 
         Returns
         -------
         dict
             Maps by their names in ``maps.h5``, in the order of a page.
         """
-        found = {"range_time": self._range_time}
+        makers: dict[str, Callable[[], ShownMap]] = {"range_time": lambda: self._range_time}
         if len(self.maps["spectrogram"]):
-            found["spectrogram"] = self._spectrogram
-        found["range_doppler"] = self._range_doppler(time_s)
-        return found | {f"range_{name}": self._range_angle(name, time_s) for name in self._angles}
+            makers["spectrogram"] = lambda: self._spectrogram
+        makers["range_doppler"] = partial(self._range_doppler, time_s)
+        for name in self._angles:
+            makers[f"range_{name}"] = partial(self._range_angle, name, time_s)
+        return {name: make() for name, make in makers.items() if names is None or name in names}
 
     @cached_property
     def _range_time(self) -> ShownMap:
@@ -457,10 +460,10 @@ class Plots:
         return self.new_figure(height_in).add_subplot(**options) if ax is None else ax
 
     def _unit(self, **options: Any) -> FieldUnit:
-        if self.maps["range_doppler"].attrs.get("units", "m2") != "m2" and not self.relative:
+        if self.maps["range_doppler"].attrs.get("units", "m2") != "m2":
             return FieldUnit(COUNTS, 1.0)
         options |= {"spreading": self._parameters.get("spreading", True)}
-        return field_unit(self.radar, relative=self.relative, **options)
+        return field_unit(self.radar, **options)
 
     def _axis(self, name: str) -> NDArray[np.float64]:
         return np.asarray(self.maps[name])

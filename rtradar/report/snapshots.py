@@ -24,8 +24,6 @@ _LARGEST = 1e9
 DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
 """Errors that damaged files and arrays cause."""
 
-_MAY_BE_NAN = ("corners", "places")
-
 
 def _array(kind: str, *axes: str | int, into: str | None = None) -> Any:
     """Field of `Snapshots`: NumPy's code of its type, and the names or lengths of its axes.
@@ -101,7 +99,8 @@ class Snapshots:
         sizes: dict[str, int] = {}
         for one in fields(self):
             kind, axes = one.metadata["kind"], one.metadata["axes"]
-            array = checked(one.name, getattr(self, one.name), sizes, kind, axes)
+            given = getattr(self, one.name), sizes, kind, axes
+            array = checked(one.name, *given, may_be_nan=one.name == "corners")
             object.__setattr__(self, one.name, array)
         if not sizes["step"]:
             raise InputError("view: there is no snapshot; at least one is needed")
@@ -109,7 +108,7 @@ class Snapshots:
             name, axis, index = one.name, one.metadata["into"], getattr(self, one.name)
             if axis and index.size and not 0 <= index.min() <= index.max() < sizes[axis]:
                 allowed = f"it must be from 0 to {sizes[axis] - 1}"
-                raise InputError(f"view: {name} points at a {axis} that is not there; {allowed}")
+                raise InputError(f"{name} points at a {axis} that is not there; {allowed}")
         of, part = self.mesh_source, self.mesh_part
         if ((of < 0) | (of >= len(self.sources))).any() or (
             (part < -1) | (part >= sizes["part"])
@@ -156,20 +155,25 @@ class Snapshots:
 
 
 def checked(
-    name: str, values: Any, sizes: dict[str, int], kind: str, axes: tuple[str | int, ...]
+    name: str,
+    values: Any,
+    sizes: dict[str, int],
+    kind: str,
+    axes: tuple[str | int, ...],
+    may_be_nan: bool = False,
 ) -> NDArray[Any]:
     """Return an array of a file as one of its type, ``kind``, with these axes.
 
-    ``sizes`` collects the lengths of named axes. InputError if it is another, or a value is not
-    finite or too large.
+    ``sizes`` collects the lengths of named axes. InputError if it is another, or a value is too
+    large, or not finite unless it ``may_be_nan``.
     """
     array = np.asarray(values)
     if kind == "U" and array.size == 0:
         array = array.astype("U")  # an empty list has no string type
     odd = array.dtype in (np.float16, np.longdouble)
     if odd or array.dtype.kind != np.dtype(kind).kind:
-        raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
-    shape = f"view: {name} has shape {array.shape}"
+        raise InputError(f"{name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
+    shape = f"{name} has shape {array.shape}"
     if array.ndim != len(axes):
         raise InputError(f"{shape}; its axes must be ({', '.join(map(str, axes))})")
     for axis, length in zip(axes, array.shape, strict=True):
@@ -178,12 +182,12 @@ def checked(
             raise InputError(f"{shape}; its axis {axis} must have length {wanted}")
     if kind == "U":
         if not all(word.isprintable() for word in array.ravel().tolist()):
-            raise InputError(f"view: {name} holds what is no line of text")
+            raise InputError(f"{name} holds what is no line of text")
         return array
-    if name not in _MAY_BE_NAN and not np.isfinite(array).all():
-        raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
+    if not may_be_nan and not np.isfinite(array).all():
+        raise InputError(f"{name} holds NaN or infinity; every value must be finite")
     if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
-        raise InputError(f"view: {name} holds a value above {_LARGEST:g}; none is so large")
+        raise InputError(f"{name} holds a value above {_LARGEST:g}; none is so large")
     return array.astype(kind)
 
 
@@ -221,6 +225,13 @@ def refused(path: str | Path, error: Exception) -> InputError:
     return InputError(f"'{path}': {why}; make it anew with: rtradar run")
 
 
+_LATER = {
+    *("part_person", "object_names", "mesh_source", "mesh_faces", "mesh_of_vertex", "mesh_part"),
+    *("mesh_rows", "blend_vertex", "blend_row", "blend_weight"),
+}
+"""Fields that files of the first format lack, all of them empty or 0 there."""
+
+
 def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
     times, parts = arrays["times"], arrays["part_names"].tolist()
@@ -234,8 +245,8 @@ def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]
     }
     sizes = {"step": len(times), "part": len(parts)}
     for one in fields(Snapshots):
-        if one.name not in {**found, **arrays}:
+        if one.name in _LATER:
             axes, kind = one.metadata["axes"], one.metadata["kind"]
             shape = [axis if isinstance(axis, int) else sizes.get(axis, 0) for axis in axes]
-            found[one.name] = np.zeros(shape, kind)
+            found.setdefault(one.name, np.zeros(shape, kind))
     return found

@@ -88,7 +88,8 @@ def build_model(
     def conductor(before: Radar) -> EchoModel:
         with MODELS.guarded(fidelity):
             model: EchoModel = kind(before, body, spreading=spreading, **backend, **model_options)
-        if fidelity in MODELS.built_in or getattr(model, "fast_over_walls", False):
+        formula = getattr(model, "fast_over_walls", False) and hasattr(model, "conductor_echo")
+        if fidelity in MODELS.built_in or formula:
             return model
         return _Checked(fidelity, model, before, body)
 

@@ -72,7 +72,8 @@ class PeopleAndObjects:
         self.person, self.objects, self._parts = person, list(map(list, objects)), parts
         self.limits, self.variant = tuple(limits), person.variant
         room = person if isinstance(person, RoomModel) else None
-        self.room = None if room is None or room.in_free_space else room
+        # Free space may be a room without walls, in which the people are alone.
+        self.room = None if room is None or room.person is room else room
         self.people_alone = person if self.room is None else self.room.person
         self.paths = (DIRECT,) if self.room is None else self.room.paths
 

@@ -165,8 +165,8 @@ class Material:
             At frequencies for which the source gives nothing.
         """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
-        for outside in frequency[~self.holds(frequency)]:
-            self._refuse(float(outside))
+        if (outside := frequency[~self.holds(frequency)]).size:
+            self._refuse(float(outside[0]))
         eta = np.empty(frequency.shape, dtype=np.complex128)
         for band in reversed(self.bands):
             inside = _inside(band, frequency)

@@ -70,7 +70,7 @@ class Triangles:
         Parameters
         ----------
         vertices : (vertex, 3) float64
-            Positions [m].
+            Positions [m]; the array becomes read-only.
 
         Returns
         -------

@@ -54,7 +54,13 @@ class RigidMotion:
         shift : (time, 3) float64
             Vector from the position of the object to its pivot, world axes [m].
         """
-        return np.tile(np.eye(3), (len(times), 1, 1)), np.zeros((len(times), 3))
+        return self._rotations(times), self._shifts(times)
+
+    def _rotations(self, times: Array) -> Array:
+        return np.tile(np.eye(3), (len(times), 1, 1))
+
+    def _shifts(self, times: Array) -> Array:
+        return np.zeros((len(times), 3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,26 +80,12 @@ class _AboutAxis(RigidMotion, ABC):
     def _angle_rad(self, times: Array) -> Array:
         """Angles at some times (time,), of any number of turns."""
 
-    def pose(self, times: Array) -> tuple[Array, Array]:
-        """Compute rotation about the pivot and shift of it.
-
-        Parameters
-        ----------
-        times : (time,) float64
-            Times since the start of the capture [s].
-
-        Returns
-        -------
-        rotation : (time, 3, 3) float64
-            Rotation in the mesh's own axes.
-        shift : (time, 3) float64
-            Vector from the position of the object to its pivot, world axes [m].
-        """
+    def _rotations(self, times: Array) -> Array:
         from scipy.spatial.transform import Rotation  # slow to import
 
         axis = np.array(self.axis) / np.linalg.norm(self.axis)
         turns: Any = Rotation.from_rotvec(self._angle_rad(times)[:, None] * axis)
-        return np.asarray(turns.as_matrix(), dtype=np.float64), super().pose(times)[1]
+        return np.asarray(turns.as_matrix(), dtype=np.float64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,29 +191,14 @@ class FollowingPath(RigidMotion):
                 "points_m"
             )
 
-    def pose(self, times: Array) -> tuple[Array, Array]:
-        """Compute rotation about the pivot and shift of it.
-
-        Parameters
-        ----------
-        times : (time,) float64
-            Times since the start of the capture [s].
-
-        Returns
-        -------
-        rotation : (time, 3, 3) float64
-            Rotation in the mesh's own axes.
-        shift : (time, 3) float64
-            Vector from the position of the object to its pivot, world axes [m].
-        """
-        still, _ = super().pose(times)
+    def _shifts(self, times: Array) -> Array:
         if self.velocity_mps is not None:
-            return still, times[:, None] * np.array(self.velocity_mps)
+            return times[:, None] * np.array(self.velocity_mps)
         from scipy.interpolate import PchipInterpolator  # slow to import
 
         ends = self.times_s or ()
         course = PchipInterpolator(np.array(ends), np.array(self.points_m))
-        return still, np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
+        return np.asarray(course(np.clip(times, ends[0], ends[-1])), dtype=np.float64)
 
 
 _KINDS: Mapping[str, tuple[type[RigidMotion], tuple[str, ...]]] = {
@@ -259,8 +236,9 @@ class Object(Furniture):
     ----------
     name : str
         Name that reports show.
-    mesh : str, Path or trimesh.Trimesh
-        Name of a mesh that comes with rtradar, a file as `Furniture` takes it, or a mesh in metres.
+    mesh : str, Path, trimesh.Trimesh or tuple of float
+        Name of a mesh that comes with rtradar, a file as `Furniture` takes it, a mesh in metres, or
+        the sizes of a box [m].
     material : Material or str
         Material of the surface, or its name.
     position_m : tuple of float

@@ -351,7 +351,12 @@ class Furniture:
     @property
     def _settled(self) -> bool:
         """Whether the mesh itself says its unit, and whether it is a sheet."""
-        return self._built_in or isinstance(self.mesh, tuple) or hasattr(self.mesh, "faces")
+        return self._built_in or isinstance(self.mesh, tuple) or self.in_memory
+
+    @property
+    def in_memory(self) -> bool:
+        """Whether the mesh is one of Python's, which no file has."""
+        return hasattr(self.mesh, "vertices") and hasattr(self.mesh, "faces")
 
     @property
     def path(self) -> Path:
@@ -408,12 +413,12 @@ class Furniture:
         return read.moved(vertices)
 
     def _read(self) -> Triangles:
-        if hasattr(self.mesh, "faces"):
+        if self.in_memory:
             return checked_triangles(self._where, self.mesh.vertices, self.mesh.faces)
         if not isinstance(self.mesh, tuple):
             return read_mesh(self.path)
         import trimesh  # slow to import
 
         box = trimesh.creation.box(self.mesh)
-        vertices = box.vertices + np.array([0, 0, self.mesh[2] / 2])
+        vertices = np.asarray(box.vertices) + np.array([0, 0, self.mesh[2] / 2])
         return Triangles(vertices, np.array(box.faces, dtype=np.int64), closed=True)

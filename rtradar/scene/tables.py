@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
+from rtradar.conventions import PERSON_LIMITS
 from rtradar.errors import InputError, prefixed
 from rtradar.recordings import SAID, SYNTHETIC, said_of
 from rtradar.scene.materials import MATERIALS, Material, material, own_material
@@ -26,7 +27,16 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
-from rtradar.system.fields import check_fields, keys_of, read_table, read_value, within
+from rtradar.system.fields import (
+    Angle,
+    Limits,
+    Point,
+    check_fields,
+    keys_of,
+    read_table,
+    read_value,
+    within,
+)
 from rtradar.system.files import shipped_folder
 from rtradar.system.seeds import Seed
 
@@ -46,6 +56,13 @@ _ACTOR_S, _LONGEST_S = 10.0, 3600.0
 Piece = TypeVar("Piece", Wall, Furniture, Object)
 
 ANGLES = ("yaw_deg", "pitch_deg", "roll_deg")
+
+_PLACES = {
+    ("radar", "position_m"): Point,
+    ("person", "position_m"): Annotated[tuple[float, float], Limits(*PERSON_LIMITS["position_m"])],
+    ("person", "heading_deg"): Annotated[float, Limits(*PERSON_LIMITS["heading_deg"])],
+}
+"""What the keys of the tables of radar and person are, of those that are no angles of the radar."""
 
 _SHAPES = {"mesh": str, "box": BOX}
 """Keys that say the shape of furniture or of an object, which has one of them."""
@@ -137,14 +154,19 @@ def fields_of(table: Table) -> dict[str, Any]:
     }
     for kind in ("radar", "person"):
         own = table_at(kind, table)
-        check_keys(f"[{kind}] ", own, *KEYS[f"[{kind}]"])
-        fields |= {key if key == "heading_deg" else f"{kind}_{key}": own[key] for key in own}
+        # A table of the radar says where it is.
+        nowhere = kind == "radar" and kind in table and not own
+        check_keys(f"[{kind}] ", own, *((("position_m",), ()) if nowhere else KEYS[f"[{kind}]"]))
+        for key, value in own.items():
+            read = read_value(_PLACES.get((kind, key), Angle), f"[{kind}] ", key, value)
+            fields[key if key == "heading_deg" else f"{kind}_{key}"] = read
     return fields
 
 
 def _own_materials(table: Table) -> dict[str, Material]:
     found = {}
     for name in table:
+        read_value(str, "[materials] ", "a name", name)
         constants = table_at(name, table, "materials.")
         check_keys(f"[materials.{printable(name)}] ", constants, *KEYS["[materials.NAME]"])
         found[name] = own_material(name, **constants)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
-from functools import cache, lru_cache, partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -70,9 +70,10 @@ def _grouped(objects: Sequence[Echoes], mirrors: Collection[int]) -> list[_Group
     for kind in dict.fromkeys(kinds):
         member = np.array([other == kind for other in kinds])
         chosen = [own for own, inside in zip(objects, member, strict=True) if inside]
-        echoes = together(chosen)
         # In the precision of the samples.
-        echoes = replace(echoes, amplitude=echoes.amplitude.astype(np.complex64))
+        echoes = together(
+            [replace(own, amplitude=own.amplitude.astype(np.complex64)) for own in chosen]
+        )
         groups.append(_Group(echoes, member, np.cumsum(counts * member) - counts * member))
     return groups
 
@@ -163,7 +164,7 @@ class RoomIf:
             samples += self._whole[tx]
             return
         self.begin(chirps)
-        found = self._lost()
+        found = self._waited_for()
         keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
         for keyframe in np.unique(keyframes).tolist():
@@ -183,11 +184,19 @@ class RoomIf:
         before = np.unique(keyframe_before(self._radar, chirps, self._shadow.step)[0])
         needed = np.unique(before[:, None] + np.arange(-1, 3)).tolist()
         # Only after what was begun are the caches free.
-        kept = {k: lost for k, lost in self._lost().items() if k >= needed[0]}
-        missing = [k for k in needed if k not in kept]
-        self._lost = lambda: kept
+        held = self._waited_for()
+        missing = [k for k in needed if k not in held]
+        # Where nothing is missing it is perhaps part of a block, whose rest is asked for later.
         if missing:
-            self._lost = cache(begun(lambda: kept | {k: self._find(k) for k in missing}))
+            kept = {k: held[k] for k in needed if k in held}
+            self._lost = begun(lambda: kept | {k: self._find(k) for k in missing})
+
+    def _waited_for(self) -> dict[int, _Samples]:
+        """Return what is lost at the keyframes that were begun; an error leaves none behind."""
+        lost, self._lost = self._lost, dict
+        held = lost()
+        self._lost = lambda: held
+        return held
 
     def _blend(self, out: _Samples, tx: Any, weights: NDArray[np.float32], lost: _Samples) -> None:
         n_tx, whole = len(self._whole), self._whole.reshape(len(self._whole), -1)

@@ -16,7 +16,6 @@ import re
 import signal
 import subprocess
 import sys
-from collections import ChainMap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -174,7 +173,7 @@ def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int | No
         except subprocess.TimeoutExpired:
             return ProbeResult(f"hangs: no answer in {TIMEOUT_S:.0f} s", version), None
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
-    said = dict(ChainMap(*lines))
+    said = {key: value for line in lines for key, value in line.items()}
     if (found := said.get("llvm_version", [-1]))[0] > 0:
         version = ".".join(map(str, found))
     return ProbeResult(_finding(done, said), version), done.returncode

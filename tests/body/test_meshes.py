@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from rtradar.body import Body, ellipsoid_meshes, unit_sphere
+from rtradar.body.body import geodesic_sphere
 from rtradar.errors import InputError
 from rtradar.motion import synthetic_motion
 
@@ -30,6 +31,20 @@ def test_unit_sphere_is_the_right_size_in_the_mean(subdivisions: int) -> None:
     radii = np.linalg.norm(vertices, axis=1)
     assert np.ptp(radii) < 1e-14
     assert radii[0] > 1
+
+
+@pytest.mark.parametrize("frequency", [1, 3, 7, 16])
+def test_edges_of_a_geodesic_sphere_are_divided_into_any_number_of_parts(frequency: int) -> None:
+    vertices, faces = geodesic_sphere(frequency)
+    assert type(vertices) is type(faces) is np.ndarray
+    assert len(vertices) == 10 * frequency**2 + 2
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    assert len(faces) == 20 * frequency**2
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0
+    # No facet is larger than the icosahedron's own, seen from the centre, nor much smaller.
+    assert mesh.area_faces.max() < 2.1 * mesh.area_faces.min()
 
 
 def test_sphere_is_kept_and_cannot_be_spoilt() -> None:

@@ -21,6 +21,7 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.description import settings_of_table, table_of, with_value
 from rtradar.description.run_file import plain
+from rtradar.scene import Furniture, Scene, material
 from rtradar.settings import RunSettings
 from rtradar.system.registries import RADARS, scene_files
 
@@ -240,11 +241,14 @@ def test_own_materials_and_meshes_of_files_are_in_the_table(tmp_path: Path) -> N
 
 
 def test_a_mesh_made_in_python_cannot_be_run_again(tmp_path: Path) -> None:
-    box = rt.Object("box", trimesh.creation.box((0.5, 0.5, 0.5)), "wood", position_m=(1, 1, 1))
-    walk = rt.synthetic_motion("walk", duration_s=0.3)
-    rt.run([walk, box], RADAR, out=tmp_path / "run", **QUICK)
-    with pytest.raises(rt.InputError, match=r"lacks the mesh of object 'box'"):
-        _ = rt.Experiment.load(tmp_path / "run" / "run.toml").parts
+    made, walk = trimesh.creation.box((0.5, 0.5, 0.5)), rt.synthetic_motion("walk", duration_s=0.3)
+    box = rt.Object("box", made, "wood", position_m=(1, 1, 1))
+    stool = Furniture("stool", made, material("wood"), position_m=(1, 1, 0))
+    given: list[Any] = [([walk, box], {}), ([walk], {"scene": Scene(furniture=(stool,))})]
+    for name, (people, scene) in zip(("box", "stool"), given, strict=True):
+        rt.run(people, RADAR, out=tmp_path / name, **QUICK, **scene)
+        with pytest.raises(rt.InputError, match=rf"lacks the mesh of '{name}'"):
+            _ = rt.Experiment.load(tmp_path / name / "run.toml").parts
 
 
 def test_keys_lead_to_tables_and_lists_and_nowhere_else() -> None:

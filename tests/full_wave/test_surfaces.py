@@ -13,6 +13,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.full_wave import ClosedMesh, ConductingSurface
+from rtradar.full_wave.antennas import antenna_moments
 from rtradar.full_wave.surfaces import rules
 
 solves = pytest.mark.slow
@@ -152,3 +153,53 @@ def test_two_bodies_are_one_problem() -> None:
     alone = ConductingSurface(closed(one), frequency).scattering_length(tx, tx, "v")
     # What they send each other falls with the distance: here by 1/40.
     assert both.scattering_length(tx, tx, "v") == pytest.approx(2 * alone, rel=0.05)
+
+
+def dipole_by_derivatives(at: Any, position: Any, moment: Any, k: float) -> Any:
+    """Electric field of a dipole (I + grad grad / k^2) G m, over that of its carrier at the origin.
+
+    The derivatives are central differences, which need no closed form of the near field.
+    """
+    far, step = np.linalg.norm(position), 1e-4
+
+    def green(x: Any) -> Any:
+        distance = np.linalg.norm(x - position, axis=-1)
+        return far / distance * np.exp(-1j * k * (distance - far))
+
+    field = green(at)[..., None] * np.asarray(moment, dtype=complex)
+    for i, one in enumerate(step * np.eye(3)):
+        for j, other in enumerate(step * np.eye(3)):
+            signs = ((1, 1), (1, -1), (-1, 1), (-1, -1))
+            second = sum(a * b * green(at + a * one + b * other) for a, b in signs)
+            field[..., i] += moment[j] * second / (4 * step**2 * k**2)
+    return field
+
+
+def test_currents_meet_the_near_fields_of_the_dipoles() -> None:
+    """An antenna 0.1 m from the surface, at ka = 3; H by the curl of E, which is -j k H."""
+    surface = ConductingSurface(closed(ball(0)), frequency_of(3.0))
+    mesh, k = surface.mesh, 3.0 / RADIUS_M
+    antenna, rule = np.array([[0.2, 0.05, 0.03]]), rules(4)
+    moment = antenna_moments(antenna, "v")[0]
+    points = np.einsum("pc,tcx->tpx", rule.places, mesh.triangles.corners)
+
+    def electric(at: Any) -> Any:
+        return dipole_by_derivatives(at, antenna[0], moment, k)
+
+    step = 1e-3 * np.eye(3)
+    slopes = np.array([(electric(points + one) - electric(points - one)) / 2e-3 for one in step])
+    turned = [slopes[i - 2, ..., i - 1] - slopes[i - 1, ..., i - 2] for i in range(3)]
+    jump = np.cross(mesh.triangles.normals[:, None], 1j / k * np.stack(turned, axis=-1))
+    products = surface._products(antenna, "v")
+    for found, field in zip(
+        products, (electric(points), 0.8 * electric(points) + 0.2 * jump), strict=True
+    ):
+        expected = np.zeros(mesh.unknowns, dtype=complex)
+        for triangle, edges in enumerate(mesh.edge_of):
+            for corner, edge in enumerate(edges):
+                flow = points[triangle] - mesh.triangles.corners[triangle, corner]
+                flux = np.einsum("px,px,p->", flow, field[triangle], rule.weights)
+                size = mesh.triangles.scales[triangle, corner] * mesh.triangles.areas[triangle]
+                expected[edge] += size * flux
+        # What the differences leave.
+        assert np.abs(found[0] - expected).max() < 3e-4 * np.abs(expected).max()

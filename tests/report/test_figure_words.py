@@ -8,6 +8,7 @@ import math
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -138,6 +139,28 @@ EVERY: dict[str, Callable[[], None]] = {
     "transfer": lambda: evaluation.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
     "learning": lambda: evaluation.draw_learning(FILE, [HISTORY], NAME),
 }
+
+
+@pytest.mark.parametrize("reference", ["b", None])
+def test_compared_maps_are_in_one_unit_and_say_how_each_was_made(
+    drawn: list[Figure], reference: str | None
+) -> None:
+    # Twice the power, each below a maximum of its own; the first without clutter removal.
+    given: dict[str, Any] = {"title": "", "labels": ("", ""), "qualifier": "one channel"} | AXES
+    maps = {}
+    for name, made, power in (("a", "", 2 * POWER), ("b", "mean removed", POWER)):
+        unit = FieldUnit("dB re maximum", 1 / power.max())
+        maps[name] = ShownMap(level_db=unit.level(power), made=made, unit=unit, **given)
+    draw_maps(FILE, maps, "run", reference)
+    (first, second), label = drawn[0].axes[:2], drawn[0].axes[2].get_ylabel()
+    levels = [np.asarray(axes.images[0].get_array()) for axes in (first, second)]
+    apart_db = 0.0 if reference is None else 10 * np.log10(2)
+    # Maps are in float32.
+    np.testing.assert_allclose(levels[0] - levels[1], apart_db, atol=1e-5)
+    assert levels[1].max() == pytest.approx(0, abs=1e-9)
+    assert "dB re maximum" in label
+    assert "removed" not in first.get_title(loc="left")
+    assert "removed" in second.get_title(loc="left")
 
 
 def bars(figure: Figure) -> list[str]:

@@ -134,6 +134,15 @@ def test_files_of_the_first_format_have_one_person(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.person_speed, apart, rtol=1e-6)
 
 
+@pytest.mark.parametrize("field", ["window", "walls", "furniture_piece"])
+def test_files_of_the_first_format_have_all_that_it_had(tmp_path: Path, field: str) -> None:
+    first = replace(example(), part_names=np.array(["head", "left foot", "lower torso"]))
+    kept = {name: value for name, value in vars(first).items() if name != field}
+    np.savez_compressed(tmp_path / "view.npz", format=np.array(1), **kept)
+    with pytest.raises(rt.InputError, match="damaged"):
+        load_snapshots(tmp_path / "view.npz")
+
+
 @pytest.mark.parametrize(
     ("how", "said"),
     [

@@ -40,7 +40,7 @@ ANGLES = {"yaw_deg": 35.0, "pitch_deg": -12.0, "roll_deg": 20.0}
 PATH = {
     "path_times_s": (0.0, 0.06, 0.3),
     "path_m": ((0.0, 0.0, 0.0), (0.1, -0.05, 0.08), (0.3, 0.2, 0.1)),
-    "path_angles_deg": ((0.0, 0.0, 0.0), (20.0, -5.0, 3.0), (60.0, -20.0, 8.0)),
+    "path_angles_deg": ((0.0, 0.0, 0.0), (5.0, -2.0, 1.0), (25.0, -9.0, 5.0)),
 }
 CHIRPS = np.arange(400, 408)
 Pose = Callable[[Any], tuple[np.ndarray, np.ndarray]]

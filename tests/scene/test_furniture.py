@@ -55,6 +55,19 @@ def test_scale_and_units(own: Path) -> None:
     )
 
 
+def test_a_mesh_in_memory_is_in_metres() -> None:
+    box = trimesh.creation.box((1.0, 0.5, 0.2))
+    own = piece(mesh=box, position_m=(5, 6, 7), scale=2).triangles()
+    np.testing.assert_allclose(own.vertices, 2 * box.vertices + (5, 6, 7))
+    assert own.closed
+    assert piece(mesh=box).in_memory
+    assert not piece().in_memory
+    with pytest.raises(InputError, match="belong to a file of one's own"):
+        piece(mesh=box, metres_per_unit=1.0)
+    with pytest.raises(InputError, match="measures 200 m"):
+        piece(mesh=trimesh.creation.box((200.0, 1.0, 1.0))).triangles()
+
+
 def test_units_are_asked_for(own: Path) -> None:
     with pytest.raises(InputError, match="metres_per_unit is missing"):
         piece(mesh=own)

@@ -186,8 +186,10 @@ def test_no_mesh_from_elsewhere(tmp_path: Path, mesh: str) -> None:
         (MATERIAL.replace("felt", "glass"), ["'glass'", "ITU-R P.2040-3", "another"]),
         (MATERIAL.replace("a = 1.3", "a = 0.3"), ["'felt'", "1 or more"]),
         ("[materials]\nfelt = 3", ["materials.felt = 3", "[materials.felt]"]),
-        ("[radar]\nposition_m = [0, 0]", ["radar_position_m = [0, 0]", "3 numbers"]),
+        ("[radar]\nposition_m = [0, 0]", ["[radar] position_m = [0, 0]", "3 numbers"]),
         ("[radar]\nyaw = 3\nposition_m = [0, 0, 0]", ["[radar] unknown key 'yaw'"]),
+        ("[radar]", ["[radar] position_m is missing"]),
+        ("[person]\nposition_m = [0]", ["[person] position_m = [0]"]),
         ("person = []", ["person = []", "[person]"]),
     ],
 )

@@ -127,6 +127,24 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
     assert np.abs(got - still).max() > 0.003 * np.abs(still).max()
 
 
+def test_a_room_is_as_before_after_an_error(
+    clutter: Clutter, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chirps, shadow = np.arange(9, 200), ClutterShadow(clutter, Ball())
+    expected = RoomIf(RADAR, clutter.cycle(), shadow).clutter_if(chirps)
+    room, at, errors = RoomIf(RADAR, clutter.cycle(), shadow), shadow.at, [KeyboardInterrupt()]
+
+    def once_interrupted(keyframe: int) -> object:
+        if errors:
+            raise errors.pop()
+        return at(keyframe)
+
+    monkeypatch.setattr(shadow, "at", once_interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        room.clutter_if(chirps)
+    np.testing.assert_array_equal(room.clutter_if(chirps), expected)
+
+
 def test_what_was_begun_is_not_computed_again(
     clutter: Clutter, monkeypatch: pytest.MonkeyPatch
 ) -> None:

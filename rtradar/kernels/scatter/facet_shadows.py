@@ -1,9 +1,9 @@
-"""Fractions of facets that an antenna sees past other parts, exact at edges of shadows.
+"""What an antenna sees of facets past other parts, and where edges of shadows cut them.
 
 A tracer says which part occludes which vertex. Where it occludes some vertices of a facet and not
-others, the edge of the shadow runs through that facet, where what the rays to its vertices pass
-outside the occluding ellipsoids, in float64, is 0 as a linear function over the facet. So a shadow
-moves over the body without jumps.
+others, the edge of the shadow runs through that facet. The distance by which the ray to each vertex
+clears the occluding ellipsoids, in float64, is taken as linear over the facet; the edge is where it
+is 0. So a shadow moves over the body without jumps.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def _clearance(ball, vertex):
 
 @inlined()
 def _clearances(occluders, corner, antenna, part, pose, vertices, balls):
-    """How far outside of all occluders of some of its corners the ways to those of a facet pass.
+    """By how much the rays to the corners of a facet clear the parts that occlude any of these.
 
     ``balls (part, 5, 3)`` are from the part's axes to those in which another one is the unit ball,
     and the antenna in these; NaN where they are not known yet.

@@ -27,7 +27,7 @@ from rtradar.kernels.scatter.triangles import (
     FAST,
     SERIES,
     excess_paths,
-    steep_last,
+    large_last,
     sum_large,
     sum_small,
 )
@@ -39,19 +39,17 @@ class Facets(NamedTuple):
     """Triangles of one or more parts, one part after the other; each in its own axes.
 
     ``vertices (vertex, 3)`` float64 [m]; ``faces (facet, 3)`` int32, anticlockwise seen from
-    outside; ``normals (facet, 3)``, outward, and ``planes (facet,)`` how far along these they lie
-    [m]; ``areas (facet,)`` [m^2]. ``bend (facet,)`` is how far
+    outside; ``normals (facet, 3)``, outward; ``areas (facet,)`` [m^2]. ``bend (facet,)`` is how far
     n.s swings to either side of its mean over the curved surface that a facet represents, 0 where
     it is flat: the terminator is softened over it. ``rise (facet,)`` is how far that surface stands
-    out of the facet in the mean [m]. ``ends (part + 1, 2)`` int64 are the first
-    vertex and the first facet of each part, and the numbers of all. With ``both_sides`` they are a
-    thin sheet, lit from either side.
+    out of the facet in the mean [m]. ``ends (part + 1, 2)`` int64 are the first vertex and the
+    first facet of each part, and last the numbers of all. With ``both_sides`` they are a thin
+    sheet, lit from either side.
     """
 
     vertices: Array
     faces: NDArray[np.int32]
     normals: Array
-    planes: Array
     areas: Array
     bend: Array
     rise: Array
@@ -99,7 +97,8 @@ class Waves(NamedTuple):
 class _Chosen(NamedTuple):
     """Facets (n,) that may be lit: ``corners (3, n)``, normals and planes ``facing (4, n)``.
 
-    ``facet (n,)`` is which of those that are seen, ``corners`` are numbers of vertices of the part.
+    ``facet (n,)`` is the column of each in `Views.seen`, ``corners`` are numbers of vertices of the
+    part.
     """
 
     facet: NDArray[np.uint32]
@@ -150,12 +149,15 @@ def _choose(facets, own, antennas, row, start, seen, x, y, z):
     """Facets of a part that may be lit; its vertices' coordinates are filled in."""
     (first, begin), (last, end) = facets.ends[own], facets.ends[own + 1]
     vertices, faces = facets.vertices[first:last], facets.faces[begin:end]
-    normals, planes = facets.normals[begin:end], facets.planes[begin:end]
-    every_bend = facets.bend[begin:end]
+    normals, every_bend = facets.normals[begin:end], facets.bend[begin:end]
     n_facets, size = len(faces), 0.0
     for i in range(len(vertices)):
         x[i], y[i], z[i] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
+    planes = np.empty(n_facets)
+    for f in range(n_facets):
+        i = faces[f, 0] - first
+        planes[f] = normals[f, 0] * x[i] + normals[f, 1] * y[i] + normals[f, 2] * z[i]
     lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
     reach = math.sqrt(size)
     count = _may_be_lit(antennas, planes, normals, every_bend, both, reach, seen, row, start, lit)
@@ -239,10 +241,10 @@ def _light(tx, rx, chosen, far_t, far_r, carrier, spreading, terms):
 
 @inlined()
 def _cut(tx, rx, tx_edge, rx_edge, facet, terms):
-    """Put the triangles that are lit in the place of facets on the edge of a shadow.
+    """Replace each facet on the edge of a shadow by its lit piece; return the number of terms.
 
-    Those of which a corner is not lit become themselves, less that corner, which comes after all
-    ``facet (n,)``. Returned is how many terms there are.
+    The edge cuts a triangle off. If that is lit, it takes the place of the facet; if not, the whole
+    facet stays, and the triangle is appended to the ``terms`` with a negative strength.
     """
     mean, u, v, strength = terms
     count = len(facet)
@@ -308,11 +310,11 @@ def integrate(begin, end, facets, views, waves, out):
                 pieces = _cut(view[t], view[r], tx_edge, rx_edge, chosen.facet, rows)
             mean, u, v = rows[0, :pieces], rows[1, :pieces], rows[2, :pieces]
             strength = rows[3, :pieces]
-            calm = steep_last(mean, u, v, strength, SERIES / waves.wavenumber[task].max() ** 2)
+            small = large_last(mean, u, v, strength, SERIES / waves.wavenumber[task].max() ** 2)
             for node in range(waves.wavenumber.shape[1]):
                 k = waves.wavenumber[task, node]
-                total = sum_small(mean[:calm], u[:calm], v[:calm], strength[:calm], k)
-                total += sum_large(mean[calm:], u[calm:], v[calm:], strength[calm:], k)
+                total = sum_small(mean[:small], u[:small], v[:small], strength[:small], k)
+                total += sum_large(mean[small:], u[small:], v[small:], strength[small:], k)
                 out[task, pair, node] = total * complex(0.0, k / math.sqrt(math.pi))
 
 

@@ -139,20 +139,20 @@ def sum_large(mean, u, v, strength, k):
 
 
 @inlined()
-def steep_last(mean, u, v, strength, limit):
-    """Put terms whose p, for k = 1, exceeds the limit after the others; return how many these are.
+def large_last(mean, u, v, strength, limit):
+    """Put terms whose p, for k = 1, exceeds the limit after all others, in place.
 
-    In place: terms are added up, in any order.
+    Returned is the number of the others.
     """
-    calm = 0
+    small = 0
     for i in range(len(mean)):
         if u[i] * u[i] + u[i] * v[i] + v[i] * v[i] <= limit:
-            mean[calm], mean[i] = mean[i], mean[calm]
-            u[calm], u[i] = u[i], u[calm]
-            v[calm], v[i] = v[i], v[calm]
-            strength[calm], strength[i] = strength[i], strength[calm]
-            calm += 1
-    return calm
+            mean[small], mean[i] = mean[i], mean[small]
+            u[small], u[i] = u[i], u[small]
+            v[small], v[i] = v[i], v[small]
+            strength[small], strength[i] = strength[i], strength[small]
+            small += 1
+    return small
 
 
 _STEEP = 1e-9

@@ -155,7 +155,7 @@ def read_result(folder: Path) -> Result:
         points = _sound("points", read_arrays(path)["points"], {}, "f8", ("point", 3))
         path = folder / "cloud_xyz.npz"
         arrays, sizes = read_arrays(path), dict[str, int]()
-        columns = [_sound("places", arrays["points"], sizes, "f8", ("point", 3))]
+        columns = [_sound("points", arrays["points"], sizes, "f8", ("point", 3), True)]
         kinds = {"velocity": "f8", "power": "f8", "time": "f8", "source": "i8"}
         columns += [
             _sound(name, arrays[name], sizes, kind, ("point",))
@@ -163,7 +163,7 @@ def read_result(folder: Path) -> Result:
             if name in arrays or name != "source"
         ]
         return Result(points, SpatialCloud(*columns), summary, radar, out=folder)
-    except (InputError, *DAMAGE) as error:
+    except DAMAGE as error:
         raise refused(path, error) from None
 
 

@@ -238,6 +238,7 @@ def _returns(
     groups = FacetGroups(places[:, 3], radar)
     chains = [PathGroups(places, radar, order) for order in range(2, bounces + 1)]
     nodes = sweep_nodes(radar, FURNITURE_NODES)
+    k = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
 
     def shot(tx: Array, rx: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
@@ -254,7 +255,7 @@ def _returns(
                 group = groups.of(footprints.places[:, 3])
             visible = exits(surfaces, footprints, rx)
             turn, lit = _reflected(footprints, piece.material, radar.centre_frequency_hz)
-            lit, k = replace(lit, surface=group), 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
+            lit = replace(lit, surface=group)
             own = radiate(lit, visible, rx, k, lengths[-1], polarization=polarization)
             sums.append(turn * own)
         return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,8 +151,11 @@ def delayed(
     return room_series(walls, radar, most_nodes=most_nodes, enough=ENOUGH, bounces=1).walls
 
 
-_Leg = tuple[Wave, Field]
-"""A wave on the way to points, and what is left of its field (node, tx or rx, echo)."""
+class _Leg(NamedTuple):
+    """A wave on the way to points, and what is left of its field (node, tx or rx, echo)."""
+
+    wave: Wave
+    left: Field
 
 
 def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
@@ -217,18 +220,18 @@ def _transmitted(
         directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
         sent = antenna_field(directions, polarization, x_for_steep=True)
         waves = walls.transmitted(0, walls.start(sent), antennas[:, None], points)
-        return [(wave, (wave.field * sent).sum(axis=-1).conj()) for wave in waves]
+        return [_Leg(wave, (wave.field * sent).sum(axis=-1).conj()) for wave in waves]
 
     groups: dict[tuple[tuple[int, int], ...], list[tuple[_Leg, _Leg]]] = {}
     for out, back in product(legs(radar.tx), legs(radar.rx)):
         passes = Counter[int]()
-        for one in (*out[0].passages, *back[0].passages):
+        for one in (*out.wave.passages, *back.wave.passages):
             passes[one.wall] += one.passes
         groups.setdefault(tuple(sorted(passes.items())), []).append((out, back))
     # A bound of each echo, for most are not worth what they hold in memory.
     strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
     bounds = [
-        sum(np.prod([np.abs(left).max(axis=(0, 1)) for _, left in pair], axis=0) for pair in pairs)
+        sum(np.prod([np.abs(leg.left).max(axis=(0, 1)) for leg in pair], axis=0) for pair in pairs)
         * strength
         for pairs in groups.values()
     ]
@@ -236,7 +239,7 @@ def _transmitted(
     for pairs, size, some in zip(groups.values(), sizes, _worth(sizes), strict=True):
         if some.any():
             parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
-            passed = (one for pair in pairs for wave, _ in pair for one in wave.passages)
+            passed = (one for pair in pairs for leg in pair for one in leg.wave.passages)
             if not all(series[one.wall].held[1] for one in passed):
                 off = max(off, float(size.max()))
     return parts, off
@@ -250,25 +253,23 @@ def _together(
     What each is longer is in its amplitude.
     """
 
-    def longer(pair: tuple[_Leg, _Leg]) -> Array:
-        (out, _), (back, _) = pair
-        return out.extra_m[:, None, some] + back.extra_m[kept][..., some]
+    def longer(out: _Leg, back: _Leg) -> Array:
+        return out.wave.extra_m[:, None, some] + back.wave.extra_m[kept][..., some]
 
-    def left(pair: tuple[_Leg, _Leg], node: int) -> Field:
-        (_, out), (_, back) = pair
-        return out[node][:, None, some] * back[node][kept][..., some]
+    def left(out: _Leg, back: _Leg, node: int) -> Field:
+        return out.left[node][:, None, some] * back.left[node][kept][..., some]
 
     # Pair by pair and node by node, which takes less memory.
     middle, total, weighted = len(returns.frequency) // 2, np.zeros(1), np.zeros(1)
     for pair in pairs:
-        size = np.abs(left(pair, middle))
-        total, weighted = total + size, weighted + size * longer(pair)
+        size = np.abs(left(*pair, middle))
+        total, weighted = total + size, weighted + size * longer(*pair)
     mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
     amplitude = np.zeros_like(returns.amplitude)
     for node, wavenumber in enumerate(2 * np.pi * returns.frequency / SPEED_OF_LIGHT_MPS):
         for pair in pairs:
-            turn = np.exp(1j * wavenumber * (longer(pair) - mean))
-            amplitude[node] += turn * left(pair, node)
+            turn = np.exp(1j * wavenumber * (longer(*pair) - mean))
+            amplitude[node] += turn * left(*pair, node)
     amplitude *= returns.amplitude
     return replace(returns, length=returns.length + mean, amplitude=amplitude)
 

@@ -291,9 +291,12 @@ class ClutterItem:
 
 def _meshes(scene: Scene) -> bytes:
     """Hash the triangles of furniture, whose files may change."""
-    shapes = [piece.triangles() for piece in scene.furniture]
-    arrays = b"".join(one.vertices.tobytes() + one.faces.tobytes() for one in shapes)
-    return hashlib.sha256(arrays).digest()
+    digest = hashlib.sha256()
+    for piece in scene.furniture:
+        triangles = piece.triangles()
+        digest.update(np.ascontiguousarray(triangles.vertices).data)
+        digest.update(np.ascontiguousarray(triangles.faces).data)
+    return digest.digest()
 
 
 @lru_cache(maxsize=KEPT_ROOMS)

@@ -81,7 +81,7 @@ class ArrayEnds:
 
     A line is a line of Tx with the Rx that are kept with it; ``line_of_tx (tx,)`` is that of each
     Tx. ``tx (line, tx_end, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m], two for each line of
-    Rx, and of the Tx two or more places; ``tx_middle`` and ``rx_middle (line, 3)`` are mean
+    Rx, and of the Tx as many places as asked; ``tx_middle`` and ``rx_middle (line, 3)`` are mean
     positions [m]. ``tx_weight (tx, tx_end)`` and ``rx_weight (tx, rx, rx_end)`` are the weights of
     the ends in each Tx and each Rx kept with it.
     """

@@ -33,8 +33,11 @@ _NORMAL_INCIDENCE = 1e-9
 
 def unit(vectors: Array) -> Array:
     """Return unit vectors (..., 3); 0 for no direction."""
-    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(np.where(size > 1e-12, vectors / np.where(size > 1e-12, size, 1.0), 0.0))
+    # NumPy adds along an axis of three a tenth as quickly.
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    size = np.sqrt(x * x + y * y + z * z)
+    scale = np.where(size > 1e-12, 1 / np.maximum(size, 1e-12), 0.0)
+    return np.asarray(vectors * scale[..., None])
 
 
 class Polarization(NamedTuple):

@@ -36,8 +36,9 @@ class BuiltInModel:
     """Whether the model traces rays, so that parts of the body occlude each other."""
 
     fast_over_walls: bool = False
-    """Whether one model serves all paths of a room: by one formula, ``conductor_echo``, or with one
-    echo a part, over specular points; else each path has one before images of the antennas."""
+    """Whether one model serves all paths of a room: by one formula, ``conductor_echo``, or if it is
+    built in with one echo a part, over specular points; else each path has one before images of the
+    antennas."""
 
     accepts_meshes: ClassVar[bool] = False
     """Whether the model takes meshes as well as ellipsoids, as people and as targets of

@@ -20,6 +20,7 @@ from rtradar.scatter.facets.radiation import (
     Seen,
     as_amplitude,
     body_facets,
+    check_count,
     directions_apart,
     ellipsoid_facets,
     radiated,
@@ -63,9 +64,8 @@ class FacetShadows:
     ) -> Seen:
         """What antennas (antenna, 3) see of the facets of some parts (n,) past the others.
 
-        ``centres (part, 3)`` and ``frames
-        (part, 3, 3)`` are the pose of the whole body, world [m]. Facets that face an antenna away,
-        by a cosine of more than ``apart``, are not looked at.
+        ``centres (part, 3)`` and ``frames (part, 3, 3)`` are the pose of the whole body, world [m].
+        Facets that face an antenna away, by a cosine of more than ``apart``, are not looked at.
         """
         facets = self.facets
         first = np.cumsum([0, *np.diff(facets.ends[:, 1])[parts]])
@@ -89,7 +89,7 @@ class FacetShadows:
 class FacetBody:
     """The facets of a moving body, which several models share.
 
-    ``facets`` are the least numbers of the parts, None for `body_facets`; ``nodes`` the number of
+    ``facets`` is the least number per part, None for `body_facets`; ``nodes`` the number of
     frequencies over the sweep, ``frequency (node,)`` [Hz]; ``variant`` the backend in use.
     """
 
@@ -100,17 +100,21 @@ class FacetBody:
         *,
         variant: str,
         spreading: bool,
-        facets: Indices | int | None,
+        facets: int | None,
         nodes: int,
     ) -> None:
         self._radar, self._body, self._spreading = radar, body, spreading
+        counts: Indices | int
         if facets is None:
             wavenumber = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
-            facets = body_facets(body.semi_axes, wavenumber)
+            counts = body_facets(body.semi_axes, wavenumber)
+        else:
+            check_count(facets)
+            counts = facets
         self.frequency = sweep_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind
-        self._shadows = FacetShadows(backend, body.semi_axes, facets)
+        self._shadows = FacetShadows(backend, body.semi_axes, counts)
 
     def carriers(self, at: Geometry | ChirpPoses) -> tuple[Array, Array]:
         """Path [m] and strength of each part (chirp, rx, part) by its specular point.

@@ -195,14 +195,12 @@ class SkinFacets:
         normals, areas = facet_normals(own, faces)
         # The current does not fall to nothing at the edge of the lit side.
         bend = smooth_bend(own, faces) if wide else np.zeros_like(areas)
-        planes = np.sum(normals * own[faces[:, 0]], axis=1)
-        facets = Facets(own, faces, normals, planes, areas, bend, np.zeros_like(areas), ends)
-        own_axes = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
+        facets = Facets(own, faces, normals, areas, bend, np.zeros_like(areas), ends)
+        unturned = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
         links = Links(antennas[None], pairs, length[None], *given, shadow=False)
         lit = Seen(np.array([piece.facets.start for piece in pieces]), seen)
-        return as_amplitude(radiated(facets, np.arange(len(parts)), own_axes, links, lit, index))[
-            :, 0
-        ]
+        field = radiated(facets, np.arange(len(parts)), unturned, links, lit, index)
+        return as_amplitude(field)[:, 0]
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""

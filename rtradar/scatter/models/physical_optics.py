@@ -83,7 +83,7 @@ class PhysicalOptics(TwoBounceModel):
     ----------
     facets : int, optional
         Least number per ellipsoid, 20 to 1 310 720; None: by wavelength and size, 1280 to 4500 at
-        12 GHz and 8000 to 21 000 at 77 GHz. A mesh is always divided by the wavelength.
+        12 to 16 GHz and 7000 to 22 000 at 77 to 81 GHz. A mesh is always divided by the wavelength.
     anchor_s : float
         Time between keyframes [s], above 0; where the echo bends it comes down to an eighth of it.
     tolerance : float
@@ -188,8 +188,8 @@ class Reference(BuiltInModel):
     Parameters
     ----------
     facets : int, optional
-        Least number per part, 20 to 1 310 720; None: by wavelength and size, 1280 to 4500 at 12 GHz
-        and 8000 to 21 000 at 77 GHz. A mesh is always divided by the wavelength.
+        Least number per part, 20 to 1 310 720; None: by wavelength and size, 1280 to 4500 at 12 to
+        16 GHz and 7000 to 22 000 at 77 to 81 GHz. A mesh is always divided by the wavelength.
     """
 
     accepts_meshes = True

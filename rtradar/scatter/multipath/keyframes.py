@@ -3,8 +3,9 @@
 A leg carries the field of its antenna as a vector, over and through walls by the coefficients of
 their slabs, to the specular point on the body. Both legs begin at their antennas: by reciprocity a
 receiver receives what it would send. Specular points are those for the middles of the lines of
-antennas, legs run from the ends of the lines. A slab that delays makes several waves of one, each
-with its own delay: an echo has a column for each pair of those of its legs.
+antennas. Legs run from the ends of the lines, in free space from every Tx. A slab that delays makes
+several waves of one, each with its own delay: an echo has a column for each pair of those of its
+legs.
 
 Keyframes are computed many at a time, kept, and found again.
 """
@@ -12,12 +13,14 @@ Keyframes are computed many at a time, kept, and found again.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Sequence
 from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
@@ -347,13 +350,27 @@ _KEPT_BYTES = 64e6
 
 _KEYFRAMES_AT_ONCE = 32
 
+_KEYFRAMES_RAD = math.radians(3.0)
+"""Most that a radar turns from one keyframe to the next [rad], for the sake of its patterns."""
+
+
+def _turning(radar: Radar, duration_s: float) -> float:
+    """Largest rate at which a radar turns [rad/s]."""
+    if not radar.is_moving:
+        return 0.0
+    axes = radar.poses_at(np.arange(0.0, duration_s + KEYFRAMES_S, KEYFRAMES_S))[0]
+    turns = Rotation.from_matrix(np.swapaxes(axes[:-1], 1, 2) @ axes[1:])
+    return float(turns.magnitude().max(initial=0.0)) / KEYFRAMES_S
+
 
 class RoomKeyframes:
     """Keyframes of the echoes of a ``body``, in their ``columns``, every ``step`` chirps."""
 
     def __init__(self, around: Surroundings, columns: EchoColumns, body: Body) -> None:
         self._around, self.columns, self._body = around, columns, body
-        self.step = keyframe_step(around.radar, KEYFRAMES_S)
+        turning = _turning(around.radar, body.duration_s)
+        apart_s = min(KEYFRAMES_S, _KEYFRAMES_RAD / max(turning, 1e-9))
+        self.step = keyframe_step(around.radar, apart_s)
         self._cache: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
 
     def direct(self) -> RoomKeyframes:
@@ -379,13 +396,10 @@ class RoomKeyframes:
         stops = starts + (np.bincount(interval, weights=fraction) > 0)
         known, ends = self._find(np.union1d(starts, stops).tolist()), self._around.ends
         line, weight = ends.line_of_tx[tx], ends.tx_weight[tx]
-        factors, points, wanted = (
-            [],
-            [],
-            np.zeros((len(chirps), len(self.columns.path)), dtype=bool),
-        )
-        for numbers in (starts, stops):
-            own = [known[number] for number in numbers.tolist()]
+        factors, points = list[PathFactors](), list[Array]()
+        wanted = np.zeros((len(chirps), len(self.columns.path)), dtype=bool)
+        for of_end in (starts, stops):
+            own = [known[number] for number in of_end.tolist()]
             factor = np.stack([_widened(one.factor, len(self.columns)) for one in own])
             seen, start = (np.stack(arrays) for arrays in list(zip(*own, strict=True))[1:])
             # Whole arrays, or Numba would compile the same for another layout.

@@ -54,7 +54,6 @@ from rtradar.trace.occluders import Occluders
 from rtradar.trace.tracers import BodyTracer
 
 Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 FIELD_ERROR = 0.02
 """Largest error of the field of an echo over or through a wall, over the sweep, without a limit."""
@@ -113,7 +112,6 @@ class RoomModel:
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
         room, occluders = None, None
-        self.in_free_space = scene.is_empty
         self.person: EchoModel = self
         if not scene.is_empty:
             self.person = in_free_space(lambda _: conductor, radar, body, materials)

@@ -12,6 +12,7 @@ from references.cases import Pair, filled, kernel_case, samples
 from rtradar.kernels.receiver import (
     add_ramps,
     add_still,
+    convert,
     high_pass,
     mirror,
     turn_by_noise,
@@ -81,6 +82,22 @@ def high_pass_reference(corners, given):
 @kernel_case(high_pass, 2e-6)
 def _high_pass() -> Pair:
     return _in_place(high_pass, high_pass_reference, np.array([0.05, 0.2], np.float32))
+
+
+def convert_reference(dc, step, limit, given):
+    """`convert` of what is given."""
+    parts = np.stack([(given + dc).real, (given + dc).imag])
+    if step > 0:
+        parts = step * np.floor(parts / step + 0.5)
+    parts = np.clip(parts, -limit, limit - step)
+    return parts[0] + 1j * parts[1]
+
+
+@kernel_case(convert, 0)
+def _convert() -> Pair:
+    # A power of two, so that steps are the same numbers in both.
+    given = np.complex64(0.25 - 0.125j), np.float32(2.0**-4), np.float32(2)
+    return _in_place(convert, convert_reference, *given)
 
 
 def add_ramps_reference(starts, frequency, tx, slope, rate, ramps, steering, shape):

@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
+from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Views, Waves
+from rtradar.kernels.scatter.triangles import positive_fraction
+from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import Polarization, copolar
 from rtradar.scatter.facets.radiation import (
     body_facets,
@@ -65,16 +68,19 @@ def directions(rng: np.random.Generator, n: int) -> Array:
 # -- one facet -------------------------------------------------------------------------------------
 
 
-def mean_over_triangle(phases: Array, cells: int = 400) -> complex:
+def mean_over_triangle(phases: Array, lit: Array | None = None, cells: int = 400) -> complex:
     """Mean of exp(j phase), phase linear between its three corner values, by the midpoints of small
-    triangles."""
+    triangles; 0 where a function that is linear, too, is not positive, if its corner values are
+    given."""
     i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
     up, down = i + j < cells, i + j < cells - 1
     u = np.concatenate([(i[up] + 1 / 3) / cells, (i[down] + 2 / 3) / cells])
     v = np.concatenate([(j[up] + 1 / 3) / cells, (j[down] + 2 / 3) / cells])
-    return complex(
-        np.exp(1j * (phases[0] + (phases[1] - phases[0]) * u + (phases[2] - phases[0]) * v)).mean()
+    phase, kept = (
+        own[0] + (own[1] - own[0]) * u + (own[2] - own[0]) * v
+        for own in (phases, np.ones(3) if lit is None else lit)
     )
+    return complex((np.exp(1j * phase) * (kept > 0)).mean())
 
 
 @settings(max_examples=40)
@@ -104,6 +110,31 @@ def test_linear_phase_is_integrated_exactly(seed: int, size: float) -> None:
     # rounding.
     scale = k / np.sqrt(np.pi) * facing * facets.areas[0]
     assert abs(got - expected) < 1e-3 * scale
+
+
+@settings(max_examples=40)
+@given(seeds, st.floats(-1, 1))
+def test_of_a_facet_that_an_edge_cuts_the_lit_piece_is_integrated_exactly(
+    seed: int, size: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    corners, edge = rng.normal(size=(3, 3)), rng.normal(size=3)
+    facets = mesh_facets(corners, np.array([[0, 1, 2]]), both_sides=True)
+    antenna = 1e9 * directions(rng, 1)[0]
+    path = 2 * (np.linalg.norm(corners - antenna, axis=1) - np.linalg.norm(antenna))
+    k = 10**size / np.ptp(path)
+    # Lit by the Tx as the edge says, and in whole by the Rx.
+    edges = np.stack([edge, np.ones(3)]).astype(np.float32)[:, None]
+    seen = np.array([[positive_fraction(*edge)], [1.0]], dtype=np.float32)
+    pair, each = np.array([[0, 1]]), np.zeros(1, dtype=int)
+    views = Views(each, np.array([[antenna, antenna]]), pair, each, seen, edges)
+    carrier = np.array([[2 * np.linalg.norm(antenna)]])
+    waves = Waves(pair, carrier, np.array([[k]]), spreading=False)
+    got = facet_integral(facets, views, waves)[0, 0, 0]
+    scale = k / np.sqrt(np.pi) * facets.areas[0]
+    scale *= abs(facets.normals[0] @ antenna) / np.linalg.norm(antenna)
+    # By many points, of which an edge takes half a row at the most.
+    assert abs(got - 1j * scale * mean_over_triangle(-k * path, edge)) < 4e-3 * scale
 
 
 @settings(max_examples=20)
@@ -322,6 +353,14 @@ def test_facets_must_be_a_count(facets: object) -> None:
         field(ellipsoid(0.1, 0.1, 0.1), np.ones(3), np.ones(3), 1e9, facets=facets)
 
 
+@pytest.mark.parametrize("level", ["physical-optics", "reference"])
+@pytest.mark.parametrize("facets", [0, 19, 2.5, True, 10**9, "many"])
+def test_facets_of_a_level_must_be_a_count(level: str, facets: object) -> None:
+    body = Body.from_motion(rt.synthetic_motion("walk", duration_s=0.1))
+    with pytest.raises(InputError, match=r"facets = .* whole number from 20"):
+        build_model(level, rt.Radar.preset("iwr6843"), body, facets=facets)
+
+
 def test_parts_have_at_least_the_facets_that_they_are_asked_for() -> None:
     facets = ellipsoid_facets(np.ones((5, 3)), np.array([20, 21, 80, 5120, 5121]))
     assert np.diff(facets.ends[:, 1]).tolist() == [20, 80, 80, 5120, 5780]
@@ -332,7 +371,8 @@ def test_parts_have_at_least_the_facets_that_they_are_asked_for() -> None:
 def test_a_sphere_of_the_facets_of_a_body_has_the_closed_form(ka: float) -> None:
     frequency = ka * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
     tx = 1e6 * directions(np.random.default_rng(1), 4)
-    (facets,) = body_facets(np.full((1, 3), 0.1), frequency).tolist()
+    (facets,) = body_facets(np.full((1, 3), 0.1), ka / 0.1).tolist()
+    assert facets == max(1280, 100 * ka)
     found = field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency, facets=facets)
     decibel = 20 * np.log10(np.abs(found / rt.rcs.sphere(0.1, frequency, "po")))
     # A sag of 0.1 rad, at which the terminator is not smooth any more.
