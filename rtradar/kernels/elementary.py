@@ -17,13 +17,13 @@ from rtradar.kernels.jit import compiled, inlined
 
 @inlined(fastmath={"contract"})
 def dot(a, b):
-    """Product of two vectors."""
+    """Scalar product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined(fastmath={"contract"})
 def cross(a, b):
-    """Vector across both, as long as their parallelogram is large."""
+    """Cross product of two vectors."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -41,7 +41,7 @@ def minus(a, b):
 
 @inlined(fastmath={"contract"})
 def scaled(a, factor):
-    """A vector times a number."""
+    """Product of a vector and a number."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
@@ -53,20 +53,20 @@ def stretched(a, b):
 
 @inlined(fastmath={"contract"})
 def with_length(a):
-    """Unit vector, and the length of the vector; 0 has no direction and stays 0."""
+    """Unit vector along a vector, and its length; the zero vector has no direction and stays 0."""
     size = math.sqrt(dot(a, a))
     return scaled(a, 1 / size if size > 0 else 0.0), size
 
 
 @inlined(fastmath={"contract"})
 def turned(matrix, a):
-    """A matrix (3, 3) times a vector: from the axes of its columns to where they are given."""
+    """Product of a matrix (3, 3) and a vector: from the axes in its columns outward."""
     return dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a)
 
 
 @inlined(fastmath={"contract"})
 def turned_back(matrix, a):
-    """The transposed matrix times a vector: into the axes of its columns."""
+    """Product of the transposed matrix and a vector: into the axes in its columns."""
     return (
         matrix[0, 0] * a[0] + matrix[1, 0] * a[1] + matrix[2, 0] * a[2],
         matrix[0, 1] * a[0] + matrix[1, 1] * a[1] + matrix[2, 1] * a[2],
@@ -76,7 +76,7 @@ def turned_back(matrix, a):
 
 @inlined()
 def least_axis(a):
-    """Unit vector of the coordinate axis that a vector is the least along, the first of these."""
+    """Unit vector of the coordinate axis along which a vector is least, the first of equal ones."""
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
     first = x <= y and x <= z
     second = not first and y <= z
@@ -87,11 +87,12 @@ def least_axis(a):
 
 
 def _series(first, terms, kind):
-    """Coefficients of sin(x) / x (``first`` 1) or cos(x) (0) in powers of x^2, |x| to pi / 2.
+    """Coefficients of sin(x) / x (``first`` 1) or cos(x) (0) in powers of x^2, |x| up to pi / 2.
 
     The first two are Taylor's, so that sines of small angles are exact. The rest is the polynomial
     through the Chebyshev nodes, which needs fewer terms.
     """
+    # Taylor's coefficients in powers of x^2.
     taylor = [(-1) ** n / math.factorial(2 * n + first) for n in range(16)]
     rest = Chebyshev.interpolate(Polynomial(taylor[2:]), terms - 3, (0, math.pi**2 / 4))
     return tuple(kind(value) for value in (*taylor[:2], *rest.convert(kind=Polynomial).coef))
@@ -112,9 +113,11 @@ def horner(x, coefficients):
 
 @inlined(fastmath={"contract"})
 def _turned(turns, pi, sines, cosines):
-    """Cosine and sine by those of half the angle: no quadrants, no branches."""
+    """Cosine and sine from those of half the angle, so that no quadrant needs a branch."""
+    # Whole turns do not matter. Half of what is left is within pi / 2, where both series hold.
     half = pi * (turns - np.rint(turns))
     x = half * half
+    # Then the angle is doubled.
     sine, cosine = half * horner(x, sines), horner(x, cosines)
     return cosine * cosine - sine * sine, (sine + sine) * cosine
 
@@ -140,6 +143,7 @@ def fast_phasor(angle):
 @inlined(fastmath={"contract"})
 def sine(angle):
     """Sine of an angle [rad], within 1e-15 of itself where it is small."""
+    # Half turns are taken out; each of them changes the sign.
     halves = np.rint(angle * (1 / math.pi))
     rest = angle - halves * math.pi
     return rest * horner(rest * rest, SINE) * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
@@ -156,7 +160,7 @@ def smoothstep(fraction):
 
 @inlined()
 def hermite_weights(fraction, width):
-    """Weights of both values, then of both slopes, in the cubic through an interval of a width."""
+    """Weights of both values, then of both slopes, in the cubic over an interval of a width."""
     x, y = fraction, 1 - fraction
     return y * y * (1 + 2 * x), smoothstep(x), x * y * y * width, -x * x * y * width
 
@@ -165,8 +169,8 @@ def hermite_weights(fraction, width):
 def add_blended(tx, weights, keyframes, whole, out):
     """Add what is at rest, less a blend of four keyframes, to ``out (chirp, value)`` complex64.
 
-    Of ``whole (tx, value)`` complex64 is taken off the sum over keyframes of ``weights (chirp,
-    keyframe)`` float32 times ``keyframes (keyframe, tx, value)``; ``tx (chirp,)`` transmits.
+    The sum over keyframes of ``weights (chirp, keyframe)`` float32 times ``keyframes (keyframe, tx,
+    value)`` is subtracted from ``whole (tx, value)`` complex64; ``tx (chirp,)`` transmits.
     """
     for chirp in range(len(tx)):
         own, kept = out[chirp], whole[tx[chirp]]
@@ -180,9 +184,10 @@ def add_blended(tx, weights, keyframes, whole, out):
 def cubic_weights(fraction):
     """Weights (chirp, 4) of keyframes before, at, after and past an interval's ``fraction``.
 
-    They are those of the cubic through the middle two, with the slopes of the chords beside them
-    (Catmull and Rom, 1974): no keyframe makes a kink.
+    They are those of the cubic through the middle two, whose slopes there are those of the chords
+    between both neighbours (Catmull and Rom, 1974): no keyframe makes a kink.
     """
+    # For each keyframe the coefficients of the powers 0 to 3 of the fraction.
     f = np.asarray(fraction)[:, None]
     rows = ((0, -0.5, 1, -0.5), (1, 0, -2.5, 1.5), (0, 0.5, 2, -1.5), (0, 0, -0.5, 0.5))
     return np.concatenate([a + f * (b + f * (c + f * d)) for a, b, c, d in rows], axis=1)

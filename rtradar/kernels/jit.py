@@ -39,11 +39,11 @@ _tables: defaultdict[frozenset[str], dict[Any, Any]] = defaultdict(dict)
 
 
 class _Compiler(Compiler):
-    """Numba's compiler with tables of our own for what functions use of Numba's.
+    """Numba's compiler, with tables of our own for the functions of Numba that our code calls.
 
-    Products of complex numbers, for one, are functions. Numba looks for them by name and types but
-    not by ``fastmath``, in one table of the process: how ours round would depend on who came first,
-    and how others' do on ours. Here each ``fastmath`` has a table.
+    The product of two complex numbers, for one, is such a function. Numba keeps them in one table
+    of the process, by name and types but not by ``fastmath``: how our products round would depend
+    on who compiled first, and those of other packages on ours. Here each ``fastmath`` has a table.
     """
 
     def __init__(self, typing: Any, target: Any, *given: Any) -> None:
@@ -52,7 +52,7 @@ class _Compiler(Compiler):
         super().__init__(typing, own, *given)  # type: ignore[no-untyped-call]
 
 
-# Nobody calls ours from C: without the wrapper for that, compiling takes a tenth less.
+# Nobody calls these functions from C. Without the wrapper for that, compiling takes a tenth less.
 _OPTIONS: Any = {"error_model": "numpy", "pipeline_class": _Compiler, "no_cfunc_wrapper": True}
 
 
@@ -60,9 +60,9 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
     """Compile a function that Python calls.
 
     It lets other threads run and divides by zero as NumPy does. Code of rtradar's own functions is
-    kept on disk; where that cannot be, a `CacheWarning` says so once. The time of compiling and
-    loading is that of `warming_up`. ``fastmath`` are the liberties that LLVM may take with floating
-    point: all of them, or those named.
+    kept on disk; where that is impossible, a `CacheWarning` says so once. The time of compiling and
+    loading is counted by `warming_up`. ``fastmath`` names the liberties that LLVM may take with
+    floating point; True allows all of them.
     """
     numba_decorator: Callable[[_Function], Any] = njit(nogil=True, fastmath=fastmath, **_OPTIONS)
 
@@ -80,9 +80,9 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
 def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
     """Compile a function into each compiled one that calls it; called by Python it is plain Python.
 
-    Nothing is compiled that only Python or a later process would use. And only inlined code rounds
-    alike whether its caller was just compiled or comes from disk. ``fastmath`` is that of
-    `compiled`, for what this function does.
+    So nothing is compiled that only Python or a later process would use. And only inlined code
+    rounds alike whether its caller was just compiled or comes from disk. ``fastmath`` is as in
+    `compiled`, for the arithmetic of this function.
     """
     numba_decorator: Callable[[_Function], _Function] = register_jitable(
         forceinline=True, fastmath=fastmath, **_OPTIONS
@@ -92,9 +92,9 @@ def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Func
 
 @inlined()
 def on_cache_lines(count, like):
-    """An array (count,) of the kind of ``like`` that begins where a cache line does.
+    """Return an array (count,) of the kind of ``like`` that begins on a cache line.
 
-    From elsewhere, every load of 64 bytes would touch two lines: the prime-factor DFT then takes
+    Otherwise every load of 64 bytes would touch two lines: the prime-factor DFT then takes
     1.17 to 1.34 times as long, the tone sum 1.11 to 1.25 (`validation/cost/alignment.py`).
     """
     store = np.empty(count + 64 // like.itemsize, dtype=like.dtype)
@@ -131,11 +131,12 @@ def _place(_named: str) -> tuple[Any, Path]:
 
     Numba says where: in the folder that is named, beside the modules, or in the user's cache. The
     name of the folder there is one hash of all that the code is made from. Code of other versions
-    goes when no process has used it for a month.
+    is removed when no process has used it for a month.
     """
     if not _sources:
         raise OSError("the package is not in files")
     code = CompileResultCacheImpl(_increment)  # type: ignore[no-untyped-call]
+    # Whatever changes the machine code: sources, versions, settings and the processor.
     made_from = (
         _sources,
         platform.python_version(),
@@ -146,6 +147,7 @@ def _place(_named: str) -> tuple[Any, Path]:
     digest = hashlib.sha256(repr(made_from).encode()).hexdigest()[:16]
     folder = Path(code.locator.get_cache_path()) / f"rtradar-{digest}"
     folder.mkdir(parents=True, exist_ok=True)
+    # The time of the folder says when a process last used it.
     os.utime(folder)
     for other in folder.parent.glob("rtradar-" + "?" * len(digest)):
         if time.time() - other.stat().st_mtime > _UNUSED_S:
@@ -157,8 +159,8 @@ class _CodeOnDisk(NullCache):
     """Machine code of one function on disk, which Numba loads from here and saves here.
 
     Numba's own cache checks only the file of a function, not what is inlined into it from others.
-    Whatever goes wrong, be it a damaged file, a full disk or another version of Numba, the function
-    is compiled.
+    Whatever goes wrong (a damaged file, a full disk, another version of Numba), the function is
+    compiled.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -176,6 +178,7 @@ class _CodeOnDisk(NullCache):
         try:
             code, path = self._file(sig)
             data = path.read_bytes()
+            # The file begins with a digest of the rest.
             if hashlib.sha256(data[32:]).digest() != data[:32]:  # damaged
                 return None
             return code.rebuild(target_context, pickle.loads(data[32:]))
@@ -191,6 +194,8 @@ class _CodeOnDisk(NullCache):
     def save(self, sig: Any, result: Any) -> Path | None:
         """Keep code; an error of any kind is raised where it cannot be kept."""
         code, path = self._file(sig)
+        # A module that was edited since may have been imported later than the digest was taken: its
+        # code does not belong to that digest.
         if code.check_cachable(result) and _read_sources() == _sources:
             data = dumps(code.reduce(result))  # type: ignore[no-untyped-call]
             with atomic_file(path) as file:

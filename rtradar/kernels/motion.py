@@ -10,6 +10,7 @@ from rtradar.kernels.jit import compiled, inlined
 
 @inlined(fastmath={"contract"})
 def _fill_cubics(t, powers, interval, out):
+    # Horner's scheme.
     a, b, c, d = powers[0, interval], powers[1, interval], powers[2, interval], powers[3, interval]
     for i in range(len(out)):
         out[i] = d[i] + t * (c[i] + t * (b[i] + t * a[i]))
@@ -20,8 +21,8 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
     """Fill positions (time, joint, 3) and quaternions (time, joint * 4) at ``times[which]``.
 
     ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power,
-    interval, joint * 4)`` are the cubics from each to the next, the highest power first, as
-    `scipy.interpolate.PPoly` has them. Quaternions are normalised here.
+    interval, joint * 4)`` are the cubics from each knot to the next, the highest power first, as in
+    `scipy.interpolate.PPoly`. Quaternions are scalar last, and are normalised here.
     """
     rate, last = (len(knots) - 1) / (knots[-1] - knots[0]), len(knots) - 2
     for k in range(len(which)):
@@ -58,14 +59,17 @@ def pose_ellipsoids(positions, quaternions, parents, rest, centres, frames):
     """
     for time in range(frames.shape[0]):
         for part in range(frames.shape[1]):
+            # The centre is the middle of the bone.
             for axis in range(3):
                 ends = positions[time, part + 1, axis] + positions[time, parents[part + 1], axis]
                 centres[time, part, axis] = 0.5 * ends
+            # The rotation matrix of the unit quaternion, row by row.
             q = quaternions[time, part + 1]
             x, y, z, w = q[0], q[1], q[2], q[3]
             a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
             d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
             g, h, k = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+            # It turns each column of the frame, the direction of one semi-axis.
             own, rotated = rest[part], frames[time, part]
             for column in range(3):
                 u, v, s = own[0, column], own[1, column], own[2, column]

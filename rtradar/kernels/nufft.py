@@ -1,14 +1,14 @@
 """The sum of many tones: each spread over a few cells of a grid of beat frequencies, and one FFT.
 
-A nonuniform FFT of type 1 (Dutt and Rokhlin, SIAM J. Sci. Comput. 14, 1993), whose windows are
-fitted to what undoes Kaiser and Bessel's. Its work grows with tones times taps, not with tones
-times samples. An amplitude that changes over the sweep costs no further FFT: it is a sum of
-Legendre polynomials P_k(x) of the place in the sweep, x = 2 (n - n_samples // 2) / n_samples, and
-the product of each with a tone has a window of its own, real for even k and imaginary for odd.
+A nonuniform FFT of type 1 (Dutt and Rokhlin, SIAM J. Sci. Comput. 14, 1993). Its windows are fitted
+to the weights that undo the window of Kaiser and Bessel. Its work grows with tones times taps, not
+with tones times samples. An amplitude that changes over the sweep costs no further FFT: it is a sum
+of Legendre polynomials P_k(x) of the place in the sweep, x = 2 (n - n_samples // 2) / n_samples,
+and the product of each with a tone has a window of its own, real for even k and imaginary for odd.
 
-Tones are given chirp by chirp, which are summed to 1e-6, or at anchors, instants some cycles apart
-between which lengths and amplitudes are cubics in time, which are summed to -60 dB: enough for
-ghosts, which are weaker than what they are ghosts of. Sums are float32.
+Tones are given in one of two ways. Chirp by chirp they are summed to 1e-6. At anchors, which are
+instants some cycles apart between which lengths and amplitudes are cubics in time, they are summed
+to -60 dB: enough for ghosts, which are weaker than the echoes that they repeat. Sums are float32.
 """
 
 from __future__ import annotations
@@ -56,8 +56,9 @@ class Anchors(NamedTuple):
     """Echoes at the anchors of each Tx, receivers side by side.
 
     ``length (anchor, tx, rx, echo)`` float64 [m], ``level (2, anchor, tx, rx, echo)`` float32, real
-    and imaginary parts of mean amplitudes over the sweep [m]. Those of the last echoes change by
-    ``change[0] P_1(x) + change[1] P_2(x) (2, 2, anchor, tx, rx, changing)``.
+    and imaginary parts of the mean amplitudes over the sweep [m]. The amplitudes of the last echoes
+    change over the sweep by ``change[0] P_1(x) + change[1] P_2(x) (2, 2, anchor, tx, rx,
+    changing)``.
     """
 
     length: NDArray[np.float64]
@@ -84,11 +85,11 @@ class BetweenAnchors(NamedTuple):
 def sum_by_nufft(tones: Tones, out: NDArray[np.complex64]) -> None:
     """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it [m].
 
-    The weights of the tones, for `MOST_NODES` nodes at most, are those of Legendre polynomials;
-    each chirp has `LEAST_SAMPLES` or more.
+    The weights of the tones are those of Legendre polynomials. There are at most `MOST_NODES`
+    nodes, and at least `LEAST_SAMPLES` samples in each chirp.
     """
     out[:] = 0
-    # One type and layout, or Numba would compile for each that comes.
+    # One type and layout, or Numba would compile anew for each other one.
     amplitude = np.ascontiguousarray(tones.amplitude, dtype=np.complex64)
     own = tones._replace(amplitude=amplitude, weights=tones.weights.astype(np.float32))
     windows = _windows(out.shape[2], len(own.weights) + 1, *_FINE)
@@ -103,13 +104,13 @@ def add_anchored_tones(
     Tones whose beat frequency lies outside [0, sample rate) add nothing.
     """
     windows = _windows(out.shape[2], 1 + len(anchors.change), *_COARSE)
-    # Chirps of one Tx and of the same anchors in turn, so that these stay in the cache.
+    # Chirps of one Tx and of the same anchors follow one another, so that these stay in the cache.
     order = np.lexsort((between.first, between.tx))
     _add_sums(order, _spread_anchored, (anchors, between), windows, out)
 
 
 class _Windows(NamedTuple):
-    """``values (term, place, tap)`` of tones times P_k(x), less a factor j of odd terms.
+    """``values (term, place, tap)`` of tones times P_k(x), without the factor j of odd terms.
 
     They are for a grid of so many ``cells``. After the FFT, samples are to be multiplied by
     ``weights (sample,)``.
@@ -122,7 +123,9 @@ class _Windows(NamedTuple):
 
 @lru_cache
 def _windows(samples: int, terms: int, taps: int, ratio: float) -> _Windows:
+    # The FFT of the grid is fast for some numbers of cells only.
     half, cells = samples // 2, fft.next_fast_len(max(math.ceil(ratio * samples), taps))
+    # The usual shape parameter: pi times the taps W, times 1 - 1 / 2s with s cells for each sample.
     shape = np.pi * taps * (1 - samples / (2 * cells))
 
     def weights(sample: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -130,8 +133,9 @@ def _windows(samples: int, terms: int, taps: int, ratio: float) -> _Windows:
         root = np.sqrt(shape**2 - (np.pi * taps * sample / cells) ** 2)
         return np.asarray(np.i0(shape) * root / (taps * np.sinh(root)))
 
-    # For each place and term the values with the least squared error over the samples. No product
-    # is so large that a library for matrices has its threads share it, and rounds by their number.
+    # For each place and term the values with the least squared error over the samples. The products
+    # are so small that a library for matrices does not share them among its threads, whose number
+    # would change how they round.
     sample = np.linspace(-half, half, min(2 * half + 1, _FITTED))[:, None]
     tap, place = np.arange(taps) - taps // 2 + 1, (np.arange(_PLACES) + 0.5) / _PLACES
     fit = np.linalg.pinv(weights(sample) * np.exp(2j * np.pi / cells * sample * tap), rcond=1e-15)
@@ -139,6 +143,7 @@ def _windows(samples: int, terms: int, taps: int, ratio: float) -> _Windows:
     values = np.empty((terms, _PLACES, taps), dtype=np.float32)
     for term in range(terms):
         found = fit @ (Legendre.basis(term)(2 * sample / samples) * tones)
+        # The fit is over samples that are symmetric about 0: of odd terms it is imaginary.
         own = found.imag if term % 2 else found.real
         values[term] = own.transpose(0, 2, 1).reshape(_PLACES, taps)
     return _Windows(cells, values, weights(np.arange(samples) - float(half)).astype(np.float32))
@@ -175,6 +180,8 @@ def _add_rows(summed, weights, half, rows, out):
     for i in range(len(rows)):
         for receiver in range(out.shape[1]):
             source, target = summed[i, receiver], out[rows[i], receiver]
+            # Phases are about the middle sample: the samples before it are at the end of the
+            # period.
             for sample in range(half):
                 target[sample] += source[cells - half + sample] * weights[sample]
             for sample in range(half, samples):
@@ -198,6 +205,7 @@ def _spread(flat, cell, place, terms, values, grid, out):
     cells, taps, last = len(out), values.shape[2], terms.shape[1] - 1
     grid[:] = 0
     # Indices are unsigned, because checks of them would cost more than the sums.
+    # Tones of constant amplitude have the first window alone.
     for i in range(flat):
         at, window = np.uint64(cell[i]), values[0, np.uint64(place[i])]
         _add_window(window, at, terms[0, 0, i], terms[1, 0, i], grid)
@@ -216,6 +224,7 @@ def _spread(flat, cell, place, terms, values, grid, out):
     # Cells beyond an end belong to the other end.
     before = taps // 2 - 1
     for i in range(taps):
+        # The grid begins half a window before the first cell.
         if i < before:
             grid[cells + i] += grid[i]
         else:
@@ -242,7 +251,7 @@ def _spread_tones(chirps, tones, samples, values, grid):
     cell, place = np.empty(echoes, dtype=np.int32), np.empty(echoes, dtype=np.int32)
     cosine, sine = np.empty(echoes, dtype=np.float32), np.empty(echoes, dtype=np.float32)
     step = np.empty(echoes, dtype=np.float32)
-    # Of one term before the first and two after the last there is nothing.
+    # One row of zeros before the first term and two after the last, for `_step`.
     amplitude = np.zeros((2, nodes + 3, echoes), dtype=np.float32)
     terms = np.empty((2, nodes + 1, echoes), dtype=np.float32)
     summed = np.empty(cells + values.shape[2], dtype=np.complex64)
@@ -250,6 +259,7 @@ def _spread_tones(chirps, tones, samples, values, grid):
     cells_per_m = tones.slope * per_m / tones.sample_rate * cells
     middle = tones.start_frequency + tones.slope * (samples // 2) / tones.sample_rate
     for i in range(len(chirps)):
+        # Where each tone lies on the grid, and its phase in the middle of the chirp.
         for receiver in range(receivers):
             length = tones.length[chirps[i], receiver]
             for echo in range(echoes):
@@ -266,6 +276,7 @@ def _spread_tones(chirps, tones, samples, values, grid):
                 across, up = phasor(turns)
                 cosine[echo] = np.float32(across if received else 0.0)
                 sine[echo] = np.float32(up if received else 0.0)
+            # The coefficients of its Legendre polynomials, turned by that phase.
             for term in range(nodes):
                 real, imaginary = amplitude[0, term + 1], amplitude[1, term + 1]
                 real[:] = 0
@@ -280,6 +291,7 @@ def _spread_tones(chirps, tones, samples, values, grid):
                 for echo in range(echoes):
                     a, b = real[echo], imaginary[echo]
                     real[echo], imaginary[echo] = _turned(a, b, cosine[echo], sine[echo], odd)
+            # Correct for the step to the tabulated place, and spread.
             _step(amplitude, step, terms)
             _spread(0, cell, place, terms, values, summed, grid[i, receiver])
 
@@ -288,9 +300,11 @@ def _spread_tones(chirps, tones, samples, values, grid):
 def _step(amplitude, step, out):
     """Fill ``out (2, term, echo)`` with amplitudes times 1 + j step x.
 
-    Before and after the ``amplitude (2, 1 + term + 1, echo)`` of all terms is a row of zeros. A sum
-    of P_(k-1) and P_(k+1) is x P_k.
+    The rows of ``amplitude (2, 1 + term + 1, echo)`` before the first term and after the last are
+    zeros. A sum of P_(k-1) and P_(k+1) is x P_k.
     """
+    # (2k + 1) x P_k = k P_(k-1) + (k + 1) P_(k+1). Odd terms are stored times j: an even term takes
+    # j times an odd one as it is stored, an odd term takes j twice, which is -1.
     for term in range(out.shape[1]):
         sign = -1 if term % 2 == 1 else 1
         less = np.float32(sign * term / (2 * term - 1))
@@ -318,11 +332,13 @@ def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors
     flat, transmitters = len(which) - change.shape[5], chirps.shape[1]
     for item in range(start, stop):
         anchor, tx = item // transmitters, item % transmitters
+        # The chirp at which this transmitter has its anchor.
         chirp = chirps[anchor, tx]
         for receiver in range(receivers):
             for kept in range(len(which)):
                 echo = which[kept]
                 lengths[anchor, tx, receiver, kept] = length[chirp, receiver, echo]
+                # The mean over the sweep, and of echoes that change its first two polynomials.
                 for term in range(1 if kept < flat else 3):
                     total = np.complex64(0)
                     for node in range(nodes):
@@ -335,14 +351,17 @@ def fill_anchors(start, stop, chirps, length, amplitude, which, weights, anchors
 
 @inlined()
 def _course(length, carrier, slope, cells_per_m, place, turn, steps):
-    """Places and phases of tones at the first of their anchors, and the turns to the others.
+    """Fill in places and phases of tones at their first anchor, and the turns to the others.
 
-    Filled are ``place`` and ``turn (echo,)`` and ``steps (3, echo)`` float32, by lengths (4, echo).
+    They are ``place`` and ``turn (echo,)`` and ``steps (3, echo)`` float32, for lengths (4, echo).
     """
+    # The phase in the middle of the chirp, with the term of the squared delay.
     turns_per_m = 1 / SPEED_OF_LIGHT_MPS
     bend = 0.5 * slope * turns_per_m
     for echo in range(length.shape[1]):
         own = length[0, echo]
+        # Whole turns are taken out in float64; the turns between anchors are few enough for
+        # float32.
         before = own * turns_per_m * (carrier - bend * own)
         place[echo] = np.float32(own * cells_per_m)
         turn[echo] = np.float32(before - np.floor(before))
@@ -372,13 +391,16 @@ def _spread_anchored(chirps, anchors, between, samples, values, grid):
         for i in range(len(chirps)):
             chirp, before = chirps[i], chirps[max(i - 1, 0)]
             first, tx, w = between.first[chirp], between.tx[chirp], between.weight[chirp]
+            # Places and phases at the anchors, where these or the transmitter are new.
             if i == 0 or first != between.first[before] or tx != between.tx[before]:
                 middle = between.carrier[chirp]
                 middle += between.slope * (samples // 2) / between.sample_rate
                 own = anchors.length[first : first + ANCHORS, tx, receiver]
                 _course(own, middle, between.slope, cells_per_m, begin, turn, steps)
-                # A tone that turns on by one turn goes on by so many cells.
+                # While its phase grows by one turn, a tone moves on by so many cells.
                 pace = np.float32(cells_per_m * SPEED_OF_LIGHT_MPS / middle)
+            # The cubic as its value at the first anchor and the differences after it, for the
+            # weights of the four anchors add up to 1.
             v0, v1, v2, v3 = np.float32(w[0]), np.float32(w[1]), np.float32(w[2]), np.float32(w[3])
             after0, after1 = np.float32(w[1] + w[2] + w[3]), np.float32(w[2] + w[3])
             # Interpolate, in vector lanes over the echoes: places and phases, then amplitudes.

@@ -1,11 +1,11 @@
 """DFTs over slow time whose number of cycles is a product of coprime factors.
 
 FFT libraries are made for small prime factors. A frame of 100 ms has 133 = 7 x 19 or 666 = 18 x 37
-cycles here, and the factors 19 and 37 take most of a library's time. By the prime-factor algorithm
-(Good 1958) such a DFT is a DFT of each length in turn, without twiddle factors between. Each is
-small enough for plain sums, over half of the terms because cosines are even and sines odd. Range
-bins lie side by side in vector lanes. Samples are weighted as they are read, and only their power
-or the values of chosen cells are written, so that no whole spectrum is ever stored.
+cycles here, and the factors 19 and 37 take most of a library's time. The prime-factor algorithm
+(Good 1958) takes a DFT of each length in turn, without twiddle factors between them. Each is small
+enough for plain sums, which run over half of the terms because cosines are even and sines odd.
+Range bins lie side by side in vector lanes. Samples are weighted as they are read, and only their
+power or the values of chosen cells are written, so that no whole spectrum is ever stored.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _TOGETHER = 3
 class PrimeFactorDft(NamedTuple):
     """Tables of a DFT over as many cycles as there are in ``cycle_at``.
 
-    ``cycle_at`` and ``bin_at (place,)`` are the cycle at each place of the grid (first, second) of
-    the two ``factors``, and the Doppler bin afterwards. ``cosines`` and ``sines (frequency, term)``
-    are tables of each factor for the frequencies and terms from 1 to below half of it, filled up
-    with zeros to multiples of `_TOGETHER`.
+    At each place of the grid (first, second) of the two ``factors``, ``cycle_at (place,)`` is the
+    cycle that is put there, and ``bin_at (place,)`` the Doppler bin that is found there afterwards.
+    ``cosines`` and ``sines (frequency, term)`` are tables of each factor for the frequencies and
+    terms from 1 to below half of it, filled up with zeros to multiples of `_TOGETHER`.
     """
 
     cycle_at: NDArray[np.int64]
@@ -57,7 +57,8 @@ def prime_factor_dft(n_cycles: int) -> PrimeFactorDft | None:
         return None
     first, second = min(allowed, key=sum)  # the least sum is the least work
     i, j = np.divmod(np.arange(n_cycles), second)
-    # Cycles by Good's map and bins by the Chinese remainder theorem: the product has no mixed term.
+    # Cycles by Good's map and bins by the Chinese remainder theorem: their product modulo the
+    # number of cycles has no mixed term, and so there are no twiddle factors.
     cycle_at = (i * second + j * first) % n_cycles
     bin_at = (i * second * pow(second, -1, first) + j * first * pow(first, -1, second)) % n_cycles
     cosines, sines = zip(_tables(first), _tables(second), strict=True)
@@ -67,6 +68,7 @@ def prime_factor_dft(n_cycles: int) -> PrimeFactorDft | None:
 def _tables(factor: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     paired = np.arange(1, (factor + 1) // 2)
     angles = 2 * np.pi * np.outer(paired, paired) / factor
+    # Zeros fill the tables up to whole groups of the inner loop.
     rest = -len(paired) % _TOGETHER
     cosines, sines = (np.pad(table, (0, rest)) for table in (np.cos(angles), np.sin(angles)))
     return cosines.astype(np.float32), sines.astype(np.float32)
@@ -81,9 +83,9 @@ def add_doppler_power(
 ) -> None:
     """Add the squared magnitudes of weighted DFTs over the cycles of some channels.
 
-    To ``power (doppler, range)``, in the order of the DFT, is added what ``spectra (cycle, channel,
-    range)``, contiguous, have in ``channels``, in steps of one, with ``weights (cycle,)``; all are
-    of single precision.
+    The ``channels``, in steps of one, of ``spectra (cycle, channel, range)``, which are contiguous,
+    are weighted by ``weights (cycle,)``. Their power is added to ``power (doppler, range)``, in the
+    order of the DFT. All are of single precision.
     """
     none = np.empty(0, np.int64), np.empty((0, 0), np.int64), np.empty(0, np.int64)
     values = np.empty((0, 0, 0), np.complex64)
@@ -100,7 +102,7 @@ def pick_cells(
     cells: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]],
     values: NDArray[np.complex64],
 ) -> None:
-    """Fill in some channels the chosen cells of weighted DFTs over the cycles.
+    """Fill in the chosen cells of weighted DFTs over the cycles, for some channels.
 
     ``cells`` are the Doppler bin ``(cell,)`` of each in the order of the DFT, its range bins
     ``(cell, offset)`` as places in a list, and that list of the range bins ``(bin,)`` that are
@@ -110,6 +112,7 @@ def pick_cells(
     turns, at, bins = cells
     # A few bins of some channels side by side fill the lanes.
     lanes = (np.asarray(channels)[:, None] * spectra.shape[2] + bins).ravel()
+    # The inverse of the map of bins: the place of the grid where each Doppler bin is found.
     place = np.argsort(dft.bin_at)[turns], at, lanes
     power = np.empty((0, 0), np.float32)
     _transform(
@@ -118,14 +121,14 @@ def pick_cells(
 
 
 def _read_only(spectra: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    # Numba compiles anew for an array that may be written to: this one is always read-only.
+    # Numba compiles anew where one array may be written to and another not: these never are.
     spectra = spectra.view()
     spectra.flags.writeable = False
     return spectra
 
 
-# Rows are `_ROW` long, a constant, and the rows of a function lie in as few arrays as possible: if
-# each were an array, every loop would first have to check whether any two of them overlap.
+# Rows have the constant length `_ROW`, and the rows of a function lie in as few arrays as possible.
+# If each were an array, every loop would first have to check whether any two of them overlap.
 
 
 @inlined()
@@ -148,7 +151,7 @@ def _read(samples, weight, out):
 
 @inlined(fastmath={"contract"})
 def _gather(samples, lanes, weight, out):
-    """As `_read`, but of samples at these places."""
+    """Do the same as `_read` with the samples at some places."""
     for c in range(len(lanes)):
         sample = samples[lanes[c]]
         out[c] = sample.real * weight
@@ -159,6 +162,8 @@ def _gather(samples, lanes, weight, out):
 def _fold(near, far, even, odd):
     """Fill the sum of two rows, and -j times their difference, which belongs to the sines."""
     for c in range(_COLUMNS):
+        # exp(-jx) and exp(jx) of the two terms leave the sum times cos(x), and -j times the
+        # difference times sin(x).
         near_re, near_im, far_re, far_im = near[c], near[_COLUMNS + c], far[c], far[_COLUMNS + c]
         even[c] = near_re + far_re
         even[_COLUMNS + c] = near_im + far_im
@@ -228,10 +233,10 @@ def _add_unfolded_squares(cosine, sine, low, high):
 def _transform_line(cosines, sines, rows, line, to_power):
     """Sum the terms of one line (first place, step, factor, place of its half) to its frequencies.
 
-    They are put in its places, or their power is added. Of ``rows`` the ``grid`` has one for each
-    cycle and one of zeros, ``sums`` the power of each bin, ``even`` and ``odd`` the folded terms of
-    a line, ``alone`` the sum and the difference of the two terms that have no partner, ``total``
-    one frequency, and the ``parts`` three.
+    They are put in its places, or their power is added. Among the ``rows``, the ``grid`` has one
+    for each cycle and one of zeros, ``sums`` has the power of each bin, ``even`` and ``odd`` have
+    the folded terms of a line, ``alone`` has the sum and the difference of the two terms without a
+    partner, ``total`` has one frequency, and each of the ``parts`` three.
     """
     grid, sums, even, odd, alone, total, cosine_parts, sine_parts = rows
     first, step, factor, at_half = line
@@ -244,6 +249,8 @@ def _transform_line(cosines, sines, rows, line, to_power):
     # Frequencies without a partner: 0, and half of an even factor.
     for half in range(2 - factor % 2):
         place, sign = (at_half, -one) if half else (first, one)
+        # At frequency 0 all terms are added. At half of the factor their signs alternate, and the
+        # term at half of it has the sign of that half.
         _put(_row(alone, half * (factor // 2 % 2)), total)
         _add_signed(even, pairs, sign, total)
         if to_power:
@@ -253,10 +260,12 @@ def _transform_line(cosines, sines, rows, line, to_power):
     # All others in pairs, some pairs together.
     for group in range(0, pairs, _TOGETHER):
         for k in range(_TOGETHER):
+            # The term at half of the factor changes its sign from one frequency to the next.
             _put(_row(alone, (group + k + 1) % 2), _row(cosine_parts, k))
         sine_parts[:] = 0
         _add_products(cosines, group, even, cosine_parts)
         _add_products(sines, group, odd, sine_parts)
+        # Both frequencies of a pair have the same cosines, and sines of opposite sign.
         for k in range(min(_TOGETHER, pairs - group)):
             low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
             cosine, sine = _row(cosine_parts, k), _row(sine_parts, k)
@@ -268,24 +277,25 @@ def _transform_line(cosines, sines, rows, line, to_power):
 
 @inlined()
 def _pick(grid, cells, begin, end, channel_begin, channel_end, values):
-    """Fill values of these channels that lie in these lanes from the transformed grid."""
+    """Fill in the values of some channels from the lanes of the transformed grid that hold them."""
     places, at, lanes = cells
     bins = len(lanes) // (channel_end - channel_begin)
     for cell in range(len(places)):
         row = _row(grid, places[cell])
         for offset in range(at.shape[1]):
             for channel in range(channel_begin, channel_end):
+                # The place among the lanes of this pass.
                 c = (channel - channel_begin) * bins + at[cell, offset] - begin
                 if 0 <= c < end - begin:
                     values[cell, offset, channel] = complex(row[c], row[_COLUMNS + c])
 
 
-# One function for both, because it takes longer to compile than most.
+# One function for both uses, because it takes longer to compile than most.
 @compiled(fastmath={"contract"})
 def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, values):
-    """Add power (doppler, range), unless it is empty; else fill values at cells.
+    """Add to power (doppler, range), unless that is empty; else fill in values at cells.
 
-    These are (place, place of their bins among those of a channel, lanes).
+    The cells are (place, place of their bins among those of a channel, lanes).
     """
     to_power = len(power) > 0
     cycles, _, n_range = spectra.shape
@@ -300,11 +310,13 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
     sine_parts = on_cache_lines(_TOGETHER * _ROW, weights)
     rows = grid, sums, even, odd, alone, total, cosine_parts, sine_parts
     grid[:], even[:], odd[:] = 0, 0, 0
+    # Rows have a constant length, so the lanes are taken in blocks of it.
     for begin in range(0, n_lanes, _COLUMNS):
-        # What lanes beyond the last ones hold is transformed, too, and not read.
+        # Lanes beyond the last one are transformed, too, and not read.
         end = min(begin + _COLUMNS, n_lanes)
         sums[:] = 0
         for channel in range(channel_begin, channel_begin + passes):
+            # Read the cycles in the order of Good's map, weighted.
             for place in range(cycles):
                 cycle, row = dft.cycle_at[place], _row(grid, place)
                 if to_power:
@@ -316,15 +328,20 @@ def _transform(spectra, channel_begin, channel_end, weights, dft, power, cells, 
                 # First along the second factor, whose places are neighbours, then the first.
                 factor, step = (n_1, n_2) if last else (n_2, 1)
                 cosines, sines = dft.cosines[0 if last else 1], dft.sines[0 if last else 1]
+                # Rows that only fill up the groups meet zeros of the tables. They are cleared of
+                # what the other factor left there, because 0 times infinity would not be 0.
                 padding = slice((factor - 1) // 2 * _ROW, cosines.shape[1] * _ROW)
                 even[padding] = 0
                 odd[padding] = 0
                 for number in range(cycles // factor):
                     first = number if last else number * n_2
-                    # A term at half of an even factor has no partner; else the row of zeros is it.
+                    # The term at half of an even factor has no partner. An odd factor has no such
+                    # term: the row of zeros stands for it.
                     at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
                     line = first, step, factor, at_half
                     _transform_line(cosines, sines, rows, line, to_power and last)
+        # The grid holds the spectrum of the chosen lanes; where power is wanted, the sums hold that
+        # of all channels.
         if not to_power:
             _pick(grid, cells, begin, end, channel_begin, channel_end, values)
         for place in range(cycles if to_power else 0):

@@ -1,9 +1,10 @@
 """Currents over the edges of flat triangles, and their fields on each other.
 
 A current flows across each edge, from one triangle into the other (S. M. Rao, D. R. Wilton, A. W.
-Glisson, IEEE Trans. Antennas Propag. 30, 1982). Triangles far apart have one product rule. Where
-they touch, the coordinates of S. A. Sauter and C. Schwab, *Boundary Element Methods*, section 5.2,
-cancel what is singular; where they are near without touching, both are divided until they are far.
+Glisson, IEEE Trans. Antennas Propag. 30, 1982). Triangles far apart are integrated over by one
+product rule. Where they touch, the coordinates of S. A. Sauter and C. Schwab, *Boundary Element
+Methods*, section 5.2, cancel the singularity. Where they are near without touching, both are
+divided until their pieces are far apart.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class Triangles(NamedTuple):
 
 
 class Orbits(NamedTuple):
-    """How the currents combine to ones of even or odd parity at the mirror planes."""
+    """How the currents combine into currents of even or odd parity at the mirror planes."""
 
     tested: Any  # (tested,) int64: one triangle of each set of mirror images
     weights: Any  # (tested,): one over the number of reflections that keep it
@@ -46,7 +47,7 @@ class Orbits(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """Quadrature of one triangle, and of two."""
+    """Quadrature over one triangle, and over pairs of triangles."""
 
     places: Any  # (point, corner): barycentric
     weights: Any  # (point,), their sum is 1
@@ -78,9 +79,13 @@ def fill_matrices(triangles, orbits, rules, equation, out):
             x, y, z = minus(turned_back(corners, rules.places[q]), centroids[s])
             places[q, 0, s], places[q, 1, s], places[q, 2, s] = x, y, z
     sums, block = np.empty((_ROWS, _LANES)), np.empty((3, 3), dtype=np.complex128)
+    # A pair that is halved becomes 16 pairs, of which one is taken apart at a time: for each level
+    # 15 more wait.
     stack = np.empty((15 * DEEPEST + 16, 2, 3, 3))
     for row in range(len(orbits.tested)):
         t = orbits.tested[row]
+        # All triangles are taken as far ones first, in vector lanes. The sums of those that are
+        # near are then computed anew.
         for first in range(0, count, _LANES):
             lanes = min(_LANES, count - first)
             _far_sums(t, first, lanes, triangles, centroids, places, rules, equation, sums)
@@ -149,12 +154,12 @@ def _add_times(sums, row, lane, real, imaginary, vector):
 def _add_pair(sums, lane, tested, other, between, normal, weight, equation):
     """Add a pair of points, each given from the centroid of its triangle.
 
-    R is ``between`` them, from the other point to the tested one, and n the normal at the latter.
-    The rows are pairs of real and imaginary part: G; K = j k G - h n.R; K times the tested place; K
-    times the other place o; K times their product; h times the product of R and the tested place,
-    times n.o and times 1; h R times n.o, and h R; with h = (1 + jkR) G / R^2, and both parts of the
-    equation by their weights.
+    R is the vector ``between`` them, from the other point to the tested one, and n is the normal at
+    the latter. The rows are pairs of a real and an imaginary part: G; K = j k G - h n.R; K times
+    the tested place t; K times the other place o; K t.o + h (R.t) (n.o); h R.t; h (n.o) R; and h R.
+    Here h = (1 + jkR) G / R^2, and both parts of the equation have their weights.
     """
+    # The Green's function of both points, and its gradient over R.
     k, electric = equation.wavenumber, equation.electric
     squared = dot(between, between)
     distance = math.sqrt(squared)
@@ -163,9 +168,11 @@ def _add_pair(sums, lane, tested, other, between, normal, weight, equation):
     g_re, g_im = g * cosine, g * sine
     factor, turn = (1 - electric) / squared, k * distance
     h_re, h_im = factor * (g_re - turn * g_im), factor * (g_im + turn * g_re)
+    # The part of the kernel that multiplies the product of both currents.
     along = dot(normal, between)
     k_re, k_im = -electric * k * g_im - h_re * along, electric * k * g_re - h_im * along
     product, up, across = dot(tested, other), dot(normal, other), dot(tested, between)
+    # The sums from which the elements of all nine pairs of edges follow.
     _add(sums, 0, lane, g_re, g_im)
     _add(sums, 1, lane, k_re, k_im)
     _add_times(sums, 2, lane, k_re, k_im, tested)
@@ -188,7 +195,10 @@ def _vector(sums, row, lane):
 
 @inlined()
 def _block(t, s, triangles, centroids, sums, lane, equation, block):
-    """Fill the block (edge, edge) of two triangles from the sums, but for the scales."""
+    """Fill the block (edge, edge) of two triangles from the sums, without the scales."""
+    # A current is a multiple of the place less the corner that is opposite to its edge, with a
+    # constant divergence. So its product with another one is expanded about the centroids: corners
+    # multiply sums that are the same for all edges.
     charge = complex(0.0, -4 * equation.electric / equation.wavenumber) * _term(sums, 0, lane)
     both = plus(_vector(sums, 5, lane), _vector(sums, 10, lane))
     for i in range(3):
@@ -203,7 +213,8 @@ def _block(t, s, triangles, centroids, sums, lane, equation, block):
 
 @inlined()
 def _add_own_field(t, triangles, centroids, equation, block):
-    """Add half the current on the triangle itself: what the magnetic field jumps by, in halves."""
+    """Add half the current on the triangle itself: the magnetic field jumps by the whole of it."""
+    # The mean product of two such currents over a triangle, by its second moments.
     corners, centroid = triangles.corners[t], centroids[t]
     spread = 0.0
     for i in range(3):
@@ -216,17 +227,19 @@ def _add_own_field(t, triangles, centroids, equation, block):
 
 @inlined(fastmath=_FAST)
 def _far_sums(t, first, lanes, triangles, centroids, places, rules, equation, sums):
-    """Fill the sums of the tested triangle with each one of the lanes, by one product rule."""
+    """Fill the sums of the tested triangle with each triangle of the lanes, by one product rule."""
     normal, area = triangles.normals[t], triangles.areas[t]
     normal = normal[0], normal[1], normal[2]
     away = np.empty((3, _LANES))
     for lane in range(lanes):
         x, y, z = minus(centroids[t], centroids[first + lane])
         away[0, lane], away[1, lane], away[2, lane] = x, y, z
+    # Clear the sums of the block before.
     for row in range(_ROWS):
         for lane in range(lanes):
             sums[row, lane] = 0.0
     for p in range(len(rules.weights)):
+        # Every point of the tested triangle with every point of those in the lanes.
         tested = places[p, 0, t], places[p, 1, t], places[p, 2, t]
         for q in range(len(rules.weights)):
             weight = rules.weights[p] * rules.weights[q] * area
@@ -248,13 +261,17 @@ def _near_sums(t, s, triangles, centroids, rules, equation, stack, sums, lane):
     levels = np.zeros(len(stack), dtype=np.int64)
     for row in range(_ROWS):
         sums[row, lane] = 0.0
+    # A stack of pairs of pieces that wait, first of which are both triangles whole.
     whole, held = triangles.areas[t] * triangles.areas[s], 1
     shared = _shared_first(triangles, t, s, stack[0, 0], stack[0, 1])
     while held > 0:
         held -= 1
+        # Take the last pair from the stack: its place may be filled anew below.
         for i in range(3):
             for axis in range(3):
                 one[i, axis], other[i, axis] = stack[held, 0, i, axis], stack[held, 1, i, axis]
+        # Touching pairs have a rule of their own. Others need to be far enough apart for the
+        # product rule, or have been halved often enough.
         level = levels[held]
         reach = FAR * (_middle(one, middles[0]) + _middle(other, middles[1]))
         far = _squared_distance(middles[0], middles[1]) > reach * reach
@@ -264,6 +281,7 @@ def _near_sums(t, s, triangles, centroids, rules, equation, stack, sums, lane):
                 equation, sums, lane,
             )  # fmt: skip
             continue
+        # Take both pieces apart into four each, and let all 16 pairs wait.
         for a in range(4):
             for b in range(4):
                 _quarter(one, a, stack[held, 0])
@@ -300,6 +318,7 @@ def _shared_first(triangles, t, s, one, other):
     """Fill the corners of both triangles, shared ones first; their number is returned."""
     faces, corners = triangles.faces, triangles.corners
     ones, others = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
+    # Shared corners fill both orders from the front, the others from the back.
     shared, own, left = 0, 2, 2
     for i in range(3):
         same = -1

@@ -20,7 +20,7 @@ _TOGETHER = 6
 """Tones added in one loop, so that sums are read and written a sixth as often."""
 
 _NEXT = 2 * LANES
-"""From the lanes of one tone to those of the next."""
+"""Distance from the lanes of one tone to those of the next."""
 
 _GRID = 4096
 """Steps from sample to sample whose first powers are in a table, 1 / 4096 turn apart."""
@@ -34,8 +34,8 @@ class Tones(NamedTuple):
     """Echoes of a block of chirps, and the sweep that makes tones of them.
 
     ``length (chirp, rx, echo)`` are path lengths [m]; echoes whose beat frequency lies outside [0,
-    sample rate) add nothing. ``amplitude (node, chirp, rx, echo)`` is that at some frequencies [m].
-    ``weights (term, node)`` make of these the coefficients of polynomials in the place in the
+    sample rate) add nothing. ``amplitude (node, chirp, rx, echo)`` are given at some frequencies
+    [m]. ``weights (term, node)`` turn them into coefficients of polynomials in the place in the
     sweep, x = 2 (n - n_samples // 2) / n_samples: of its powers for `add_tones`, of Legendre's
     polynomials for `sum_by_nufft`. The sweep has a start frequency [Hz], a slope [Hz/s] and a
     sample rate [Hz].
@@ -52,9 +52,9 @@ class Tones(NamedTuple):
 class ToneTables(NamedTuple):
     """Tables in the precision of the sum.
 
-    ``first (step, real or imaginary * lane)`` are phasors of lane + 1/2 samples, for steps from 0
-    to 1 turn per sample, ``middles (lane,)`` lane + 1/2, ``sines`` and ``cosines (term,)`` the
-    coefficients of the odd and the even powers of the angle.
+    ``first (step, real or imaginary * lane)`` are the phasors after lane + 1/2 samples, for steps
+    from 0 to 1 turn per sample. ``middles (lane,)`` are lane + 1/2. ``sines`` and ``cosines
+    (term,)`` are the coefficients of the odd and the even powers of the angle.
     """
 
     first: NDArray[np.floating]
@@ -75,7 +75,7 @@ def tone_tables(kind: type[np.floating]) -> ToneTables:
 
 @inlined(fastmath={"contract"})
 def _lanes(row, rest, tables, out):
-    """Powers of a tone side by side: of the next step on the grid, rotated by the rest [rad]."""
+    """Powers of a tone side by side: those of the nearest step on the grid, rotated by the rest."""
     for lane in range(LANES):
         angle = rest * tables.middles[lane]
         x = angle * angle
@@ -95,13 +95,16 @@ def _together(w, x, i):
 def _add_constants(pairs, weighted, lanes, sums, total):
     """Add tones of constant amplitude to the total, two blocks of lanes at a time.
 
-    Real and imaginary parts are the sums ``total (sample,)`` and ``weighted (pair * tone,)``, the
-    values of tones in the middle of each pair of blocks. As far before it as after it a power is
-    the conjugate, so the ``sums`` of the products of real and imaginary parts serve both. All sums
-    are one array and the lanes another, because each loop first checks whether its arrays overlap.
+    The sums ``total (sample,)`` and the values of the tones in the middle of each pair of blocks,
+    ``weighted (pair * tone,)``, are given as real and imaginary parts. A power as far before the
+    middle as another is after it is the conjugate of that, so the ``sums`` of the products of real
+    and imaginary parts serve both. All sums are one array and the lanes another, because each loop
+    first checks whether its arrays overlap.
     """
     tones = len(weighted[0]) // pairs
     for pair in range(pairs):
+        # Tones in groups, each with its powers about a middle side by side in the lanes: the
+        # products of real and imaginary parts are added up apart.
         sums[:] = 0.0
         for tone in range(0, tones, _TOGETHER):
             at = pair * tones + tone
@@ -118,6 +121,7 @@ def _add_constants(pairs, weighted, lanes, sums, total):
         early, late, end = 2 * pair * LANES, (2 * pair + 1) * LANES, 2 * (pair + 1) * LANES
         early_re, early_im = total[0][early:late], total[1][early:late]
         late_re, late_im = total[0][late:end], total[1][late:end]
+        # After the middle the power itself is taken; before it the conjugate, in reverse order.
         for i in range(LANES):
             late_re[i] += sums[i] - sums[i + 3 * LANES]
             late_im[i] += sums[i + LANES] + sums[i + 2 * LANES]
@@ -128,13 +132,14 @@ def _add_constants(pairs, weighted, lanes, sums, total):
 
 @inlined()
 def _weigh(power, powers, first, change, weight, now):
-    """Fill ``now``, the coefficients of a power of the sample number; whether any is other than 0.
+    """Fill ``now``, the coefficients of a power of the sample number; return if any is not 0.
 
     ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real
-    and imaginary * tone)`` how much more they are at the others, and ``weight`` is room for sums.
-    The weights of all powers but the first add up to 0 over the nodes, so constant amplitudes have
-    no part in them.
+    and imaginary * tone)`` are how much more they are at the others, and ``weight`` is room for
+    sums. The weights of all powers but the first add up to 0 over the nodes, so constant amplitudes
+    have no part in them.
     """
+    # The first node carries the constant; each other node adds what it differs by.
     for i in range(len(first)):
         weight[i] = first[i] if power == 0 else 0.0
     for node in range(1, powers.shape[1]):
@@ -150,12 +155,13 @@ def _weigh(power, powers, first, change, weight, now):
 
 @inlined(fastmath={"contract"})
 def _take(tones, chirp, receiver, received, start, step, first, change):
-    """Fill what `_weigh` reads of visible tones in the band, and count them.
+    """Fill in what `_weigh` reads about the visible tones in the band, and count these.
 
     ``start`` and ``step (tone,)`` are turns at the first sample and per sample.
     """
     length, amplitude = tones.length[chirp, receiver], tones.amplitude[:, chirp, receiver]
     size, count = len(start), 0
+    # The tones that the low-pass filter lets through, and that are not silent at all nodes.
     for echo in range(len(length)):
         beat = tones.slope / SPEED_OF_LIGHT_MPS * length[echo]
         if beat >= 0 and beat < tones.sample_rate:
@@ -164,8 +170,11 @@ def _take(tones, chirp, receiver, received, start, step, first, change):
                     received[count] = echo
                     count += 1
                     break
+    # Tones beyond the last one, up to a whole group, have no amplitude.
     first[:] = 0.0
     change[:] = 0.0
+    # The phase of the tone at the first sample and its step; amplitudes as that of the first node
+    # and changes from there.
     for i in range(count):
         delay = length[received[i]] / SPEED_OF_LIGHT_MPS
         start[i] = delay * (tones.start_frequency - 0.5 * tones.slope * delay)
@@ -183,8 +192,8 @@ def add_tones(begin, end, tones, tables, out):
     """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, with the tables' digits."""
     receivers, samples = out.shape[1:]
     nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
-    # The last pair of blocks may go beyond the last sample, and the last tones that are added
-    # together beyond the last tone: those are silent.
+    # The last pair of blocks may go beyond the last sample. The last group of tones that are added
+    # together may go beyond the last tone; those beyond it are silent.
     pairs = (samples + 2 * LANES - 1) // (2 * LANES)
     size = (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
     like = tables.middles
@@ -192,13 +201,14 @@ def add_tones(begin, end, tones, tables, out):
     first, weight = np.empty(2 * size), np.empty(2 * size)
     change, now = np.empty((nodes - 1, 2 * size)), np.empty(2 * size, dtype=like.dtype)
     lanes, sums = on_cache_lines(size * _NEXT, like), on_cache_lines(2 * _NEXT, like)
-    # Real and imaginary parts of tones in each middle, the same times amplitudes, and the result.
+    # Real and imaginary parts of tones in each middle, their products with amplitudes, and the sum.
     middle_re, middle_im = np.empty(pairs * size, like.dtype), np.empty(pairs * size, like.dtype)
     weighted = np.empty_like(middle_re), np.empty_like(middle_re)
     total = np.empty(2 * pairs * LANES, like.dtype), np.empty(2 * pairs * LANES, like.dtype)
     sum_re, sum_im = total
     received = np.empty(echoes, np.int64)
     fraction = np.empty(samples, dtype=like.dtype)
+    # The place in the sweep, of whose powers the weights give the coefficients.
     for sample in range(samples):
         fraction[sample] = 2 * (sample - samples // 2) / samples
     # Whatever a chirp does not fill is left over from the one before, and silent.
@@ -224,6 +234,7 @@ def add_tones(begin, end, tones, tables, out):
                 for sample in range(samples if power < nodes - 1 else 0):
                     sum_re[sample] *= fraction[sample]
                     sum_im[sample] *= fraction[sample]
+                # Constant tones have no part in the higher powers, which are then left out.
                 if not _weigh(power, tones.weights, first, change, weight, now):
                     continue
                 now_re, now_im = now[:size], now[size:]

@@ -4,13 +4,14 @@
 
 For a radar, whose Tx and Rx are near each other, the sum is over facets that face both, and o is
 the reciprocal obliquity (n.s_T + n.s_R) / 2: the Fresnel-Kirchhoff factor (Born and Wolf,
-*Principles of Optics*, section 8.3.2). For antennas anywhere it is over all that Tx lights, and o =
-(e_R.e_T)(n.s_T) - (e_R.s_T)(n.e_T) is what the current 2 n x H radiates to Rx, where e are the
-polarisations (Knott, Shaeffer and Tuley, *Radar Cross Section*, section 5.3). For one antenna both
-are n.s. Path lengths are exact at the three vertices, in float64, and taken as linear between them.
+*Principles of Optics*, section 8.3.2). For antennas anywhere, the sum is over all facets that Tx
+lights, and o = (e_R.e_T)(n.s_T) - (e_R.s_T)(n.e_T) is what the current 2 n x H radiates to Rx,
+where e are the polarisations (Knott, Shaeffer and Tuley, *Radar Cross Section*, section 5.3). For
+one antenna both are n.s. Path lengths are exact at the three vertices, in float64, and taken as
+linear between them.
 
-It is computed at some places of each interval between keyframes. Cubics go through its envelope,
-which is known there (`fill_envelope`).
+The integral is computed at some places of each interval between keyframes. Cubics go through its
+envelope, which is known there (`fill_envelope`).
 """
 
 from __future__ import annotations
@@ -61,11 +62,11 @@ class Views(NamedTuple):
     """Tasks, each of which is one part in one pose, and what the antennas see of it.
 
     ``part (task,)`` int64; ``antennas (task, antenna, 3)`` float64 in the axes of that part [m];
-    ``seen (row, facet)`` float32, the fraction of each facet that is not occluded, those of the
-    part from ``first (task,)`` int64 on; ``row (task, antenna)`` int64, which of them is whose. Of
-    facets that are seen in part ``edge (row, facet, 3)`` float32 are values at the corners of a
-    linear function that is positive where they are seen; without it, (0, 0, 3), they radiate by
-    that fraction.
+    ``seen (row, facet)`` float32, the fraction of each facet that is not occluded, where the facets
+    of the part begin at ``first (task,)`` int64; ``row (task, antenna)`` int64, the row of ``seen``
+    that belongs to each antenna. For facets that are seen in part, ``edge (row, facet, 3)`` float32
+    are values at the corners of a linear function that is positive where they are seen; without it,
+    (0, 0, 3), they radiate by that fraction.
     """
 
     part: NDArray[np.int64]
@@ -81,10 +82,10 @@ class Waves(NamedTuple):
 
     ``pairs (pair, 2)`` int64, Tx and Rx among the antennas of a task; ``carrier (task, pair)`` the
     path whose phase is taken out [m]; ``wavenumber (task, node)`` [rad/m]; ``spreading``, whether
-    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 5)`` are w
-    e_R.e_T; in the axes of the part, the vector -w (e_R.s_T) e_T; and what multiplies the
-    reciprocal obliquity, with 0 <= w <= 1 the weight of the currents. Without any, (0, 0, 5), the
-    obliquity is the reciprocal one.
+    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 5)`` are,
+    with 0 <= w <= 1 the weight of the currents: w e_R.e_T; the vector -w (e_R.s_T) e_T in the axes
+    of the part; and what multiplies the reciprocal obliquity. Without any, (0, 0, 5), the obliquity
+    is the reciprocal one.
     """
 
     pairs: NDArray[np.int64]
@@ -120,22 +121,27 @@ class _Terms(NamedTuple):
 
 @inlined()
 def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, start, chosen):
-    """Facets that any of the antennas may light, by the ball round them all; their count.
+    """Fill ``chosen`` with facets that any of the antennas may light; their number is returned.
 
-    What is seen of the first of them is at ``start``.
+    The row of what is seen has the first facet at ``start``.
     """
     count_antennas = len(antennas)
+    # A ball that holds all antennas.
     x, y, z = antennas[:, 0].mean(), antennas[:, 1].mean(), antennas[:, 2].mean()
     spread = 0.0
     for antenna in antennas:
         spread = max(
             spread, math.sqrt((antenna[0] - x) ** 2 + (antenna[1] - y) ** 2 + (antenna[2] - z) ** 2)
         )
+    # No antenna is farther than this from any vertex of the part.
     farthest = math.sqrt(x * x + y * y + z * z) + spread + size
     count = 0
     for f in range(len(planes)):
+        # The height of the ball's middle over the facet's plane: none of the antennas is in front,
+        # not even with the softened terminator, if the whole ball is below it.
         height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z - planes[f]
         if both or height > -spread - bend[f] * farthest:
+            # Nor does a facet count that no antenna sees.
             for antenna in range(count_antennas):
                 if seen[row[antenna], start + f] > 0:
                     chosen[count] = f
@@ -151,9 +157,11 @@ def _choose(facets, own, antennas, row, start, seen, x, y, z):
     vertices, faces = facets.vertices[first:last], facets.faces[begin:end]
     normals, every_bend = facets.normals[begin:end], facets.bend[begin:end]
     n_facets, size = len(faces), 0.0
+    # The coordinates side by side, and the size of the part.
     for i in range(len(vertices)):
         x[i], y[i], z[i] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
+    # The plane of each facet, n.x = plane.
     planes = np.empty(n_facets)
     for f in range(n_facets):
         i = faces[f, 0] - first
@@ -161,8 +169,8 @@ def _choose(facets, own, antennas, row, start, seen, x, y, z):
     lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
     reach = math.sqrt(size)
     count = _may_be_lit(antennas, planes, normals, every_bend, both, reach, seen, row, start, lit)
-    # Side by side, and without a sign: what may be counted from an array's end keeps a loop from
-    # vector lanes.
+    # Coordinate by coordinate, with unsigned indices: an index that may be negative, and so count
+    # from the end of an array, keeps a loop from vector lanes.
     corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
     areas, bend, rise = np.empty(count), np.empty(count), np.empty(count)
     for i in range(count):
@@ -184,13 +192,15 @@ def _see(antenna, distance, excess, chosen, seen, view):
     means, first_less, second_less, along, open_ = view[0], view[1], view[2], view[3], view[4]
     facet, rise = chosen.facet, chosen.rise
     for i in range(len(facet)):
+        # The path to the three corners, as its mean and two deviations from it.
         first, second, third = excess[first_of[i]], excess[second_of[i]], excess[third_of[i]]
         mean = (first + second + third) / 3
         means[i], first_less[i], second_less[i] = mean, first - mean, second - mean
         open_[i] = seen[facet[i]]
-    # Apart from what is picked here and there, in vector lanes.
+    # In a loop of its own without gathered values, so that it runs in vector lanes.
     for i in range(len(facet)):
         along[i] = (n0[i] * a + n1[i] * b + n2[i] * c - plane[i]) / (distance + means[i])
+        # The surface stands out of the facet toward the antenna, which shortens the path.
         means[i] -= rise[i] * along[i]
 
 
@@ -198,11 +208,13 @@ def _see(antenna, distance, excess, chosen, seen, view):
 def _facing_both(tx_facing, rx_facing, bend, both, out):
     """Fill in the reciprocal obliquity of facets that face Tx and Rx, 0 for the others."""
     for i in range(len(out)):
+        # The side of the facet is that of the antenna which is lower over it; both faces of a sheet
+        # count.
         low, high = min(tx_facing[i], rx_facing[i]), max(tx_facing[i], rx_facing[i])
         behind = both and high < 0
         low, high = (-high, -low) if behind else (low, high)
-        # The part that falls to 0 at the terminator by itself, and the one between Tx and Rx, which
-        # has to be led there.
+        # The lower value falls to 0 at the terminator by itself. The difference between Tx and Rx
+        # does not: it is faded out over the bend of the facet.
         h = max(bend[i], 1e-300)
         over = min(1.0, max(0.0, (low + h) / (2 * h)))
         out[i] = max(low, 0.0) + over * (high - low) / 2
@@ -210,13 +222,13 @@ def _facing_both(tx_facing, rx_facing, bend, both, out):
 
 @inlined(fastmath=FAST)
 def _lit_by_tx(tx_facing, chosen, both, currents, out):
-    """Take the reciprocal obliquity its part times, and add that of the currents that Tx drives."""
+    """Multiply the reciprocal obliquity by its weight, and add that of the currents Tx drives."""
     n0, n1, n2, bend = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.bend
     along, x, y, z, reciprocal = currents[0], currents[1], currents[2], currents[3], currents[4]
     for i in range(len(out)):
         side = -1.0 if both and tx_facing[i] < 0 else 1.0
         facing = side * tx_facing[i]
-        # What does not fall to 0 at the terminator by itself is led there.
+        # The term across does not fall to 0 at the terminator by itself: it is faded out.
         h = max(bend[i], 1e-300)
         over = min(1.0, max(0.0, (facing + h) / (2 * h)))
         across = x * n0[i] + y * n1[i] + z * n2[i]
@@ -225,12 +237,13 @@ def _lit_by_tx(tx_facing, chosen, both, currents, out):
 
 @inlined(fastmath=FAST)
 def _light(tx, rx, chosen, far_t, far_r, carrier, spreading, terms):
-    """Fill the terms of facets under two views; their strength is the obliquity before."""
+    """Fill in the terms of facets under two views; before, their strength is the obliquity."""
     tx_mean, tx_u, tx_v, tx_seen = tx[0], tx[1], tx[2], tx[4]
     rx_mean, rx_u, rx_v, rx_seen = rx[0], rx[1], rx[2], rx[4]
     areas = chosen.areas
     mean, u, v, strength = terms
     for i in range(len(mean)):
+        # A facet returns no more than the antenna that sees less of it.
         size = strength[i] * min(tx_seen[i], rx_seen[i]) * areas[i]
         if spreading:
             size /= (far_t + tx_mean[i]) * (far_r + rx_mean[i])
@@ -254,19 +267,23 @@ def _cut(tx, rx, tx_edge, rx_edge, facet, terms):
             continue
         edge = tx_edge[facet[i]] if tx[4, i] <= rx[4, i] else rx_edge[facet[i]]
         a, b, c = edge[0], edge[1], edge[2]
+        # The paths over the three corners, from mean and deviations.
         first, second, third = mean[i] + u[i], mean[i] + v[i], mean[i] - u[i] - v[i]
-        # The corner on one side of the edge, with the two on the other.
+        # Put first the corner that is alone on its side of the edge.
         lit = (a > 0) + (b > 0) + (c > 0) == 1
         if (b > 0) == lit and (a > 0) != lit:
             a, b, c, first, second, third = b, c, a, second, third, first
         elif (a > 0) != lit:
             a, b, c, first, second, third = c, a, b, third, first, second
+        # The edge crosses both sides that meet at that corner, at these fractions of them.
         along, beside = a / (a - b), a / (a - c)
         second, third = along * (second - first), beside * (third - first)
+        # The strength of the whole facet: the fraction that is seen was in it.
         place, whole = i, strength[i] / fraction
         size = whole * along * beside
         if not lit:
             place, strength[i], size, count = count, whole, -size, count + 1
+        # The same terms for the triangle, whose corners are that one and both crossings.
         middle = first + (second + third) / 3
         mean[place], strength[place] = middle, size
         u[place], v[place] = first - middle, first + second - middle
@@ -310,6 +327,7 @@ def integrate(begin, end, facets, views, waves, out):
                 pieces = _cut(view[t], view[r], tx_edge, rx_edge, chosen.facet, rows)
             mean, u, v = rows[0, :pieces], rows[1, :pieces], rows[2, :pieces]
             strength = rows[3, :pieces]
+            # The series is for small phases: others go last, by the phase at the highest frequency.
             small = large_last(mean, u, v, strength, SERIES / waves.wavenumber[task].max() ** 2)
             for node in range(waves.wavenumber.shape[1]):
                 k = waves.wavenumber[task, node]
@@ -320,7 +338,7 @@ def integrate(begin, end, facets, views, waves, out):
 
 @inlined()
 def stretch(known, place):
-    """The known places (place,) on either side of one between the first and the last."""
+    """Return the nearest known places (place,) on either side of a place between both ends."""
     left = min(int(place), len(known) - 2)
     right = left + 1
     while not known[left]:
@@ -334,9 +352,9 @@ def stretch(known, place):
 def fill_envelope(chirps, fraction, tx, weights, course, strength, amplitude):
     """Fill the amplitude (node, chirp, rx, part) at chirps, given by the fraction of the interval.
 
-    ``tx (chirp,)`` and ``weights (tx, rx, pair)`` say what receivers take of each pair of nodes;
-    ``course`` is the ratio and its slope (place, node, pair, part), and where it is known (place,
-    part); ``strength (chirp, rx, part)`` multiplies it.
+    ``tx (chirp,)`` and ``weights (tx, rx, pair)`` say what receivers take of each pair of nodes.
+    ``course`` is the ratio and its slope (place, node, pair, part), and where these are known
+    (place, part). The ratio is multiplied by ``strength (chirp, rx, part)``.
     """
     ratio, slope, known = course
     nodes, pairs, parts = ratio.shape[1:]
@@ -355,7 +373,7 @@ def fill_envelope(chirps, fraction, tx, weights, course, strength, amplitude):
         value = np.empty(parts, dtype=np.complex128)
         amplitude[:, chirp] = 0
         for pair in range(pairs):
-            # Where nodes are at antennas a transmitter needs but a few of the pairs.
+            # Where the nodes are at antennas, a transmitter needs only a few of the pairs.
             used = False
             for receiver in range(receivers):
                 used |= own[receiver, pair] != 0

@@ -2,10 +2,11 @@
 
 The integral is that of `rtradar.kernels.scatter.facets`, with the exact phase at each chirp. What a
 facet returns is shared between the two echoes whose lengths are next to its path, by weights that
-add up to 1 and change smoothly: each share is turned back to the length of its echo, so that their
+add up to 1 and change smoothly. Each share is turned back to the length of its echo, so that their
 sum is exact at every frequency where it is computed, and little phase is left over the sweep. A
-facet over which the path changes much in terms of the sweep is taken apart into its edges, and an
-edge into its ends: the mean of exp(-jk p) over a triangle with p = a <= b <= c at its corners is
+facet over which the path changes so much that its phase varies over the sweep is taken apart into
+its edges, and an edge into its ends: the mean of exp(-jk p) over a triangle with p = a <= b <= c at
+its corners is
 
     2 j / (k (c - a)) * (E(b, c) - E(a, b)),  E(x, y) = exp(-jk (x + y) / 2) sinc(k (y - x) / 2)
                                                       = j (exp(-jky) - exp(-jkx)) / (k (y - x)).
@@ -95,12 +96,16 @@ class LengthGrid(NamedTuple):
 def _put(out, path, grid, value):
     """Share the fields ``value (3,)`` exp(-jk path) between two echoes of ``out (3, echo)``.
 
-    As conjugates, turned back to the lengths of these. The three wavenumbers are evenly spaced.
+    They are added as conjugates, turned back to the lengths of the echoes. The three wavenumbers
+    are evenly spaced.
     """
+    # The echo whose length is next below the path, and the share of the one above.
     place = path / grid.step - grid.first
     cell = math.floor(place)
     after = smoothstep(place - cell)
     beyond = (place - cell) * grid.step
+    # The field turned back to the length of the lower echo, at the middle wavenumber; for the other
+    # two by the difference of the wavenumbers.
     re, im = fast_phasor(grid.wavenumber[1] * beyond)
     turn = complex(re, im)
     re, im = fast_phasor((grid.wavenumber[2] - grid.wavenumber[1]) * beyond)
@@ -114,8 +119,9 @@ def _put(out, path, grid, value):
 
 @inlined(fastmath=FAST)
 def _put_edge(out, low, high, grid, apart, value, field):
-    """The same for ``value (3,)`` E(low, high); taken ``apart`` into its ends."""
+    """Do the same for ``value (3,)`` E(low, high), taken ``apart`` into its ends or whole."""
     for node in range(3):
+        # The ends radiate as the difference of two exponentials, the whole edge as a sinc.
         k = grid.wavenumber[node]
         if apart:
             field[node] = value[node] * complex(0.0, 1.0 / (k * (high - low)))
@@ -141,7 +147,9 @@ def _put_facet(out, mean, u, v, grid, strength, factor, field, value):
     w, spread = -u - v, u * u + u * v + v * v
     low, high = min(u, min(v, w)), max(u, max(v, w))
     middle = -low - high
+    # By how many radians the phase of a path changes over half the sweep, over what is allowed.
     many = grid.wavenumber[1] * grid.sweep / _MOST_TURN
+    # The path changes little over the facet: its field is one term, of the mean path.
     if (high - low) * many <= 1.0:
         for node in range(3):
             k = grid.wavenumber[node]
@@ -155,6 +163,7 @@ def _put_facet(out, mean, u, v, grid, strength, factor, field, value):
     for node in range(3):
         # j k times 2 j / (k (high - low)).
         value[node] = factor[node] * (-2.0 * strength * _OVER_ROOT_PI / (high - low))
+    # Each of the two edges is taken apart in turn if the path still changes much over it.
     upper, lower = (high - middle) * many > 1.0, (middle - low) * many > 1.0
     _put_edge(out, mean + middle, mean + high, grid, upper, value, field)
     for node in range(3):
@@ -164,7 +173,7 @@ def _put_facet(out, mean, u, v, grid, strength, factor, field, value):
 
 @inlined(fastmath=FAST)
 def _blend(before, after, fraction, weight, out):
-    """Fill ``out (facet,)`` with the visibility (place, facet) between keyframes, by weights."""
+    """Fill ``out (facet,)`` with the weighted visibility (place, facet) between two keyframes."""
     for f in range(len(out)):
         out[f] = 0.0
     for place in range(len(weight)):
@@ -176,7 +185,7 @@ def _blend(before, after, fraction, weight, out):
 
 @compiled()
 def facets_by_length(begin, end, facets, views, grid, spreading, out):
-    """Add to ``out (task, rx, node, echo)`` amplitudes as of `Echoes` [m], from begin to end."""
+    """Add to ``out (task, rx, node, echo)`` amplitudes as in `Echoes` [m], from begin to end."""
     n_facets, n_vertices = len(facets.faces), facets.vertices.shape[1]
     middle, (x, y, z) = n_vertices - n_facets, facets.vertices
     field, value = np.empty(3, dtype=np.complex128), np.empty(3, dtype=np.complex128)
@@ -184,6 +193,7 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
     open_tx, open_rx, facing = np.empty(n_facets), np.empty(n_facets), np.empty(n_facets)
     factor, lit = np.empty((n_facets, 3), np.complex128), np.empty(n_facets, np.int64)
     for task in range(begin, end):
+        # The visibility from Tx, and the facets that it lights, are the same for all receivers.
         fraction = smoothstep(views.fraction[task])
         before, after = views.seen[views.before[task]], views.seen[views.after[task]]
         first, last = views.factor[views.before[task]], views.factor[views.after[task]]
@@ -196,6 +206,8 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
             height = dot(normal, tx) - facets.planes[f]
             if open_tx[f] > 0 and (height > 0 or facets.both_sides):
                 facing[f] = height / (far_tx + to_tx[middle + f])
+                # What walls, material and antennas make of a conductor's field, between both
+                # keyframes.
                 for node in range(3):
                     begins = first[node, f]
                     factor[f, node] = begins + fraction * (last[node, f] - begins)
@@ -208,12 +220,16 @@ def facets_by_length(begin, end, facets, views, grid, spreading, out):
             for f in lit[:count]:
                 normal, far_r = facets.normals[f], far_rx + to_rx[middle + f]
                 along = (dot(normal, rx) - facets.planes[f]) / far_r
-                # Both on one side of the facet, which of a closed mesh is the outside.
+                # Tx and Rx are on one side of the facet, which is the outside of a closed mesh.
                 if open_rx[f] <= 0 or along * facing[f] <= 0:
                     continue
+                # The reciprocal obliquity; a facet returns no more than the antenna that sees less
+                # of it.
                 size = abs(along + facing[f]) / 2 * min(open_tx[f], open_rx[f]) * facets.areas[f]
                 if spreading:
                     size /= (far_tx + to_tx[middle + f]) * far_r
+                # The paths over the corners are taken as linear, and the middle of the facet gives
+                # their bow.
                 a, b, c = facets.faces[f, 0], facets.faces[f, 1], facets.faces[f, 2]
                 first_path, second_path = to_tx[a] + to_rx[a], to_tx[b] + to_rx[b]
                 mean = (first_path + second_path + to_tx[c] + to_rx[c]) / 3

@@ -1,10 +1,10 @@
 """Echoes over specular points that are nearly known, by one or two steps of Newton's method.
 
-Over a wall each part of the body sends an echo more, so to search for the specular point of each of
-them would cost more than all the rest of a run. Between keyframes a specular point wanders little
-on its part: the steps start where it is expected, and lead to the point for the middle of the line
-of receivers. The path is stationary there: for each receiver its second-order term, -1/2 g H^-1 g
-with the slope g on the tangent plane, leaves an error of third order, below 1 um.
+Each wall adds an echo from each part of the body. To search for the specular points of all these
+echoes would cost more than all the rest of a run. But between keyframes a specular point wanders
+little on its part. So the steps start where it is expected, and lead to the point for the middle of
+the line of receivers. The path is stationary there: with the second-order term of each receiver,
+-1/2 g H^-1 g with the slope g on the tangent plane, an error of third order is left, below 1 um.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from rtradar.kernels.scatter.specular_point import (
 
 _NEARBY_STEPS = 6
 _SMALL_STEP = 0.003
-"""Step over the least semi-axis after which each receiver corrects its length itself."""
+"""Last step over the least semi-axis: from there each receiver corrects its length itself."""
 
 _LEFT_OUT_M = 1e-6
 """Largest error of a length after the correction by its second-order term [m]."""
@@ -70,19 +70,24 @@ def _plane_in_world(plane, frame):
 
 @inlined()
 def _settle(tx, rx, axes, start):
-    """Newton's steps from near the specular point, all in the part's axes.
+    """Take Newton's steps from near the specular point, all in the part's axes.
 
-    Whether they settled on the side that Tx sees, the point, its tangent plane, and the leg to Tx.
+    Returned are whether they settled on the side that Tx sees, the point, its tangent plane, and
+    the leg to Tx.
     """
     inverse_squares = (1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2)
     least = min(axes[0], min(axes[1], axes[2]))
+    # The expected point need not lie on the surface.
     x, y, z = on_surface(start[0], start[1], start[2], inverse_squares)
     settled = False
     for _ in range(_NEARBY_STEPS):
+        # Take Newton's steps while they lead to a minimum on the lit side and are not absurdly
+        # long.
         plane, out, back, step = look(x, y, z, tx, rx, inverse_squares)
         size = math.sqrt(step.e * step.e + step.f * step.f)
         if not (out.facing + back.facing > 0 and step.determinant > 0 and size < 10 * least):
             break
+        # What is left of the step is small enough for the second-order term of each receiver.
         settled = size < _SMALL_STEP * least
         if settled:
             break
@@ -94,13 +99,14 @@ def _settle(tx, rx, axes, start):
 def _correct(rx, point, plane, out, least, room):
     """Lengths and returns for receivers ``rx (3, rx)`` beside the one whose specular point this is.
 
-    The path is stationary there: its second-order term, -1/2 g H^-1 g with the slope g on the
-    tangent plane, leaves an error of third order. ``room (4, rx)``: lengths and returns first.
-    Whether all receivers see the point and are near enough.
+    The path is stationary there: with its second-order term, -1/2 g H^-1 g with the slope g on the
+    tangent plane, an error of third order is left. ``room (4, rx)`` is filled, with lengths and
+    returns first. Returned is whether all receivers see the point and are near enough.
     """
-    # Receivers in vector lanes, so without branches.
+    # Without branches, so that the receivers run in vector lanes.
     for i in range(rx.shape[1]):
         back = leg(rx[0, i] - point[0], rx[1, i] - point[1], rx[2, i] - point[2], plane)
+        # The step of this receiver gives its own second-order term.
         step = newton(plane, out, back)
         room[0, i] = out.distance + back.distance - step.drop
         ranges = out.distance * back.distance
@@ -124,9 +130,9 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
     polarisation [m]. ``tx_index (chirp,)`` is the transmitter of each chirp, ``near (chirp, echo,
     3)`` are expected specular points, in the axes of the parts [m], which need not lie on the
     surface. Echoes that have 0 there get the path over the part's centre and no return. Returned is
-    the number of echoes, over all chirps, that had to be searched for as by `solve`: where the
-    steps do not settle on the side that both antennas see, or lengths may be off by 1 um. That is
-    near forward scattering, where a small step of an antenna moves the specular point far.
+    the number of echoes, over all chirps, that had to be searched for as by `solve`, because the
+    steps did not settle on the side that both antennas see, or lengths could be off by 1 um. That
+    happens near forward scattering, where a small step of an antenna moves the specular point far.
     """
     # Unpacked here, as in `solve`.
     images_tx, images_rx, images_middle, out_leg, back_leg, part_of = images
@@ -141,11 +147,13 @@ def nearby_echoes(start, stop, images, tx_index, ellipsoids, near, length, ampli
             part = part_of[echo]
             axes, frame = semi_axes[part], frames[chirp, part]
             centre = centres[chirp, part]
+            # The images of the antennas over the legs of this echo, in the axes of the part.
             rx = images_rx[back_leg[echo], transmitter]
             tx = turned_back(frame, minus(images_tx[out_leg[echo], transmitter], centre))
             middle = turned_back(frame, minus(images_middle[back_leg[echo], transmitter], centre))
             for k in range(3):
                 guess[k] = near[chirp, echo, k]
+            # Nothing is expected: the path over the centre, without a return.
             if guess[0] == 0 and guess[1] == 0 and guess[2] == 0:
                 over_centre = math.sqrt(dot(tx, tx)) + math.sqrt(dot(middle, middle))
                 for i in range(receivers):

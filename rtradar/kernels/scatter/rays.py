@@ -22,7 +22,7 @@ NEAR = 1.1
 
 @inlined()
 def _grown(rays):
-    """Twice the room; number by number, as to assign slices takes seconds to compile."""
+    """Return a copy with twice the room, made number by number: slices take seconds to compile."""
     rows, columns = rays.shape
     out = np.empty((rows, 2 * columns), dtype=rays.dtype)
     for row in range(rows):
@@ -35,31 +35,34 @@ def _grown(rays):
 def near_rays(origins, targets, group, own, pose, centres, maps, longest):
     """Return one ray for each line of sight and each part that this line comes near.
 
-    Lines (line, 3) go from ``origins`` to ``targets`` [m]. Those of one ``group (line,)`` end on
-    the part ``own (group,)``, -1 for none, which cannot occlude them, of the body in one of its
-    poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``maps (pose, part, 3, 3)`` to the axes
-    where a part is the unit sphere, and its ``longest (part,)`` semi-axis [m].
+    Lines (line, 3) go from ``origins`` to ``targets`` [m]. Lines of one ``group (line,)`` end on
+    the part ``own (group,)``, which cannot occlude them, or on none where it is -1. The body is in
+    the pose ``pose (group,)`` then: ``centres (pose, part, 3)``, ``maps (pose, part, 3, 3)`` to the
+    axes where a part is the unit sphere, and its ``longest (part,)`` semi-axis [m].
 
-    Returned are rays (7, ray) float32, and of each its line and that part (2, ray): the start, at
-    most two radii before the point nearest to the centre of the unit sphere; the unit direction;
-    the length.
+    Returned are rays (7, ray) float32, with the line and the part of each (2, ray). A ray is its
+    start, at most two radii before the point nearest to the centre of the unit sphere; its unit
+    direction; and its length.
     """
     rays, whose = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
     count = 0
     for line in range(len(group)):
         g, origin = group[line], origins[line]
         way, at = minus(targets[line], origin), pose[g]
+        # A line of no length must not divide by zero.
         over_square = 1 / max(dot(way, way), 1e-300)
         for part in range(len(longest)):
-            # By the bounding ball first, which rules out most.
+            # The bounding ball comes first, because it rules out most parts.
             gap, reach = minus(centres[at, part], origin), NEAR * longest[part]
             aside = minus(gap, scaled(way, dot(gap, way) * over_square))
             if part == own[g] or dot(aside, aside) > reach * reach:
                 continue
             m = maps[at, part]
+            # The line in the axes where the part is the unit sphere.
             start, along = turned(m, minus(origin, centres[at, part])), turned(m, way)
             span, back = dot(along, along), -dot(start, along)
-            # The least square of the distance along the line, times its span: no division.
+            # The least squared distance from the centre, times the square of the line's length, so
+            # that nothing is divided: it is reached within the line, at its end or at its start.
             square = dot(start, start)
             least = (
                 square * span - back * back if back < span else (square - 2 * back + span) * span
@@ -84,8 +87,8 @@ def near_rays(origins, targets, group, own, pose, centres, maps, longest):
 def _nearest(x, y, z, start, turn, shift, nearest):
     """Fill in where lines of sight come nearest to a part, as fractions; return how many come near.
 
-    The part is the unit sphere in its own axes. ``nearest`` is -1 where the line passes outside the
-    bounding volume.
+    In the axes of the lines the part is the unit sphere. ``nearest`` is -1 where the line passes
+    outside the bounding volume.
     """
     s0, s1, s2 = start[0], start[1], start[2]
     square = s0 * s0 + s1 * s1 + s2 * s2
@@ -95,10 +98,12 @@ def _nearest(x, y, z, start, turn, shift, nearest):
         w0 = turn[0, 0] * x[vertex] + turn[0, 1] * y[vertex] + turn[0, 2] * z[vertex]
         w1 = turn[1, 0] * x[vertex] + turn[1, 1] * y[vertex] + turn[1, 2] * z[vertex]
         w2 = turn[2, 0] * x[vertex] + turn[2, 1] * y[vertex] + turn[2, 2] * z[vertex]
+        # From the antenna to the vertex.
         w0, w1, w2 = w0 + (shift[0] - s0), w1 + (shift[1] - s1), w2 + (shift[2] - s2)
         span = w0 * w0 + w1 * w1 + w2 * w2
         back = -(s0 * w0 + s1 * w1 + s2 * w2)
-        # Least square of the distance along the line, times its span: no division.
+        # The least squared distance from the centre, times the square of the line's length, so that
+        # nothing is divided.
         least = square * span - back * back if back < span else (square - 2 * back + span) * span
         near = least < bound * span
         nearest[vertex] = max(min(back / span, 1.0), 0.0) if near else -1.0
@@ -108,22 +113,25 @@ def _nearest(x, y, z, start, turn, shift, nearest):
 
 @inlined(fastmath={"contract"})
 def _facing(local, x, y, z, axes, margin, faces, begin):
-    """Fill in whether a vertex ``faces`` an antenna, or not away by more than the margin.
+    """Fill in whether a vertex ``faces`` an antenna, or faces away by no more than the margin.
 
-    A vertex that faces away is seen through its own part: only what is met before that, at the
-    fraction ``begin`` of the way, occludes it.
+    A vertex that faces away is seen through its own part: only what is met before that part, at the
+    fraction ``begin`` of the line, occludes it.
     """
     s0, s1, s2 = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
     l0, l1, l2 = local[0], local[1], local[2]
+    # How far the antenna is outside of the part, in the part's own measure.
     outside = s0 * l0**2 + s1 * l1**2 + s2 * l2**2 - 1
     for vertex in range(len(x)):
+        # Whether the normal of the surface there is toward the antenna.
         n0, n1, n2 = s0 * x[vertex], s1 * y[vertex], s2 * z[vertex]
         a0, a1, a2 = l0 - x[vertex], l1 - y[vertex], l2 - z[vertex]
         along = n0 * a0 + n1 * a1 + n2 * a2
         size = (n0 * n0 + n1 * n1 + n2 * n2) * (a0 * a0 + a1 * a1 + a2 * a2)
+        # Where the line from the antenna enters the vertex's own part.
         span = s0 * a0 * a0 + s1 * a1 * a1 + s2 * a2 * a2
         back = s0 * l0 * a0 + s1 * l1 * a1 + s2 * l2 * a2
-        # Vertices stand out a little: from behind the edge some are seen past their own part.
+        # Vertices stand out of the ellipsoid a little: some behind its edge are seen past it.
         chord = back * back - span * outside
         met = (back - math.sqrt(max(chord, 0.0))) / span
         faces[vertex] = 0.0 if along < 0 and along * along > margin * margin * size else 1.0
@@ -133,11 +141,14 @@ def _facing(local, x, y, z, axes, margin, faces, begin):
 @inlined()
 def _may_stand_before(antenna, part, other, centres, longest):
     """Whether one bounding ball may occlude another: it begins nearer, and their cones overlap."""
+    # Both parts as balls, as the antenna sees them.
     a, b = minus(centres[part], antenna), minus(centres[other], antenna)
     to_part, to_other, along = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), dot(a, b)
     own, its = NEAR * longest[part], NEAR * longest[other]
+    # The other part begins behind the end of this one.
     if to_other - its >= to_part + own:
         return False
+    # The antenna is in one of the balls: no cone holds it.
     if to_part <= own or to_other <= its:
         return True
     angle = math.acos(min(1.0, max(-1.0, along / (to_part * to_other))))
@@ -162,6 +173,8 @@ def _write_rays(lines, axes, out):
         w2 = t20 * x[i] + t21 * y[i] + t22 * z[i] + d2
         distance = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
         inverse = 1 / distance
+        # The ray starts two radii before the point that is nearest, and ends where the vertex's own
+        # part, or the vertex itself, is met.
         ahead = max(nearest[i] - 2 * inverse, 0.0)
         rays[0, place] = s0 + ahead * w0
         rays[1, place] = s1 + ahead * w1
@@ -172,8 +185,8 @@ def _write_rays(lines, axes, out):
         rays[6, place] = (begin[i] - ahead) * distance
         rays[7, place] = nearest[i]
         whose[0, place], whose[1, place] = slot + chosen[i], other
-        # What is met behind the near side of the vertex's own part does not count: the next ray
-        # takes the place of one that would begin there.
+        # What is met behind the near side of the vertex's own part does not count: a ray that would
+        # begin there is overwritten by the next one.
         place += np.uint64(ahead < begin[i])
     return np.int64(place)
 
@@ -185,7 +198,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, f
     ``rays (8, ray)`` float32: start, direction and length in axes where the part that it may meet
     is the unit sphere, and the fraction of the line of sight at which it comes nearest to it.
     ``whose (2, ray)``: the place of the vertex in (antenna, vertex), and that part. ``vertices (3,
-    vertex)`` are those of all parts, of each from ``first (part + 1,)`` on.
+    vertex)`` are those of all parts; the vertices of each part begin at ``first (part + 1,)``.
     """
     every, most = len(centres), np.diff(first).max()
     turn, shift, start = np.empty((3, 3)), np.empty(3), np.empty(3)
@@ -214,7 +227,8 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, f
                     local = turned_back(frames[part], minus(antennas[a], centres[part]))
                     _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
                     for vertex in range(len(all_x)):
-                        # The next one takes its place where this one is not wanted: no branch.
+                        # A vertex that does not face the antenna is overwritten by the next one,
+                        # which needs no branch.
                         chosen[facing], begin[facing] = vertex, begins[vertex]
                         x[facing], y[facing] = all_x[vertex], all_y[vertex]
                         z[facing] = all_z[vertex]
@@ -241,6 +255,7 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, f
 @compiled()
 def first_occluders(met, fraction, whose, occluder):
     """Fill in for each vertex the part that is met first: where its ray comes nearest decides."""
+    # Along one line of sight the part whose nearest point comes first is taken to be met first.
     first = np.full(len(occluder), np.inf, dtype=np.float32)
     for ray in range(len(met)):
         vertex = whose[0, ray]

@@ -29,8 +29,9 @@ class PathFactors(NamedTuple):
 class Blend(NamedTuple):
     """Where chirps are between keyframes and between the ends of lines of antennas.
 
-    Each chirp has an ``interval``, the ``fraction`` of it that is over, and a ``line``;
-    ``tx_weight (chirp, tx_end)`` and ``rx_weight (chirp, rx, rx_end)`` are the weights of the ends.
+    Each chirp has an ``interval``, the ``fraction`` of the interval that has passed, and a
+    ``line``; ``tx_weight (chirp, tx_end)`` and ``rx_weight (chirp, rx, rx_end)`` are the weights of
+    the ends.
     """
 
     interval: Indices
@@ -54,6 +55,7 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
     for chirp in range(start, stop):
         which, line, fraction = at.interval[chirp], at.line[chirp], at.fraction[chirp]
         smooth = smoothstep(fraction)
+        # Real and imaginary parts apart, so that the loops over echoes run in vector lanes.
         left = np.zeros((ends, echoes), dtype=np.float32)
         real, imaginary = np.zeros((2, nodes, ends, echoes), dtype=np.float32)
         fade = np.empty(echoes, dtype=np.float32)
@@ -76,7 +78,7 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
                         real[node, end, echo] += old * first[echo].real + new * last[echo].real
                         imaginary[node, end, echo] += old * first[echo].imag + new * last[echo].imag
         for receiver in range(receivers):
-            # Interpolate visibility along the line of Rx, times the bare amplitude.
+            # Interpolate visibility along the line of Rx, and multiply by the bare amplitude.
             weights, own = at.rx_weight[chirp, receiver], bare[chirp, receiver]
             fade[:] = 0
             for end in range(ends):
@@ -85,7 +87,7 @@ def path_amplitudes(start, stop, bare, before, after, at, out):
                     fade[echo] += weight * left[end, echo]
             for echo in range(echoes):
                 fade[echo] *= np.float32(own[echo])
-            # The same for the factors, node by node, and multiply.
+            # The factors along the line of Rx, node by node; the minus sign conjugates them.
             for node in range(nodes):
                 target = out[node, chirp, receiver]
                 target[:] = 0
@@ -114,6 +116,8 @@ def received_from_conductors(start, stop, sent, received, to_tx, to_rx, out):
             for one in range(tx_ends):
                 for other in range(rx_ends):
                     for echo in range(echoes):
+                        # The bisector halves the angle between both ways, as the normal of a mirror
+                        # does.
                         a, b = to_tx[keyframe, line, one, echo], to_rx[keyframe, line, other, echo]
                         normal = plus(a, b)
                         square = dot(normal, normal)
@@ -142,9 +146,10 @@ class PartPoints(NamedTuple):
 class SlabDelays(NamedTuple):
     """Which slabs delay the columns of an echo list.
 
-    ``echo (column,)`` is the echo of each; ``legs (column, 2, 3)`` are, on the way out and back,
-    its leg, its first passage and the one after its last. ``passes (passage,)`` are the passes
-    through a slab, ``slabs (passage, 5)`` its normal, thickness [m] and squared index.
+    ``echo (column,)`` is the echo of each column. ``legs (column, 2, 3)`` are its leg, its first
+    passage and the one after its last, on the way out and on the way back. ``passes (passage,)``
+    are the passes through a slab, ``slabs (passage, 5)`` its normal, thickness [m] and squared
+    index.
     """
 
     echo: Indices
@@ -156,11 +161,13 @@ class SlabDelays(NamedTuple):
 @inlined()
 def _delay(antenna, place, first, last, delays):
     """Length that the passages on a leg add to it."""
+    # A leg goes straight on through each slab, so one direction gives all angles of incidence.
     way, _ = with_length(minus(place, antenna))
     total = 0.0
     for one in range(first, last):
         slab, passes = delays.slabs[one], delays.passes[one]
         cosine = min(abs(dot(way, slab)), 1.0)
+        # The passes through the slab, less the air that a transmitted wave has passed anyway.
         total += slab[3] * passes * math.sqrt(slab[4] - 1 + cosine * cosine)
         if passes % 2:
             total -= slab[3] * cosine
@@ -217,8 +224,8 @@ def delayed_lengths(start, stop, antennas, tx_index, points, bodies, delays, len
 class EdgeBalls(NamedTuple):
     """Edges of a mesh: a ball around all, ``centre (3,)`` and ``radius``, and one around each [m].
 
-    ``middles (edge, 3)`` and ``radii (edge,)`` are those of each, and ``normals (edge, 2, 3)`` are
-    those of both faces that meet there.
+    ``middles (edge, 3)`` and ``radii (edge,)`` belong to the balls around each edge, and ``normals
+    (edge, 2, 3)`` to the two faces that meet there.
     """
 
     centre: Array
@@ -230,7 +237,7 @@ class EdgeBalls(NamedTuple):
 
 @inlined()
 def _beside(origin, way, square, centre, reach):
-    """Whether a leg comes so near to a place."""
+    """Whether a leg comes nearer to a place than the reach."""
     there = minus(centre, origin)
     aside = minus(there, scaled(way, min(max(dot(there, way) / square, 0.0), 1.0)))
     return dot(aside, aside) < reach * reach
@@ -240,9 +247,9 @@ def _beside(origin, way, square, centre, reach):
 def outline_near(origins, ways, later_m, edges):
     """Find edges of the outline that a mesh has along each leg, where the leg comes near to them.
 
-    Legs have ``origins`` and ``ways`` to their ends (leg, 3) [m], ``edges`` are `EdgeBalls`. Over
-    an edge that is near a leg may be longer by less than ``later_m``. Returned are the numbers of
-    legs and of edges (2, pair).
+    Legs have ``origins`` and ``ways`` to their ends (leg, 3) [m], ``edges`` are `EdgeBalls`. An
+    edge is near if a detour over it may lengthen the leg by less than ``later_m``. Returned are the
+    numbers of legs and of edges (2, pair).
     """
     found, count = np.empty((2, 1024), dtype=np.int64), 0
     for leg in range(len(origins)):
@@ -250,10 +257,14 @@ def outline_near(origins, ways, later_m, edges):
         square = dot(way, way)
         if square == 0:
             continue
+        # The half width of the ellipsoid on which a detour over an edge is ``later_m`` longer.
         wide = math.sqrt(later_m * (2 * math.sqrt(square) + later_m)) / 2
+        # The ball round the whole mesh rules out most legs.
         if not _beside(origin, way, square, edges.centre, edges.radius + wide):
             continue
         for edge in range(len(edges.radii)):
+            # An edge is on the outline if the leg meets one of its faces from the front and the
+            # other from behind.
             one, other = edges.normals[edge, 0], edges.normals[edge, 1]
             if (dot(one, way) > 0) == (dot(other, way) > 0):
                 continue

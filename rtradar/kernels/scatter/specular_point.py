@@ -1,12 +1,12 @@
 """Specular points of ellipsoids in the near field, by Newton's method from a starting point.
 
 In the ellipsoid's own axes the specular point makes the path |T - p| + |R - p| over the surface
-stationary (least, for it faces both). Newton's method on the tangent plane finds it, for the matrix
-that it needs,
+stationary (least, because the point faces both antennas). Newton's method on the tangent plane
+finds it. The determinant of the matrix that the method needs,
 
     H = sum over T, R of (I - s s^T) / R + (s_T + s_R).n S,     S the shape operator,
 
-is the one whose determinant gives the return by stationary phase:
+also gives the return by stationary phase:
 
     |F| = 2 sqrt(pi) cos(i) / sqrt(det H),    divided by R1 R2 for the spreading of both legs.
 
@@ -14,7 +14,7 @@ The matrix holds the curvature of both wavefronts, so that the near field is exa
 optics. Source: Born and Wolf, *Principles of Optics*, appendix III (stationary phase of double
 integrals). Everything is float64.
 
-In the far field the specular point is that of the bisector of both ways (`far_field`).
+In the far field the normal at the specular point is the bisector of both ways (`far_field`).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Geometry(NamedTuple):
 
 
 class Options(NamedTuple):
-    """What an amplitude holds: co-polarisation (v, or h), and 1 / (R1 R2)."""
+    """What an amplitude holds: the co-polar fraction (of v, or of h), and 1 / (R1 R2)."""
 
     horizontal: bool
     spreading: bool
@@ -74,7 +74,7 @@ class Plane(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """Way from a point to an antenna: slopes along the tangents; ee, ff, ef of (I - s s^T) / R."""
+    """Way from a point to an antenna: slopes along both tangents; ee, ff, ef of (I - s s^T) / R."""
 
     distance: float
     direction: tuple[float, float, float]
@@ -96,6 +96,7 @@ class Step(NamedTuple):
 def _tangent_plane(x, y, z, inverse_squares):
     """Tangent plane of an ellipsoid at a point, in its own axes."""
     ia, ib, ic = inverse_squares
+    # The unit normal, along the gradient of x^2 / a^2 + y^2 / b^2 + z^2 / c^2.
     n0, n1, n2 = x * ia, y * ib, z * ic
     flat = 1 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     n0, n1, n2 = n0 * flat, n1 * flat, n2 * flat
@@ -105,6 +106,7 @@ def _tangent_plane(x, y, z, inverse_squares):
     v = n0 * n1 * u
     e0, e1, e2 = 1 + sign * n0 * n0 * u, sign * v, -sign * n0
     f0, f1, f2 = v, sign + n1 * n1 * u, -n1
+    # The shape operator is the Hessian of the same function over the length of its gradient.
     ia, ib, ic = ia * flat, ib * flat, ic * flat
     ee = e0 * e0 * ia + e1 * e1 * ib + e2 * e2 * ic
     ff = f0 * f0 * ia + f1 * f1 * ib + f2 * f2 * ic
@@ -118,6 +120,7 @@ def leg(x, y, z, plane):
     distance = math.sqrt(x * x + y * y + z * z)
     near = 1 / distance
     direction = (x * near, y * near, z * near)
+    # Slope and curvature of the distance along both tangents.
     e, f = dot(direction, plane.e), dot(direction, plane.f)
     hessian = ((1 - e * e) * near, (1 - f * f) * near, -e * f * near)
     return Leg(distance, direction, (e, f), dot(direction, plane.normal), hessian)
@@ -126,6 +129,7 @@ def leg(x, y, z, plane):
 @inlined(fastmath={"contract"})
 def newton(plane, out, back):
     """One step toward where both slopes cancel."""
+    # Newton's matrix: the curvature of both waves, and that of the surface.
     facing, (ee, ff, ef) = out.facing + back.facing, plane.curvature
     h_ee = out.hessian[0] + back.hessian[0] + facing * ee
     h_ff = out.hessian[1] + back.hessian[1] + facing * ff
@@ -139,7 +143,7 @@ def newton(plane, out, back):
 
 @inlined(fastmath={"contract"})
 def look(x, y, z, tx, rx, inverse_squares):
-    """Plane, both legs and the step from there at a point of the surface, all in its axes."""
+    """Tangent plane, both legs and Newton's step at a point of the surface, all in its axes."""
     plane = _tangent_plane(x, y, z, inverse_squares)
     out = leg(tx[0] - x, tx[1] - y, tx[2] - z, plane)
     back = leg(rx[0] - x, rx[1] - y, rx[2] - z, plane)
@@ -202,9 +206,9 @@ def _search(tx, rx, axes, up, options, start, out):
         x * ia * (rx[0] - x) + y * ib * (rx[1] - y) + z * ic * (rx[2] - z),
     )
     if not lit > 0:  # NaN too
-        # From cold: stretched to the unit sphere, the point below where the line from Tx to Rx
-        # comes nearest. Both see it, and so they see a specular point; where the line goes through
-        # the body there is none.
+        # Without a guess: in the axes where the ellipsoid is the unit sphere, the point below the
+        # place where the line from Tx to Rx comes nearest. Both antennas see it, and so they see a
+        # specular point; where the line goes through the body there is none.
         t0, t1, t2 = tx[0] / axes[0], tx[1] / axes[1], tx[2] / axes[2]
         r0, r1, r2 = rx[0] / axes[0] - t0, rx[1] / axes[1] - t1, rx[2] / axes[2] - t2
         span = r0 * r0 + r1 * r1 + r2 * r2
@@ -223,8 +227,8 @@ def _search(tx, rx, axes, up, options, start, out):
         plane, there, back, step = look(x, y, z, tx, rx, inverse_squares)
         length = there.distance + back.distance
         if length > best * (1 + 4e-16) or not there.facing + back.facing > 0:
-            # The step went past the minimum (a needle's tip seen from near) or round to the dark
-            # side, where a flat body seen from near has a minimum too: half of it does not.
+            # The step went past the minimum (at a needle's tip seen from near) or round to the dark
+            # side, where a flat body seen from near has a minimum too: take half of the step.
             x, y, z = 0.5 * (x + old_x), 0.5 * (y + old_y), 0.5 * (z + old_z)
             x, y, z = on_surface(x, y, z, inverse_squares)
         else:
@@ -233,6 +237,7 @@ def _search(tx, rx, axes, up, options, start, out):
                 break
             old_x, old_y, old_z = x, y, z
             x, y, z = moved(x, y, z, plane, step, inverse_squares)
+    # The last step is not taken, but what it would take off the path is.
     out[0] = length - step.drop
     out[1] = _amplitude(plane, there, back, step, up, options)
     out[2], out[3], out[4] = x, y, z
@@ -248,12 +253,14 @@ def _in_lanes(tx, rx, axes, up, options, start, out):
     inverse_squares = (1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2)
     tolerance = (_STEP_TOLERANCE * min(axes[0], min(axes[1], axes[2]))) ** 2
     source, above = (tx[0], tx[1], tx[2]), (up[0], up[1], up[2])
-    # In one array of a known size: of many the compiler would have to fear that they overlap.
+    # One array of a known size, because several could overlap for all that the compiler knows.
     lanes = np.empty((9, _LANES))
+    # Lanes beyond the last receiver repeat it, so that loops have a constant length.
     for i in range(_LANES):
         receiver = min(i, rx.shape[1] - 1)
         for k in range(3):
             lanes[k, i], lanes[3 + k, i] = start[k], rx[k, receiver]
+    # A fixed number of steps: no lane waits for another.
     for _ in range(_LANE_STEPS):
         for i in range(_LANES):
             x, y, z = lanes[0, i], lanes[1, i], lanes[2, i]
@@ -261,6 +268,7 @@ def _in_lanes(tx, rx, axes, up, options, start, out):
             plane, _, _, step = look(x, y, z, source, antenna, inverse_squares)
             x, y, z = moved(x, y, z, plane, step, inverse_squares)
             lanes[0, i], lanes[1, i], lanes[2, i] = x, y, z
+    # Length and amplitude at the points found, and whether each search has settled.
     for i in range(_LANES):
         x, y, z = lanes[0, i], lanes[1, i], lanes[2, i]
         antenna = (lanes[3, i], lanes[4, i], lanes[5, i])
@@ -279,14 +287,16 @@ def search_all(tx, rx, axes, up, options, guess, one, out):
     """Search for all receivers ``rx (3, rx)`` from one guess, or NaN; ``out`` as in `_in_lanes`."""
     receivers = rx.shape[1]
     if math.isnan(guess[0]):
-        # From cold: the others begin where the first has it.
+        # Without a guess the first receiver is searched for alone; the others begin at its point.
         _search(tx, rx[:, 0], axes, up, options, guess, one)
-        # One by one: to assign a slice takes seconds to compile, for the text of an error.
+        # Number by number: a slice takes seconds to compile, because of the text of an error.
         for i in range(3):
             guess[i] = one[2 + i]
+    # All receivers start from that point, in lanes.
     for first in range(0, receivers, _LANES):
         some = slice(first, min(first + _LANES, receivers))
         _in_lanes(tx, rx[:, some], axes, up, options, guess, out[:, some])
+    # Those that have not settled in so few steps are searched for one by one, with all precautions.
     for receiver in range(receivers):
         if not out[5, receiver] > 0:
             _search(tx, rx[:, receiver], axes, up, options, guess, one)
@@ -300,11 +310,12 @@ def search_all(tx, rx, axes, up, options, guess, one, out):
 def solve(begin, end, at, above, start, options, length, amplitude, point):
     """Fill length, amplitude (chirp, rx, part) and, unless empty, point (chirp, rx, part, 3) [m].
 
-    For chirps from ``begin`` to ``end`` of a `Geometry`; the antennas' up is ``above (chirp, 3)``,
-    0 for amplitudes without regard to polarisation. The search starts at ``start (chirp, part, 3)``
-    in the ellipsoid's axes, NaN where nothing is known. `Options` say what amplitudes hold.
+    The chirps from ``begin`` to ``end`` of a `Geometry` are computed; the antennas' up is ``above
+    (chirp, 3)``, 0 for amplitudes without regard to polarisation. The search starts at ``start
+    (chirp, part, 3)`` in the ellipsoid's axes, NaN where nothing is known. `Options` say what
+    amplitudes hold.
     """
-    # Unpacked here: to take an array out of a tuple counts a reference, which takes time in loops.
+    # Unpacked here: taking an array out of a tuple counts a reference, which takes time in loops.
     tx, rx, centres, frames, semi_axes = at
     receivers, parts = rx.shape[1], centres.shape[1]
     one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
@@ -343,9 +354,9 @@ def far_field(start, stop, at, spreading, length, amplitude):
     tx, rx, centres, frames, semi_axes = at
     _, receivers, parts = length.shape
     for chirp in range(start, stop):
-        # Receivers side by side: to each of them in the axes of the part, then length and
-        # amplitude. In one array of a known size: of many the compiler would have to fear that they
-        # overlap.
+        # Receivers side by side: the vector to each of them in the axes of the part, then length
+        # and amplitude. They are in one array of a known size, because several arrays could overlap
+        # for all that the compiler knows.
         lanes = np.empty((5, _LANES))
         for part in range(parts):
             # The transmitter in the axes of the part.
@@ -369,6 +380,8 @@ def far_field(start, stop, at, spreading, length, amplitude):
                     r0, r1, r2 = lanes[0, k], lanes[1, k], lanes[2, k]
                     norm = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
                     inverse = 1 / norm
+                    # The bisector of both ways, as the centre sees them, is the normal; it is not
+                    # of unit length.
                     n0, n1, n2 = u0 + r0 * inverse, u1 + r1 * inverse, u2 + r2 * inverse
                     squared = n0 * n0 + n1 * n1 + n2 * n2
                     support = a * a * n0 * n0 + b * b * n1 * n1 + c * c * n2 * n2

@@ -45,13 +45,13 @@ _LEAST = 1e-4
 
 @inlined(fastmath=FAST)
 def excess_paths(antenna, x, y, z, out):
-    """Path from the antenna to each vertex less that to the origin, which is returned."""
+    """Fill in paths from the antenna to vertices less the one to the origin; return the latter."""
     a, b, c = antenna[0], antenna[1], antenna[2]
     distance = math.sqrt(a * a + b * b + c * c)
     for i in range(len(x)):
         p, q, r = x[i], y[i], z[i]
         away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
-        # |T - p| - |T| without the loss of digits of a far antenna.
+        # |T - p| - |T| as a quotient: the difference itself would lose digits for a far antenna.
         out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
     return distance
 
@@ -64,7 +64,7 @@ def positive_fraction(a, b, c):
         return 1.0
     if high <= 0:
         return 0.0
-    # Quotients before products: squares of tiny numbers are 0.
+    # The quotients come before the products, because squares of tiny numbers would be 0.
     middle = a + b + c - low - high
     if middle <= 0:
         return high / (high - low) * (high / (high - middle))
@@ -89,15 +89,18 @@ def by_series(a, b):
 def _by_differences(turn, a, b, strength):
     """Strength exp(j turn) times the mean of exp(j phase) for any phases a, b and -a - b.
 
-    Between phases x and y the difference of exp is exp(j (x + y) / 2) sin(h) / h, h = (y - x) / 2;
-    of the two that meet at the middle one of the three phases the difference again, over the
-    largest spread, is the mean.
+    Between phases x and y the divided difference of exp is exp(j (x + y) / 2) sin(h) / h, with h =
+    (y - x) / 2. Two of these meet at the middle one of the three phases: their difference, over the
+    largest spread, gives the mean.
     """
+    # The phases in ascending order; a least spread keeps the denominators from 0.
     c = -a - b
     low, high = min(-_LEAST, min(a, min(b, c))), max(_LEAST, max(a, max(b, c)))
     middle = -low - high
+    # Half the difference between neighbouring phases, and twice the strength over all denominators.
     above, below = max(0.5 * (high - middle), 1e-30), max(0.5 * (middle - low), 1e-30)
     size = 2 * strength / (above * below * (high - low))
+    # Both differences, each a sinc times the phasor in the middle of its two phases.
     upper, lower = size * sine(above) * below, size * sine(below) * above
     upper_re, upper_im = fast_phasor(turn - 0.5 * low)
     lower_re, lower_im = fast_phasor(turn - 0.5 * high)
@@ -108,7 +111,7 @@ def _by_differences(turn, a, b, strength):
 def mean_of_phasor(a, b, c):
     """Mean of exp(-j phase), real and imaginary, over a triangle with phases a, b, c at corners.
 
-    These add up to 0: the caller takes out their mean.
+    The phases add up to 0: the caller takes out their mean.
     """
     if a * a + a * b + b * b < _EXACT_SERIES:
         return by_series(-a, -b)
@@ -129,7 +132,7 @@ def sum_small(mean, u, v, strength, k):
 
 @inlined(fastmath=FAST)
 def sum_large(mean, u, v, strength, k):
-    """The same for any deviations."""
+    """Do the same as `sum_small` for any deviations."""
     real, imaginary = 0.0, 0.0
     for i in range(len(mean)):
         re, im = _by_differences(-k * mean[i], -k * u[i], -k * v[i], strength[i])
@@ -156,14 +159,15 @@ def large_last(mean, u, v, strength, limit):
 
 
 _STEEP = 1e-9
-"""Sine of the angle from up below which the boresight takes its place, as everywhere."""
+"""Sine of the angle from up below which the boresight takes the place of up."""
 
 
 class Tubes(NamedTuple):
-    """Where tubes of rays end: `Footprints` as plain arrays, with the middle ray's alone of some.
+    """Where tubes of rays end: `Footprints` as plain arrays.
 
-    ``places (tube, 4, 3)`` [m], ``path (tube, 4)`` [m], ``direction``, ``normal``, ``field (tube,
-    3)`` of the middle, and the ``group (tube,)`` that each adds to.
+    ``places (tube, 4, 3)`` [m] and ``path (tube, 4)`` [m] are those of the three corners and the
+    middle; ``direction``, ``normal`` and ``field (tube, 3)`` those of the middle ray; ``group
+    (tube,)`` is the sum that each adds to.
     """
 
     places: NDArray[np.float64]
@@ -177,6 +181,7 @@ class Tubes(NamedTuple):
 @inlined()
 def _copolar(s, axes, horizontal):
     """Polarisation of a receiver, whose axes are columns: h = up x s, v = s x h."""
+    # Along the receiver's up there is no horizontal: the boresight takes the place of up.
     h, size = with_length(cross(axes[:, 2], s))
     if size < _STEEP:
         h, size = with_length(cross(axes[:, 0], s))
@@ -191,6 +196,7 @@ def _amplitude(tubes, tube, s, axes, horizontal, tapered):
     twice = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))
     n = scaled(twice, -0.5 if dot(twice, tubes.normal[tube]) < 0 else 0.5)
     q = _copolar(s, axes, horizontal)
+    # What the currents on the triangle send along s, from the incident field e and its direction d.
     n_s, n_d = dot(n, s), dot(n, d)
     weight = (dot(e, q) * (n_s - n_d) + dot(d, q) * dot(n, e) - dot(e, s) * dot(n, q)) / 2
     if tapered:
@@ -212,10 +218,11 @@ def radiate_tubes(
     for task in range(start, stop):
         chunk, receiver = task // receivers, task % receivers
         here, u = rx[receiver], np.empty(3)
-        # Interleaved, for occluded tubes come in runs.
+        # Chunks are interleaved, because occluded tubes come in runs.
         for tube in range(chunk, count, chunks):
             if not visible[receiver, tube]:
                 continue
+            # The amplitude of the tube, by its middle ray.
             own, middle = tubes.group[tube], tubes.places[tube, 3]
             way, leg = with_length(minus(here, middle))
             weight = _amplitude(tubes, tube, way, axes, horizontal, tapered)
@@ -227,8 +234,9 @@ def radiate_tubes(
                 _, away = with_length(minus(here, tubes.places[tube, corner]))
                 u[corner] = tubes.path[tube, corner] - length[receiver, own] + away
                 mean += u[corner] / 3
-            # A bow of the path across the triangle, quadratic, is on average 3/4 of its middle's.
+            # The path bows quadratically across the triangle: the mean bow is 3/4 of the middle's.
             bow = 0.75 * (tubes.path[tube, 3] + leg - length[receiver, own] - mean)
+            # The mean phasor over the triangle, turned by the mean path with its bow.
             for node in range(len(wavenumber)):
                 k = wavenumber[node]
                 a, b, c = k * (u[0] - mean), k * (u[1] - mean), k * (u[2] - mean)
