@@ -45,7 +45,7 @@ LEAST_DB = -30.0
 """Power of a pair over that of the single reflections of its person, below which it is left out."""
 
 _FADE_DB = 3.0
-"""Power above that within which a pair fades in, so that none begins at once."""
+"""Range above that power in which a pair fades in, so that none begins with a jump."""
 
 _KEPT, _PASSING = 2048, 2
 
@@ -59,7 +59,10 @@ class Doubles(NamedTuple):
 
 
 class TwoBounceModel(BuiltInModel):
-    """A model of one path a part, to which ``doubles`` may be added: reflections between parts."""
+    """A model with one path for each part, to which reflections between parts may be added.
+
+    They are its ``doubles``.
+    """
 
     doubles: DoubleReflections | None = None
 
@@ -73,7 +76,7 @@ class TwoBounceModel(BuiltInModel):
 
 
 def check_bounces(fidelity: str, bounces: int) -> None:
-    """Raise InputError unless a level of one path a part is asked for one or two reflections."""
+    """Raise InputError unless a level with one path a part is asked for one or two reflections."""
     allowed = "1, or 2 for reflections from part to part; 'rays' takes more"
     check_option(fidelity, "bounces", bounces, bounces in (1, 2), allowed)
 
@@ -89,14 +92,16 @@ def solve_doubles(
     """Find the paths over ``pairs (pair, 2)`` of parts, as if each pair stood alone.
 
     The search begins at ``start (chirp, pair, 2, 3)``, unit vectors in the axes in which the parts
-    are unit spheres, NaN where nothing is known. Equation :eq:`double-reflection` of the theory
-    page; the amplitude is 0 where there is no path.
+    are unit spheres, NaN where nothing is known. The amplitude is that of equation
+    :eq:`double-reflection` of the theory page, 0 where there is no path.
     """
     at = Geometry.of(at)
     shape = (*at.rx.shape[:2], len(pairs))
     length, amplitude, points = np.empty(shape), np.empty(shape), np.empty((*shape, 2, 3))
+    # The solver replaces the places where it begins, so it gets a copy.
     first = np.full((len(at.tx), len(pairs), 2, 3), np.nan) if start is None else start.copy()
     options = Options(horizontal=polarization.kind == "h", spreading=spreading)
+    # The antennas' up is one for all chirps, or each chirp has its own.
     above = np.empty(at.tx.shape)
     above[:] = polarization.up
     given = at, above, pairs, first, options, length, amplitude, points
@@ -107,21 +112,24 @@ def solve_doubles(
 def pairs_apart(centres: Array, frames: Array, semi_axes: Array) -> Indices:
     """List ordered pairs (pair, 2) of ellipsoids that do not touch in a pose."""
     pairs = np.array(list(combinations(range(len(semi_axes)), 2)), dtype=np.int64).reshape(-1, 2)
-    # Those whose balls are apart need no more.
+    # Pairs whose bounding balls are apart need no further test.
     gaps = np.linalg.norm(centres[pairs[:, 1]] - centres[pairs[:, 0]], axis=1)
     near = np.flatnonzero(gaps <= semi_axes.max(axis=1)[pairs].sum(axis=1))
     touching = np.zeros(len(pairs), dtype=bool)
     touching[near] = _touch(centres[pairs[near]], frames[pairs[near]], semi_axes[pairs[near]])
     apart = pairs[~touching]
+    # A wave may meet either part of a pair first.
     return np.concatenate([apart, apart[:, ::-1]])
 
 
 def _touch(centres: Array, frames: Array, axes: Array) -> NDArray[np.bool_]:
     """Whether pairs of ellipsoids (pair, 2, ...) overlap.
 
-    They do not if for some 0 < s < 1 d^T (A / (1 - s) + B / s)^-1 d exceeds 1, with A and B their
-    matrices of squared semi-axes (J. W. Perram, M. S. Wertheim, *J. Comput. Phys.* 58, 1985, 409).
+    They do not if d^T (A / (1 - s) + B / s)^-1 d exceeds 1 for some 0 < s < 1. Here d is the vector
+    between their centres, and A and B are their matrices of squared semi-axes (J. W. Perram, M. S.
+    Wertheim, *J. Comput. Phys.* 58, 1985, 409).
     """
+    # The matrices of squared semi-axes in the world, and the values of s that stand for all.
     forms = (frames * axes[:, :, None] ** 2) @ np.swapaxes(frames, -1, -2)
     apart = centres[:, 1] - centres[:, 0]
     s = np.linspace(0.02, 0.98, 49)[:, None, None]
@@ -132,6 +140,8 @@ def _touch(centres: Array, frames: Array, axes: Array) -> NDArray[np.bool_]:
 
 def legs_clear(tracer: BodyTracer, tx: Array, rx: Array, points: Array, pairs: Indices) -> Visible:
     """Whether no part hides any of the three legs, (chirp, rx, pair) bool, of the posed body."""
+    # The tracer leaves out the part that a line ends on. So the leg from part to part is asked in
+    # two halves, from its middle to either end.
     sent, received, (own, other) = points[..., 0, :], points[..., 1, :], pairs.T
     middle = (sent + received) / 2
     lines = [(tx[:, None, None], sent, own), (middle, sent, own)]
@@ -172,11 +182,11 @@ class _Keyframe(NamedTuple):
 class DoubleReflections:
     """Reflections over two parts of a moving body, for any chirps.
 
-    At keyframes 10 ms apart ``pairs`` are chosen, those that do not touch, whose legs nothing hides
-    between the middles of the lines of antennas, and whose power exceeds ``least_db`` of that of
-    the single reflections of the person they belong to, or of the weaker of both; a pair fades in
-    above that, and between keyframes. Nothing depends on how long the recording is, nor on who else
-    is there. Lengths and amplitudes are those of every chirp and receiver.
+    At keyframes 10 ms apart ``pairs`` are chosen: those that do not touch, whose legs are free
+    between the middles of the antennas, and whose power exceeds ``least_db`` of that of the single
+    reflections of the person they belong to, or of the weaker of both people. A pair fades in above
+    that level, and between keyframes. Nothing depends on how long the recording is, nor on who else
+    is there. Lengths and amplitudes are computed at every chirp and receiver.
     """
 
     least_db = LEAST_DB
@@ -198,6 +208,7 @@ class DoubleReflections:
 
     def account(self) -> dict[str, Any]:
         """Name the parts of each pair, strongest first, with its power where it is kept [dB]."""
+        # Only pairs that were kept at some keyframe have any power.
         names, pairs = self._body.part_names, np.argwhere(self._power)
         own = tuple(pairs.T)
         decibels = 10 * np.log10(self._power[own] / self._beside[own])
@@ -224,6 +235,7 @@ class DoubleReflections:
             polarization=Polarization(self._radar.polarization, at.axes),
             spreading=self._spreading,
         )
+        # Between keyframes a pair fades; its path is solved at every chirp all the same.
         amplitude = (found.amplitude * weight[:, None]).astype(np.complex128)
         double = Echoes(
             length=found.length,
@@ -237,17 +249,22 @@ class DoubleReflections:
 
     def _known(self, chirps: NDArray[np.int64]) -> tuple[Indices, Array, Array]:
         """Pairs (pair, 2), weights (chirp, pair), and where to begin (chirp, pair, 2, 3)."""
+        # The keyframes on both sides of each chirp.
         before, rest = keyframe_before(self._radar, chirps, self._step)
         numbers = np.unique([before, before + 1]).tolist()
         keyframes = [
             self._keyframes.get(number, partial(self._trace, number)) for number in numbers
         ]
+        # The pairs of all these keyframes, each once, and where those of each keyframe are among
+        # them.
         every = np.concatenate([keyframe.pairs for keyframe in keyframes])
         pairs, place = np.unique(every, axis=0, return_inverse=True)
         stops = np.cumsum([len(keyframe.pairs) for keyframe in keyframes])
         places = np.split(place.ravel(), stops[:-1])
         weight = np.zeros((len(chirps), len(pairs)))
         start = np.full((len(chirps), len(pairs), 2, 3), np.nan)
+        # Weights go smoothly from one keyframe to the next. The search begins at the points of
+        # either keyframe that knows the pair.
         ramp = smoothstep(rest / self._step)
         for number, keyframe, own in zip(numbers, keyframes, places, strict=True):
             for inside, share in ((before == number, 1 - ramp), (before + 1 == number, ramp)):
@@ -258,6 +275,7 @@ class DoubleReflections:
         return np.ascontiguousarray(pairs), weight, start
 
     def _trace(self, number: int) -> _Keyframe:
+        # The pose, before the middles of all Tx and of all Rx.
         time_s = keyframe_time(self._radar, self._body, number * self._step)
         radar, (centres, frames, semi_axes) = self._radar.at(time_s), self._body.at([time_s])
         tx, rx = (antennas.mean(axis=0)[None] for antennas in (radar.tx, radar.rx))
@@ -265,6 +283,8 @@ class DoubleReflections:
         pairs = self.pairs(centres[0], frames[0], semi_axes)
         sent = Polarization(radar.polarization, radar.axes)
         found = solve_doubles(at, pairs, polarization=sent)
+        # The power of each pair over that of the single reflections of the person, or of the weaker
+        # of both people that it belongs to.
         power = found.amplitude[0, 0] ** 2
         single = solve_specular_points(at, polarization=sent)[1][0, 0] ** 2
         owner = self._body.owner
@@ -274,9 +294,11 @@ class DoubleReflections:
             above_db = 10 * np.log10(power / beside) - self.least_db
         worth = np.flatnonzero(above_db > 0)
         pairs, points = pairs[worth], found.points[:, :, worth]
+        # Legs are traced only for the pairs that are worth it.
         self._tracer.pose(centres[0], frames[0])
         clear = legs_clear(self._tracer, tx, rx[:, None], points, pairs)[0, 0]
         weight = clear * smoothstep(np.minimum(above_db[worth] / _FADE_DB, 1.0))
+        # Sums over keyframes, for the account.
         for sums, values in ((self._power, power), (self._beside, beside)):
             sums[tuple(pairs[clear].T)] += values[worth][clear]
         # To the axes in which the parts are unit spheres.

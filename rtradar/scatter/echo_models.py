@@ -82,12 +82,15 @@ def build_model(
             f"scene '{room.name}': spreading may be off in free space only; leave --no-spreading "
             "out"
         )
-    # What traces nothing takes no backend.
+    # A model that traces nothing takes no backend.
     backend = {"variant": variant} if takes_backend(fidelity) else {}
 
+    # Walls, patterns and materials are put around a model of a conductor before given antennas, so
+    # each path of a room may build one of its own.
     def conductor(before: Radar) -> EchoModel:
         with MODELS.guarded(fidelity):
             model: EchoModel = kind(before, body, spreading=spreading, **backend, **model_options)
+        # A room recognises a formula by the attributes of the model, which a wrapper would hide.
         formula = getattr(model, "fast_over_walls", False) and hasattr(model, "conductor_echo")
         if fidelity in MODELS.built_in or formula:
             return model
@@ -170,6 +173,7 @@ class _Checked:
         """Report what the model did, if it can be written."""
         with MODELS.guarded(self._name):
             found = account_of(self._model)
+            # It fails here, and not when the summary is written.
             json.dumps(found, allow_nan=False)
         return found
 
@@ -177,6 +181,8 @@ class _Checked:
         """Echoes at these chirps."""
         with MODELS.guarded(self._name):
             found = self._model.echoes(chirps)
+        # What the stages after it rely on: shapes, the order of Tx, parts that exist, finite
+        # numbers.
         if not isinstance(found, Echoes):
             raise MODELS.refuse(self._name, f"gave a {type(found).__name__}, not Echoes")
         expected = len(chirps), self._radar.n_rx

@@ -34,12 +34,12 @@ _GLANCES = 64
 """Chirps of a capture at which the largest power of an object is looked for."""
 
 LEAST_GHOST_DB = -25.0
-"""Power of a ghost over that of the object's direct echoes, below which it is left out: each takes
-as long as these."""
+"""Power of a ghost over that of the object's direct echoes, below which it is left out: each ghost
+takes as long to compute as the direct echoes."""
 
 
 class Nobody:
-    """The echoes of nobody in a scene: none. Objects are traced by the ``variant`` there is."""
+    """A model of nobody in a scene, without echoes; ``variant`` is the backend for its objects."""
 
     def __init__(self, radar: Radar, variant: str | None) -> None:
         self._radar, self.variant = radar, variant
@@ -55,11 +55,11 @@ class PeopleAndObjects:
     """The echoes of people, by the model ``person``, and those of moving objects.
 
     The ``objects (object, path)`` answer over several paths, the direct one first. The part of an
-    object comes after the ``parts`` of the people, in the order of the objects. ``limits`` are
-    those of validity that the objects come near or go past, ``variant`` is the backend that traces
-    for the people; ``people_alone`` is their model without objects and without a room, ``room``
-    that in a room, None without a room, or with nobody in it, and ``paths`` are those of their
-    echoes, by the number that an echo has of it.
+    object comes after the ``parts`` of the people, in the order of the objects. ``limits`` are the
+    limits of validity that the objects come near or go past. ``variant`` is the backend that traces
+    for the people. ``people_alone`` is their model without objects and without a room; ``room`` is
+    the one in a room, None without a room or with nobody in it. ``paths`` are the paths of their
+    echoes, by the number that an echo has.
     """
 
     def __init__(
@@ -97,6 +97,8 @@ class PeopleAndObjects:
         if not self.objects:
             return self.person.echoes(chirps)
         found, names = [self.person.echoes(chirps)], self.path_names
+        # Objects count as parts after those of the people, and their paths have the numbers of the
+        # names.
         for number, own in enumerate(self.objects, start=self._parts):
             for path in own:
                 echoes = path.echoes(chirps)
@@ -109,6 +111,8 @@ class PeopleAndObjects:
 
         A corner or a sheet of metal that turns towards the radar answers far above its mean.
         """
+        # A flash may last a few chirps, so the largest power is looked for at more instants than a
+        # mean would need.
         chirps = np.unique(np.linspace(0, n_chirps - 1, _GLANCES).astype(np.int64))
         found = []
         for direct, *_ in self.objects:
@@ -121,16 +125,19 @@ class PeopleAndObjects:
     def prune(self, radar: Radar, n_chirps: int, noise_power_m2: float) -> list[dict[str, Any]]:
         """Leave out ghosts of objects that are not worth their cost.
 
-        Left out are those that stay more than `MARGIN_DB` below the noise of an IF sample [m^2],
-        after the gain of a frame, or `LEAST_GHOST_DB` below the direct echoes of their object; of
-        noise 0 only what is never seen. Returned are the ``name`` of each object and its
-        ``paths``, with the ``path``, its ``power_m2`` and whether it is ``kept``.
+        Left out are ghosts that stay more than `MARGIN_DB` below the noise of an IF sample [m^2],
+        after the gain of a frame, or `LEAST_GHOST_DB` below the direct echoes of their object;
+        without noise, only those that are never seen. Returned are the ``name`` of each object and
+        its ``paths``, with the ``path``, its ``power_m2`` and whether it is ``kept``.
         """
+        # The gain of a frame over the noise of one sample, if all its samples, cycles and channels
+        # add up.
         gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
         least = noise_power_m2 / gain * 10 ** (-MARGIN_DB / 10)
         chirps = np.unique(np.linspace(0, n_chirps - 1, _INSTANTS).astype(np.int64))
         found = []
         for number, own in enumerate(self.objects):
+            # The mean power of every path of this object, the direct one first.
             powers = [float(_powers(path.echoes(chirps)).mean()) for path in own]
             enough = max(least, powers[0] * 10 ** (LEAST_GHOST_DB / 10)) if least else 0.0
             worth = [not place or 0 < power >= enough for place, power in enumerate(powers)]
@@ -144,7 +151,7 @@ class PeopleAndObjects:
 
 
 def _powers(echoes: Echoes) -> NDArray[np.float64]:
-    """Power of echoes (chirp,) [m^2], of which those next to each other add up as fields."""
+    """Power of echoes (chirp,) [m^2]; they are summed as fields, because neighbours interfere."""
     fields = field_of(echoes, echoes.frequency)
     return np.asarray((np.abs(fields) ** 2).mean(axis=(0, 2)))
 
@@ -166,6 +173,7 @@ def build_model_of_all(
     occlude an object either.
     """
     overlaps = objects_inside(scene, body.duration_s) if scene.objects else []
+    # The people first, who may be nobody: then only the backend for the objects is settled.
     settled: dict[str, Any] = {"scene": scene, "order": order, "variant": variant, **options}
     if len(body.part_names):
         model = build_model(fidelity, radar, body, spreading=spreading, **settled)
@@ -177,10 +185,12 @@ def build_model_of_all(
             f"not simulated; leave out '{scene.objects[0].name}', the walls and furniture, or "
             "path_times_s"
         )
+    # What may occlude an object, if the level traces anything at all.
     past = None
     if scene.objects and model.variant is not None:
         past = Occluders(use(select(variant)), scene, body)
     given: dict[str, Any] = {"past": past, "walls": scene.walls, "spreading": spreading}
+    # Every object answers over every path.
     paths = wall_paths(scene.walls, np.array(radar.position_m), order)
 
     def echoes(moving: Object, path: WallPath) -> RigidEchoes:
@@ -197,12 +207,14 @@ def build_model_of_all(
 class BinaryPhaseModel:
     """The echoes of every Tx at every chirp, with their signs (:eq:`bpm`).
 
-    Each of as many models as there are Tx answers for a radar under TDM whose order of Tx begins
-    with another one, so that at any chirp each of them has another Tx. They are given by ``build``.
+    There are as many models as Tx, which ``build`` makes. Each answers for a radar under TDM whose
+    order of Tx begins with another Tx, so that at any chirp each of them has a different Tx.
     """
 
     def __init__(self, radar: Radar, build: Callable[[Radar], EchoModel]) -> None:
         self._radar = radar
+        # Rolled by s, the order gives the Tx of slot i + s at slot i, so all models together have
+        # all Tx.
         order = range(radar.n_tx) if radar.tx_order is None else radar.tx_order
         orders = [np.roll(order, -shift).tolist() for shift in range(radar.n_tx)]
         self._models = [build(replace(radar, multiplexing="tdm", tx_order=own)) for own in orders]

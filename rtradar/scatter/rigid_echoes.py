@@ -2,15 +2,16 @@
 
 Facets are fixed in the object's axes, into which antennas are brought by the pose at each chirp, in
 float64. The integral over a facet, with the Fresnel coefficients of a half-space of its material at
-its own angle, is exact but for the bow of the path over it. What is visible from the array past
-furniture, other objects, people and the object itself, changes slowly: it is asked of Mitsuba at
-keyframes, for the middle of each facet, and fades smoothly in between; so do the coefficients.
+its own angle, is exact but for the bow of the path over it. What the array sees past furniture,
+other objects, people and the object itself changes slowly: Mitsuba is asked at keyframes, for the
+middle of each facet, and visibility fades smoothly in between; so do the coefficients.
 
-An object is seen over some lengths, one echo each, about that over its point of reference; each
-facet is shared between the two next to its path (`rtradar.kernels.scatter.facets_by_length`). Where
-phases change slowly against those at the point of reference, the field is computed at knots in
-time for all pairs of antennas, with polynomials in between; else at every chirp. A sheet reflects
-several times, too (`RigidSheet`, in `rtradar.scatter.rigid_sheets`).
+An object has one echo at each of some lengths about the path over its point of reference. Each
+facet is shared between the two echoes next to its path
+(`rtradar.kernels.scatter.facets_by_length`). Where phases change slowly against those at the point
+of reference, the field is computed at knots in time for all pairs of antennas, with polynomials in
+between; else it is computed at every chirp. A sheet reflects several times, too (`RigidSheet`, in
+`rtradar.scatter.rigid_sheets`).
 """
 
 from __future__ import annotations
@@ -91,7 +92,7 @@ class RigidEchoes:
     """Echoes of one moving object over one path, for any chirps.
 
     The direct path goes through the ``walls`` of the room, others over them. ``past`` is what may
-    hide the object, None for nothing. ``limits`` are those of validity that it meets.
+    hide the object, None for nothing. ``limits`` are the limits of validity that it meets.
 
     An `InputError` is raised if the mesh cannot be used, or comes within 0.3 m of an antenna while
     the capture lasts.
@@ -117,17 +118,21 @@ class RigidEchoes:
         response = WallResponse(WallEdges.of(walls, radar), series.walls, self.frequency)
         self._meets = path, response, past
         self._legs = RigidLegs(radar.at(0.0), *self._meets)
+        # The point of reference is the middle of the mesh's box, so that all its points are near.
         shape = moving.shape
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         self._reference = (low + high) / 2
         self._corners = shape.corners - self._reference
         radius = float(np.linalg.norm(self._corners, axis=-1).max())
+        # How it moves settles how small facets are, and how far knots and keyframes are apart.
         nearest, rates, speeds, turning = self._kinematics(duration_s)
         wavenumber = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
         k = wavenumber[-1]
         edge = flat_edge(float((high - low).max()), nearest, k)
         self._small = small_facets(self._corners, 0, edge)
         self._facets = _rigid_facets(self._small.corners, not shape.closed)
+        # Echoes at fixed steps of length. No facet's path differs from that over the point of
+        # reference by more than twice the radius.
         step = SPEED_OF_LIGHT_MPS / (_LENGTHS_A_CELL * radar.bandwidth_hz)
         half = math.ceil(2 * radius / step) + 1
         sweep = radar.bandwidth_hz / (2 * radar.centre_frequency_hz)
@@ -135,12 +140,14 @@ class RigidEchoes:
             LengthGrid(-half, step, wavenumber, sweep, np.exp(-1j * wavenumber * step)),
             2 * half + 2,
         )
+        # A knot at least as often as a keyframe, and at every `_KNOT_RAD` of phase against the
+        # point of reference.
         self._knot_s = _KNOT_RAD / max(k * rates, _KNOT_RAD / _KEYFRAME_S)
         self._keyframe_s = min(_KEYFRAME_S, _KEYFRAME_RAD / max(turning, 1e-9))
         self._keyframes: KeyframeCache[int, _Keyframe] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
         self._knots: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(0, _KEPT_KNOTS)
         self.limits = tuple(self._limits(speeds)) if path.order == 0 else ()
-        # What slabs add is the same all the time: what is left is in the factors.
+        # The length that slabs add is taken as the same all the time; the rest is in the factors.
         self._longer_m = self._legs.longer_m(self._pose(np.zeros(1))[1][0])
 
     def _kinematics(self, duration_s: float) -> tuple[float, float, Array, float]:
@@ -151,20 +158,22 @@ class RigidEchoes:
         [m/s]; and the largest rate of rotation [rad/s].
         """
         shape = self.moving.shape
-        # Evenly spaced ones may all fall on one phase of a rotation.
+        # Instants that are evenly spaced could all fall on one phase of a rotation.
         random = np.random.default_rng(0).uniform(0.0, duration_s, _SAMPLES)
         times = np.array([0.0, *np.sort(random), duration_s])
         points = np.concatenate([shape.vertices, self._reference[None]])
         ranges, seen = [], []
+        # Two instants shortly one after the other give all rates as differences.
         for at in (times, times + _STEP_S):
             rotation, place = self.moving.pose(at)
             axes, middle = self._radar.poses_at(at)
             now = np.einsum("tij,vj->tvi", rotation, points) + place[:, None]
-            # Of both legs (2, instant, vertex).
+            # Distances over both legs (2, instant, vertex).
             middles = np.stack([images(leg, middle) for leg in (self.path.out, self.path.back)])
             ranges.append(np.linalg.norm(now - middles[:, :, None], axis=-1))
             seen.append(np.einsum("tji,tjk->tik", axes, rotation))
         ranges, later = ranges
+        # Rates of the whole path, over both legs.
         speeds = (later - ranges).sum(axis=0) / _STEP_S
         if self.path.order == 0:
             self._refuse_too_near(times, ranges[0])
@@ -175,6 +184,8 @@ class RigidEchoes:
 
     def _refuse_too_near(self, times: Array, ranges: Array) -> None:
         radar = self._radar
+        # A face can be too near to an antenna only while some vertex is this near to the middle of
+        # the array: only these instants are looked at closely.
         around = float(np.linalg.norm(np.concatenate([radar.tx_m, radar.rx_m]), axis=1).max())
         size = float(np.ptp(self.moving.shape.vertices, axis=0).max())
         least = MINIMUM_ANTENNA_DISTANCE_M
@@ -208,18 +219,21 @@ class RigidEchoes:
     def echoes(self, chirps: Indices) -> Echoes:
         """Echoes of the object at these chirps, all of part 0.
 
-        Of chirps that lie close together only lengths at which something is seen are there, so
-        their number changes from call to call; of others all are.
+        If the chirps lie close together, only lengths at which something is seen are there, so
+        their number changes from call to call; else all are.
         """
         radar = self._radar
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
+        # If the knots about these chirps are fewer than the chirps, the field is computed there and
+        # interpolated; else it is computed at every chirp.
         knots = PolynomialsInTime(times, self._knot_s)
         count = len(knots.numbers)
         if count * radar.n_tx < len(chirps):
-            # Those about the end of a pass serve the next.
+            # The knots about the end of these chirps serve the next call.
             field = np.stack(
                 [self._knots.get(one, partial(self._knot, one)) for one in knots.numbers.tolist()]
             )
+            # Lengths at which nothing is seen are left out.
             used = field.any(axis=(0, 1, 2, 3))
             field = field[..., used]
             amplitude = knots.between(field, tx)
@@ -227,6 +241,7 @@ class RigidEchoes:
             field = self._field(times, tx)
             used = field.any(axis=(0, 1, 2)) | far_apart(chirps)
             amplitude = np.moveaxis(field[..., used], 2, 0).astype(np.complex64)
+        # The exact path over the point of reference carries the Doppler; the steps stay the same.
         steps = (self._grid.first + np.flatnonzero(used)) * self._grid.step
         return Echoes(
             length=self._over_reference(times, tx)[..., None] + self._longer_m + steps,
@@ -262,6 +277,7 @@ class RigidEchoes:
         """Amplitudes (task, rx, node, echo) at the times of tasks and for their Tx."""
         legs, (rotation, at) = self._legs, self._pose(times)
         from_tx, to_rx = self._images(times, tx)
+        # The keyframes on both sides of each task hold visibility and materials.
         place = times / self._keyframe_s
         before = np.floor(place).astype(np.int64)
         numbers = np.unique([before, before + 1])
@@ -270,6 +286,7 @@ class RigidEchoes:
             for number in numbers.tolist()
         ]
         rx = self._radar.rx_of_tx[tx]
+        # Antennas are brought into the axes of the mesh, where its facets stand still.
         views = RigidViews(
             tx=np.einsum("tji,tj->ti", rotation, from_tx - at),
             rx=np.einsum("tji,trj->tri", rotation, to_rx - at[:, None]),
@@ -294,6 +311,7 @@ class RigidEchoes:
     def _keyframe(self, number: int) -> _Keyframe:
         time_s, facets = number * self._keyframe_s, self._facets
         legs, middles, normals = self._facets_at(time_s)
+        # Facets of a closed mesh that face away are not asked about.
         facing = np.einsum("fi,pfi->pf", normals, legs.places[:, None] - middles)
         asked = np.ones(facing.shape, dtype=bool) if facets.both_sides else facing > 0
         seen = legs.seen(time_s, middles, asked)
@@ -303,6 +321,7 @@ class RigidEchoes:
     def _facets_at(self, time_s: float) -> tuple[RigidLegs, Array, Array]:
         """Legs at a time, with the middles [m] and the normals (facet, 3) of facets, world."""
         facets, ((rotation,), (at,)) = self._facets, self._pose(np.array([time_s]))
+        # The last vertices are the middles of the facets, about the point of reference.
         middles = facets.vertices[:, -len(facets.faces) :].T @ rotation.T + at
         legs = RigidLegs(self._radar.at(time_s), *self._meets)
         return legs, middles, facets.normals @ rotation.T
@@ -336,6 +355,8 @@ class PolynomialsInTime:
     """
 
     def __init__(self, times: NDArray[np.float64], apart: float) -> None:
+        # Eight knots about each time, and the weights of the polynomial through them, as one sparse
+        # matrix.
         before = np.floor(times / apart).astype(np.int64)
         around = before[:, None] + _OFFSETS
         self.numbers = np.unique(around)

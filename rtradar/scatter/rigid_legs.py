@@ -58,15 +58,17 @@ class RigidLegs:
     def seen(
         self, time_s: float, points: Array, asked: Bools, *, but: Object | None = None
     ) -> Bools:
-        """Which points (point, 3) [m] are free for each place at a time [s], of those ``asked``.
+        """Which of the points (point, 3) [m] that are ``asked`` each place sees at a time [s].
 
-        Both are (place, point). All objects ``but`` one may hide them.
+        Both the result and ``asked`` are (place, point). All objects ``but`` one may hide points.
         """
         free = asked.copy()
+        # Places of Tx are asked over the leg out, places of Rx over the leg back.
         for leg, own in ((self.path.out, self._sends), (self.path.back, ~self._sends)):
             places = np.flatnonzero(own)
             along, extent = self._walls.edges.leg(leg, self._real[places, None], points)
             open_ = free[places] & (extent != 0)
+            # A point is free if no section of the leg to it is occluded.
             for origins, targets in pairwise(along):
                 start, end, _ = np.broadcast_arrays(origins, targets, open_[..., None])
                 if self._past is not None:
@@ -94,15 +96,19 @@ class RigidLegs:
         of a length ``longer_m`` is taken out; waves that come much earlier or later are left out.
         """
         out, back = self._carried(points)
+        # A conductor across the bisector of both legs reflects the one into the other.
         normal = bisector(-out.ways[-1], -back.ways[-1])
         radar = self._radar
         k = 2 * np.pi * self._walls.frequency[:, None] / SPEED_OF_LIGHT_MPS
         apart = _TOGETHER * SPEED_OF_LIGHT_MPS / radar.bandwidth_hz
         total = np.zeros((len(k), len(points)), dtype=np.complex128)
+        # Every wave that arrives, with every wave that the receiver would send back.
         for sent in out.waves:
             field = sent.field
             turned = 2 * np.sum(field * normal, axis=-1, keepdims=True) * normal - field
             for received in back.waves:
+                # Waves that are much earlier or later than the strongest belong to other range
+                # cells.
                 extra = sent.extra_m + received.extra_m - longer_m
                 near = np.abs(extra) <= apart
                 # A conductor at normal incidence counts as +1: that the field is reversed is in
@@ -110,13 +116,15 @@ class RigidLegs:
                 total -= near * np.exp(-1j * k * extra) * np.sum(received.field * turned, axis=-1)
         if made_of.conducts:
             return total
+        # What the material leaves of a conductor's field: the fraction of the field in TE follows
+        # from the polarisation that arrives, and the coefficients from the facet's own angle.
         way = -normal
         cosine = np.clip(np.abs(np.sum(normals * way, axis=-1)), 0.0, 1.0)
         across = unit(np.cross(way, normals))
         te = np.sum(antenna_field(way, self._polarization) * across, axis=-1) ** 2
         eta = made_of.eta(np.array([radar.centre_frequency_hz]))
         in_te, in_tm = (reflection(eta, cosine, kind) for kind in POLARIZATIONS)
-        # Of the fraction in TE minus its coefficient, of the rest that of TM: 1 for a conductor.
+        # TE counts with minus its coefficient and TM with its own, so that a conductor has 1.
         return np.asarray(total * (in_tm - te * (in_te + in_tm)))
 
     def _carried(self, points: Array) -> list[Carried]:

@@ -1,10 +1,10 @@
 """Several bounces on a thin sheet that moves: a corner reflector on a cart.
 
-At knots in time tubes of rays are shot at the sheet, as `rtradar.scatter.clutter.furniture` does
-for one that stands, from every Tx to its Rx. Their fields are shared between echoes of fixed
-spacing about the path over the object's point of reference, which is exact at every chirp; between
-knots run polynomials. Past furniture, other objects and people, the field is that of the fractions
-of the sheet that both antennas see.
+At knots in time tubes of rays are shot at the sheet, from every Tx to its Rx, as
+`rtradar.scatter.clutter.furniture` does for a sheet that stands. Their fields are shared between
+echoes of fixed spacing about the path over the object's point of reference, which is exact at every
+chirp; polynomials run between the knots. Furniture, other objects and people scale the field by the
+fractions of the sheet that both antennas see.
 """
 
 from __future__ import annotations
@@ -47,6 +47,7 @@ class RigidSheet(RigidEchoes):
     ) -> None:
         super().__init__(radar, moving, duration_s, past, **options)
         self._mi = past.mi
+        # With several bounces a path may cross the sheet once more for each of them.
         radius = float(np.linalg.norm(self._corners, axis=-1).max())
         self._half = int(np.ceil((SHEET_BOUNCES + 1) * radius / self._grid.step)) + 1
         self._orders = np.arange(2, SHEET_BOUNCES + 1)
@@ -57,10 +58,12 @@ class RigidSheet(RigidEchoes):
     def echoes(self, chirps: Indices) -> Echoes:
         """Echoes of the sheet at these chirps; see `RigidEchoes.echoes`."""
         times, tx = self._radar.centres_of(chirps), self._radar.tx_of_chirp(chirps)
+        # Knots twice as close as for one bounce.
         knots = PolynomialsInTime(times, self._knot_s / 2)
         field = np.stack(
             [self._shots.get(own, partial(self._shot, own)) for own in knots.numbers.tolist()]
         )
+        # Lengths at which nothing is seen are left out, unless all are asked for.
         used = field.any(axis=(0, 1, 2, 3)) | far_apart(chirps)
         beyond = np.arange(-self._half, self._half + 2) * self._grid.step
         steps = np.tile(beyond, len(self._orders))[used]
@@ -79,6 +82,7 @@ class RigidSheet(RigidEchoes):
         time_s = number * self._knot_s / 2
         radar, ((rotation,), (at,)) = self._radar.at(time_s), self._pose(np.array([time_s]))
         polarization = Polarization(radar.polarization, radar.axes)
+        # The sheet as it stands at this knot, as rays meet it.
         surfaces = MeshTracer(self._mi, self._corners @ rotation.T + at)
         shooter = Shooter(
             surfaces=surfaces,
@@ -92,7 +96,9 @@ class RigidSheet(RigidEchoes):
         nodes, count = len(self.frequency), 2 * self._half + 2
         shape = radar.n_tx, len(self._orders), nodes, radar.n_rx, count
         out = np.zeros(shape, dtype=np.complex128)
+        # Other things do not occlude single rays: the whole field is scaled.
         open_tx, open_rx = self._open_at(time_s)
+        # From every Tx to the Rx that are kept with it, each number of bounces by itself.
         for index, tx in enumerate(radar.tx):
             rx = radar.rx[radar.rx_of_tx[index]]
             over = np.linalg.norm(tx - at) + np.linalg.norm(rx - at, axis=1)
@@ -102,6 +108,8 @@ class RigidSheet(RigidEchoes):
                     given = footprints, visible, rx, over, polarization
                     out[index, order] = self._shared(*given)
             out[index] *= open_tx[index] * open_rx[radar.rx_of_tx[index]][:, None]
+        # Amplitudes are conjugates of scattering lengths; the echoes of all numbers of bounces
+        # follow one another.
         out = np.moveaxis(out.conj(), 1, 3)
         return out.reshape(*out.shape[:1], nodes, radar.n_rx, -1).swapaxes(1, 2)
 
@@ -110,6 +118,7 @@ class RigidSheet(RigidEchoes):
 
         That is the root of what walls and patterns of antennas leave of both legs.
         """
+        # The fraction of the facets that each place of the array sees.
         legs, middles, _ = self._facets_at(time_s)
         asked = np.ones((len(legs.places), len(middles)), dtype=bool)
         clear = legs.seen(time_s, middles, asked, but=self.moving).mean(axis=1)
@@ -127,15 +136,18 @@ class RigidSheet(RigidEchoes):
         polarization: Polarization,
     ) -> NDArray[np.complex128]:
         """Field (node, rx, echo) of footprints, shared between the two echoes next to each."""
+        # The path of each footprint, for the middle of the receivers, in steps of length.
         middle = rx.mean(axis=0)
         path = footprints.path[:, 3] + np.linalg.norm(footprints.places[:, 3] - middle, axis=1)
         place = (path - over.mean()) / self._grid.step + self._half
         count = 2 * self._half + 2
         cell = np.clip(np.floor(place), 0, count - 2).astype(np.int64)
         fraction = np.clip(place - cell, 0.0, 1.0)
+        # The shares of the two nearest echoes add up to 1 and change smoothly.
         after = fraction**2 * (3 - 2 * fraction)
         lengths = over[:, None] + (np.arange(count) - self._half) * self._grid.step
         total = np.zeros((len(self._grid.wavenumber), *lengths.shape), complex)
+        # `radiate` turns each share back to the length of its echo.
         for own, share in ((cell, 1 - after), (cell + 1, after)):
             lit = replace(footprints, field=footprints.field * share[:, None], surface=own)
             total += radiate(

@@ -35,7 +35,7 @@ _ALIKE = 1e-6
 """Relative difference of two semi-axes, and sine between two axes, that counts as none."""
 
 _POOR = 1e-3
-"""Residual of the boundary condition above which the field is warned of: some 0.01 dB."""
+"""Residual of the boundary condition above which a warning is given: some 0.01 dB of the field."""
 
 
 def full_wave_scattering(
@@ -53,6 +53,7 @@ def full_wave_scattering(
     what fills the target, a perfect conductor by default.
     """
     out = np.empty(len(tx), dtype=np.complex128)
+    # A system of equations serves all pairs of one frequency.
     for one in np.unique(frequency).tolist():
         own = np.flatnonzero(frequency == one)
         antennas = tx[own], rx[own]
@@ -115,6 +116,8 @@ def coaxial_bodies(
         Where an ellipsoid has three different semi-axes, they have no common axis, or the bodies
         overlap or are too large.
     """
+    # The common axis: through the centres if there are several, else that of a body that is no
+    # sphere. Spheres fit any axis.
     own = [_own_axis(*one) for one in zip(target.frames, target.semi_axes, strict=True)]
     away = target.centres - target.centres[0]
     farthest = away[np.argmax(np.linalg.norm(away, axis=1))]
@@ -122,6 +125,7 @@ def coaxial_bodies(
     candidates += [frame[:, 2] for frame, radius, half in own if radius != half]
     axis = np.array(candidates[0] if candidates else [0.0, 0.0, 1.0])
     axis = axis / np.linalg.norm(axis)
+    # Every body has to be on that axis, and turned along it.
     scale = float(target.semi_axes.max())
     for part, (frame, radius, half) in enumerate(own):
         tilted = radius != half and np.linalg.norm(np.cross(frame[:, 2], axis)) > _ALIKE
@@ -134,6 +138,7 @@ def coaxial_bodies(
         Spheroid(radius, half, float(offset @ axis))
         for (_, radius, half), offset in zip(own, away, strict=True)
     )
+    # Any two axes across the common one complete the frame.
     across = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
     across /= np.linalg.norm(across)
     frame = np.stack([across, np.cross(axis, across), axis], axis=1)
@@ -144,6 +149,7 @@ def coaxial_bodies(
 
 def _own_axis(frame: Array, semi_axes: Array) -> tuple[Array, float, float]:
     """Frame whose third column is the axis of revolution, and the semi-axes across and along."""
+    # Which two semi-axes are equal; a sphere's third is made exactly equal to them.
     for last in (2, 0, 1):
         first, second = (last + 1) % 3, (last + 2) % 3
         radius = float(semi_axes[first] + semi_axes[second]) / 2
@@ -240,6 +246,8 @@ def scattering_length(
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
             _refuse_inside(target, name, antennas)
         target = target.without_repeats() if traces else target
+        # Whoever asks for optics is warned where much of the echo comes from radii that are too
+        # small.
         if len(tx_array) and fidelity != FULL_WAVE:
             _, amplitude = far_field_echo(target_geometry(target, tx_array, rx_array))
             wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
@@ -251,7 +259,7 @@ def scattering_length(
 def _method_for(
     target: object, fidelity: str, options: Iterable[str]
 ) -> tuple[Callable[..., NDArray[np.complex128]], bool]:
-    """Function of a model that knows such targets and options, and whether it traces."""
+    """Return the function of a model that takes such targets and options, and whether it traces."""
     what = f"scattering_length: '{fidelity}'"
     if fidelity == FULL_WAVE:
         refuse_options(what, full_wave_scattering, options, _COMMON)
@@ -284,6 +292,7 @@ def _pairs(
         raise InputError(
             "scattering_length: tx, rx [m] and frequency [Hz] must be numbers"
         ) from None
+    # All lengths must be the same, or 1, which stands for all pairs.
     counts = {len(tx_array), len(rx_array), *frequencies.shape} - {1}
     triples = tx_array.shape[1:] == rx_array.shape[1:] == (3,)
     if not triples or frequencies.ndim > 1 or len(counts) > 1:
@@ -304,6 +313,7 @@ def _pairs(
 
 
 def _refuse_inside(target: Ellipsoids, name: str, antennas: NDArray[np.float64]) -> None:
+    # In the axes where each ellipsoid is the unit sphere.
     local = (
         np.einsum("pji,npj->npi", target.frames, antennas[:, None] - target.centres)
         / target.semi_axes

@@ -1,22 +1,22 @@
 """Specular points of ellipsoids: where they are, which of them are visible, and their second term.
 
-**Where they are.** A solver finds where Tx sees Rx mirrored in each ellipsoid, how far and how
+**Where they are.** A solver finds where Tx sees Rx mirrored in each ellipsoid, how far away and how
 strongly.
 
 **Which are visible** is traced at keyframes 10 ms apart, and ramped between them. A part that goes
 behind another fades as the edge crosses the Fresnel zone round its specular point, which takes
-longer than 10 ms for a limb at 1 m/s. A jump would smear a line over all velocities that physical
-optics does not have: ``validation/other_methods/occlusion.py`` measures -35 dB beside the Doppler
-line for a ramp of 1.25 ms, -59 dB for this one and -60 dB for physical optics (12 GHz, 1.5 m/s).
-The instant is known to 5 ms; at 4 m/s the true fade is faster than the ramp.
+longer than 10 ms for a limb at 1 m/s. A jump would smear a line over all velocities, which physical
+optics does not: ``validation/other_methods/occlusion.py`` measures -35 dB beside the Doppler line
+for a ramp of 1.25 ms, -59 dB for this one and -60 dB for physical optics (12 GHz, 1.5 m/s). The
+instant is known to 5 ms; at 4 m/s the true fade is faster than the ramp.
 
 **The second term** of geometric optics in powers of 1/k, for conducting ellipsoids, has two parts.
-One is of the shape: the area of an ellipsoid's section at the depth z below its specular point
-grows as z (1 - z / 2p), where p is the distance of the tangent plane from the centre. The other is
-of the currents, which are other where the surface bends more along the electric field than across
-it. Where Tx and Rx stand apart, with i half the angle between them as the part sees them, the first
-part is (1 - tan^2 i) / cos i times as much for a field across their plane and (1 + tan^2 i) / cos i
-times for one in it: exactly so for a sphere, by the series of Mie.
+One comes from the shape: the area of an ellipsoid's section at the depth z below its specular point
+grows as z (1 - z / 2p), where p is the distance of the tangent plane from the centre. The other
+comes from the currents, which differ where the surface bends more along the electric field than
+across it. Where Tx and Rx stand apart, with i half the angle between them as the part sees them,
+the first part is (1 - tan^2 i) / cos i times as large for a field across their plane, and (1 +
+tan^2 i) / cos i times for a field in it: exactly so for a sphere, by the series of Mie.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def solve_specular_points(
     The search begins at ``start (chirp, part, 3)``, in the ellipsoid's axes [m], NaN where nothing
     is known. Returned are the lengths |T - p| + |R - p| (chirp, rx, part) [m]; the scattering
     lengths (chirp, rx, part), over R1 R2 with ``spreading`` [m], co-polar where both antennas have
-    a ``polarization``, else without regard to it; and, if ``points`` are wanted, for they are many,
-    the specular points (chirp, rx, part, 3), world [m].
+    a ``polarization``, else without regard to it; and the specular points (chirp, rx, part, 3),
+    world [m], which are many, so only if ``points`` are wanted.
 
     Equations :eq:`specular-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page,
     times :eq:`polarization`.
@@ -72,6 +72,7 @@ def solve_specular_points(
     point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
     begin = np.full(at.centres.shape, np.nan) if start is None else start
     begin = np.ascontiguousarray(begin, dtype=np.float64)
+    # An up of no length stands for no polarisation.
     above, horizontal = np.zeros(at.tx.shape), False
     if polarization is not None:
         above[:], horizontal = polarization.up, polarization.kind == "h"
@@ -87,7 +88,7 @@ _KEPT_KEYFRAMES = 2048
 """Keyframes kept, 20 s: the passes that measure power and make the signal trace once."""
 
 _PASSING = 2
-"""Keyframes among these that give way to later ones: a chirp needs those on both sides of it."""
+"""Keyframes among these that give way to later ones: a chirp needs one on either side of it."""
 
 
 class Keyframe(NamedTuple):
@@ -103,8 +104,8 @@ class Keyframe(NamedTuple):
 def sees(tracer: BodyTracer, places: Array, points: Array, parts: Indices) -> Bools:
     """Whether no other part of the posed body is between places and points on some parts.
 
-    Both are (..., 3), world [m], and broadcast against each other; the result and ``parts`` are
-    (...).
+    Places and points are (..., 3), world [m], and broadcast against each other; the result and
+    ``parts`` are (...).
     """
     starts, ends = np.broadcast_arrays(places, points)
     own = np.broadcast_to(parts, ends.shape[:-1])
@@ -122,7 +123,7 @@ def unobstructed(tracer: BodyTracer, tx: Array, rx: Array, points: Array) -> Boo
 
 
 class SpecularVisibility:
-    """Visibility of the specular points of a moving body, the tracer's, over a capture."""
+    """Visibility of the specular points of a moving body, that of the tracer, over a capture."""
 
     def __init__(self, radar: Radar, body: Body, tracer: BodyTracer) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
@@ -134,16 +135,18 @@ class SpecularVisibility:
     def keyframe(self, chirp: int) -> Keyframe:
         """Trace the pose of a chirp of `Radar.gapless`, for each Tx and its Rx.
 
-        Whether another part occludes either leg is asked from Tx and Rx to the specular point of
-        each pair. One of these points is where the search for those of the chirps after it begins.
+        The tracer is asked whether another part occludes either leg, from Tx and from Rx to the
+        specular point of each pair. At one of these points the search at the next chirps begins.
         """
         time_s = keyframe_time(self._radar, self._body, chirp)
         radar, (centres, frames, semi_axes) = self._radar.at(time_s), self._body.at([time_s])
+        # One pose of the body before every Tx, each with the Rx that are kept with it.
         self._tracer.pose(centres[0], frames[0])
         of_tx = np.zeros(radar.n_tx, dtype=np.int64)
         tx, rx = radar.tx, radar.rx[radar.rx_of_tx]
         given = np.arange(radar.n_tx), tx, rx, centres[of_tx], frames[of_tx], semi_axes
         at = ChirpPoses(*given)
+        # Visibility is asked for the exact specular point of each pair of antennas.
         points = solve_specular_points(at, points=True)[2]
         start = np.einsum("pji,pj->pi", frames[0], points[0, 0] - centres[0])
         return Keyframe(unobstructed(self._tracer, tx, rx, points), start)
@@ -151,9 +154,9 @@ class SpecularVisibility:
     def at(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Visibility and starting points at chirps.
 
-        Returned are weights (chirp, rx, part), 1 visible, 0 occluded, in between on the ramp
-        between two keyframes that differ; and the specular points (chirp, part, 3) of one pair at
-        the keyframe before, in the parts' axes [m].
+        Returned are weights (chirp, rx, part), which are 1 for visible, 0 for occluded, and between
+        both on the ramp between two keyframes that differ; and the specular points (chirp, part, 3)
+        of one pair at the keyframe before, in the parts' axes [m].
         """
         before, rest = keyframe_before(self._radar, chirps, self._step)
         # At a keyframe the one after it does not matter.
@@ -162,6 +165,7 @@ class SpecularVisibility:
             self._kept.get(number, partial(self.keyframe, number * self._step))
             for number in numbers.tolist()
         ]
+        # The keyframes before and after each chirp, for its own transmitter.
         place = place.reshape(2, -1)
         visible = np.stack([one.visible for one in kept])
         first, last = visible[place, self._radar.tx_of_chirp(chirps)]
@@ -182,34 +186,40 @@ fields (`validation/closed_forms/sphere.py`)."""
 def with_second_term(
     at: Geometry | ChirpPoses, points: Array, polarization: Polarization, wavenumber: Array
 ) -> NDArray[np.complex128]:
-    """Both terms over the first, for specular points (chirp, rx, part, 3), world [m].
+    """Return both terms over the first, for specular points (chirp, rx, part, 3), world [m].
 
-    The result (chirp, rx, part) is that of scattering lengths, for exp(+j omega t); ``wavenumber``
-    [rad/m] is one for all, or (chirp, 1, 1). Equation :eq:`second-term` of the
-    theory page. Where Tx and Rx are over 120 degrees apart, as a part sees them, it is 1.
+    The result (chirp, rx, part) is a factor of scattering lengths, for exp(+j omega t), by equation
+    :eq:`second-term` of the theory page; ``wavenumber`` [rad/m] is one for all, or (chirp, 1, 1).
+    The factor is 1 where Tx and Rx are over 120 degrees apart, as a part sees them.
     """
+    # Everything in the axes of the ellipsoids, where curvature has a simple form.
     ways = [unit(a - points) for a in (at.tx[:, None, None], at.rx[:, :, None])]
     turned = np.swapaxes(at.frames, -1, -2)[:, None]
 
     def in_axes(vectors: Array) -> Array:
         return np.asarray((turned @ vectors[..., None])[..., 0])
 
+    # The gradient of x^2 / a^2 + ... is along the normal, and as long as one over the distance of
+    # the tangent plane from the centre.
     inverse_squares = 1 / at.semi_axes**2
     gradient = in_axes(points - at.centres[:, None]) * inverse_squares
     # One over the distance of the tangent plane; at the centre, where there is no echo, it is 0.
     size, normal = np.linalg.norm(gradient, axis=-1), unit(gradient)
+    # The direction of the electric field on the surface, and the curvatures along it and across it.
     field = in_axes(antenna_field(ways[0], polarization))
     along = unit(field - np.sum(field * normal, axis=-1, keepdims=True) * normal)
     bends = [
         np.sum(direction**2 * inverse_squares, axis=-1) / np.maximum(size, 1e-12)
         for direction in (along, np.cross(normal, along))
     ]
+    # The shape's part, for a field across or in the plane of Tx and Rx.
     cosine = np.sum(in_axes(ways[0] + ways[1]) * normal, axis=-1) / 2
     # Antennas in one direction have no plane, and no need of one.
     across = in_axes(unit(np.cross(ways[0], ways[1])))
     tangent = (1 - cosine**2) / np.maximum(cosine, 1e-12) ** 2
     turned_by = 1 + tangent * (1 - 2 * np.sum(field * across, axis=-1) ** 2)
     shape = size * turned_by / np.maximum(cosine, 1e-12)
+    # The term fades where Tx and Rx are too far apart for it.
     apart = np.degrees(2 * np.arccos(np.clip(cosine, 0.0, 1.0)))
     first, last = _FADES_DEG
     left = 1 - smoothstep(np.clip((apart - first) / (last - first), 0.0, 1.0))

@@ -3,9 +3,9 @@
 A mesh of one's own is a `trimesh.Trimesh` in metres, given as the target of `scattering_length`; in
 a room it is furniture (`rtradar.scene.objects`).
 
-Facets are small and fixed in the material. One seen from a Tx is a tube: rays go to its corners and
-its middle. As the facets move with the body, each tube keeps its place in the material, and the sum
-over tubes changes as smoothly from chirp to chirp as the body moves.
+Facets are small and fixed in the material. A facet seen from a Tx is a tube: rays go to its corners
+and its middle. As the facets move with the body, each tube keeps its place in the material, and the
+sum over tubes changes as smoothly from chirp to chirp as the body moves.
 """
 
 from __future__ import annotations
@@ -46,6 +46,7 @@ def sum_of_echoes(
     frequency: NDArray[np.float64],
 ) -> NDArray[np.complex128]:
     """Field of each pair of echoes (pair, 1, part), relative to the path over the origin."""
+    # The phase of the path over the origin is taken out, and the spreading that amplitudes have.
     range_tx, range_rx = np.linalg.norm(at.tx, axis=1), np.linalg.norm(at.rx[:, 0], axis=1)
     excess = length[:, 0] - (range_tx + range_rx)[:, None]
     phase = np.exp(-2j * np.pi * frequency[:, None] / SPEED_OF_LIGHT_MPS * excess)
@@ -120,12 +121,13 @@ class EllipsoidGrid:
 
     @classmethod
     def cover(cls, semi_axes: Array, edge: float) -> EllipsoidGrid:
-        """As many facets on each part as equilateral triangles of that edge [m] would cover it.
+        """Cover each part with as many facets as equilateral triangles of that edge [m] would need.
 
         They are stretched with the part and long where it bends little. That costs no accuracy,
         because the phase over each is integrated exactly as far as it is linear. An `InputError` is
         raised if they would be more than `MOST_TUBES`.
         """
+        # An icosahedron whose faces are cut n-fold has 20 n^2 facets.
         divisions = np.maximum(2, np.ceil(_sides(ellipsoid_areas(semi_axes) / 20, edge)))
         _refuse_many(20 * divisions**2)
         grids = [_sphere(int(n)) for n in divisions]
@@ -134,10 +136,10 @@ class EllipsoidGrid:
         )
 
     def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
-        """Those facets, each in four, whose corners are farther in as finer facets require."""
+        """Cut some of the facets into four; their corners move in as finer facets require."""
         quarters = in_four(self.corners[which])
-        # Corners are outside the sphere by 3/2 of what the middle is below the mean radius, by a
-        # quarter of it with half the edge.
+        # How far corners stand out of the sphere goes with the square of the edge: with half the
+        # edge it is a quarter.
         out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
         size = np.linalg.norm(quarters, axis=-1, keepdims=True)
         quarters *= (1 + np.repeat(out, 4)[:, None, None] / 4) / size
@@ -149,8 +151,10 @@ class EllipsoidGrid:
         assert self.pose is not None
         u, part = _with_middle(self.corners), self.part
         place, normal = np.empty_like(u), np.empty_like(u)
+        # The parts follow one another, so each has a slice of the facets.
         each = zip(self.pose.centres, self.pose.frames, self.pose.semi_axes, strict=True)
         for index, (centre, frame, axes) in enumerate(each):
+            # Stretching the unit sphere by the semi-axes stretches its normals by their inverses.
             own = slice(*np.searchsorted(part, [index, index + 1]))
             place[own] = centre + (u[own] * axes) @ frame.T
             normal[own] = (u[own] / axes) @ frame.T
@@ -167,7 +171,7 @@ class MeshGrid:
 
     @staticmethod
     def divisions(triangles: Array, edge: float, *, by_area: bool = False) -> NDArray[np.int64]:
-        """How often to cut triangles (face, 3, 3) until no side is longer than ``edge`` [m].
+        """Return how often to cut triangles (face, 3, 3) until no side is longer than ``edge`` [m].
 
         With ``by_area`` facets get the area that those of `EllipsoidGrid` have: no triangle of a
         skin is so long and thin that its sides would have to be cut. An `InputError` is raised if
@@ -186,6 +190,7 @@ class MeshGrid:
         """Cut triangles (face, 3, 3) evenly, each so often; those without area are left out."""
         flat = np.linalg.norm(_across(triangles), axis=1) <= 1e-12 * _longest(triangles) ** 2
         corners, face = [np.empty((0, 3, 3))], [np.empty(0, dtype=np.int64)]
+        # All triangles that are cut alike at once.
         for n in np.unique(divisions[~flat]).tolist():
             own = np.flatnonzero((divisions == n) & ~flat)
             corners.append(np.einsum("fkc,tci->tfki", _cut(n), triangles[own]).reshape(-1, 3, 3))
@@ -194,14 +199,14 @@ class MeshGrid:
 
     @cached_property
     def tubes(self) -> Tubes:
-        """The facets with their flat normals, anticlockwise seen from the side they point to."""
+        """The facets with flat normals, from whose side their corners run anticlockwise."""
         normal = _across(self.corners)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         places = _with_middle(self.corners)
         return Tubes(places, np.broadcast_to(normal[:, None], places.shape), self.face)
 
     def split(self, which: NDArray[np.int64]) -> MeshGrid:
-        """Those facets, each in four."""
+        """Cut some of the facets into four."""
         return MeshGrid(in_four(self.corners[which]), np.repeat(self.face[which], 4))
 
 
@@ -245,6 +250,8 @@ def ellipsoid_areas(semi_axes: Array) -> Array:
 @lru_cache(maxsize=64)
 def _cut(n: int) -> Array:
     """Barycentric weights (n^2, 3 corners, 3) of a triangle cut into n^2 similar ones."""
+    # Places on a grid along two sides: upright triangles at each, and between them those upside
+    # down.
     i, j = (index.ravel() for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     up, down = i + j < n, i + j < n - 1
 

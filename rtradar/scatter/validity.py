@@ -1,6 +1,6 @@
 """Limits of validity: where optics ends, and what is too near, too fast, or inside of what else.
 
-Inside of walls, furniture, objects and other people may be parts of bodies, and objects inside of
+Parts of bodies may be inside of walls, furniture, objects and other people, and objects inside of
 one another.
 """
 
@@ -81,7 +81,7 @@ def warn_of_small_radii(
     *,
     stacklevel: int = 2,
 ) -> None:
-    """Warn where much of an echo comes from radii below `MINIMUM_KA` over the wavenumber.
+    """Warn where much of an echo comes from radii that are below `MINIMUM_KA` over the wavenumber.
 
     The antennas (n, 3) are given pair by pair [m], with their wavenumbers (n,) [1/m] and the
     amplitudes (n, part) of each part's echo, of which only the ratio counts. A `ValidityWarning` is
@@ -91,6 +91,7 @@ def warn_of_small_radii(
 
     Equation :eq:`validity` of the theory page.
     """
+    # The bisector of both ways, in the axes of each part.
     normal = np.zeros((len(tx), *target.centres.shape))
     for antennas in (tx, rx):
         sight = np.einsum("pji,npj->npi", target.frames, antennas[:, None] - target.centres)
@@ -129,6 +130,7 @@ def too_fast(radar: Radar, body: Body, times: Array) -> NDArray[np.bool_]:
     """Whether the range rates of the parts' centres are ambiguous, (time, part)."""
     if body.duration_s < _STEP_S:
         return np.zeros((len(times), len(body.part_names)), dtype=bool)
+    # The rate by two instants, the later of which is still within the recording.
     early = np.minimum(times, body.duration_s - _STEP_S)
     before, after = (
         np.linalg.norm(body.at(at).centres - radar.poses_at(at)[1][:, None], axis=-1)
@@ -146,6 +148,8 @@ def folded_angle_deg(radar: Radar) -> float:
     plane wave: the direction is that of the largest beam, over the half space ahead. The error is 0
     if Tx do not take turns, or no line has two of them.
     """
+    # Only Tx that transmit one after the other, and do not stand at one place, give a wrong
+    # direction.
     taking_turns = radar.tx_delay_s[-1] > 0
     on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
     if not (taking_turns and (on_a_line or not radar.is_cross)):
@@ -160,12 +164,14 @@ def folded_angle_deg(radar: Radar) -> float:
 def _beam_of_turns_deg(radar: Radar) -> float:
     """Angle from broadside to the largest beam where each Tx is wrong by its share of a turn [deg].
 
-    Of two beams alike, such as those above and below an array without height, the nearer one.
+    If two beams are alike, such as above and below an array without height, it is the nearer one.
     """
+    # All directions ahead, by their sines along y and z.
     sines = np.linspace(-1, 1, _BEAMS)
     y, z = (axis.ravel() for axis in np.meshgrid(sines, sines, indexing="ij"))
     ahead = y**2 + z**2 <= 1
     y, z = y[ahead], z[ahead]
+    # Each Tx has the wrong phase that the wrong velocity gives it by its turn in the cycle.
     order = np.argsort(radar.tx_order if radar.tx_order is not None else np.arange(radar.n_tx))
     turns = np.repeat(order / radar.n_tx, radar.n_channels // radar.n_tx)
     field = np.zeros(len(y), dtype=np.complex128)
@@ -194,6 +200,7 @@ def refuse_too_near(radar: Radar, body: Body, times: Array) -> None:
     # The distance to a part is at least that to its centre less its largest semi-axis.
     away = np.linalg.norm(centres[:, None] - antennas[:, :, None], axis=-1)
     gap = away - semi_axes.max(axis=1)
+    # Only for pairs that come so near the exact distance is computed.
     for time, antenna, part in np.argwhere(gap < MINIMUM_ANTENNA_DISTANCE_M):
         local = frames[time, part].T @ (antennas[time, antenna] - centres[time, part])
         distance = _distance(local, semi_axes[part])
@@ -216,6 +223,7 @@ def _distance(place: Array, semi_axes: Array) -> float:
 
     if beyond(0.0) <= 0:
         return 0.0
+    # At this t the sum is below 1, so the root is between.
     t = brentq(beyond, 0.0, float(np.linalg.norm(semi_axes * place)))
     return float(np.linalg.norm(t * place / (semi_axes**2 + t)))
 
@@ -262,7 +270,7 @@ class Inside:
         )
         pieces = (*scene.furniture, *scene.objects)
         self._solids = [one for piece in pieces if (one := _Solid(piece)).mesh.closed]
-        # Who is alone is inside nobody else.
+        # A person who is alone is inside nobody else.
         people = body.names if len(body.names) > 1 else ()
         every = [wall.name for wall in scene.walls], [one.name for one in self._solids], people
         self._things = [name for names in every for name in names]
@@ -274,12 +282,14 @@ class Inside:
     def look(self, times: Array, poses: Poses, power: Array) -> None:
         """Test the next instants.
 
-        Given are the times (time,) [s], the body's poses, and its echo power (time, part) [m^2]. An
-        `InputError` is raised if the pelvis is inside a wall, or someone's trunk in another's.
+        They are given by their times (time,) [s], the body's poses, and its echo power (time, part)
+        [m^2]. An `InputError` is raised if the pelvis is inside a wall, or a trunk inside another.
         """
         for number, wall in enumerate(self._scene.walls):
             self._keep(number, times, _inside_wall(wall, poses), power)
             self._refuse(number, self._pelvis)
+        # Meshes are tested at every tenth instant, counted over all blocks of the capture, and each
+        # stands for ten.
         at = np.arange(-self._instant % _MESH_STEP, len(times), _MESH_STEP)
         self._instant += len(times)
         for number, solid in enumerate(self._solids, start=len(self._scene.walls)):
@@ -289,7 +299,7 @@ class Inside:
         counted = np.zeros(power.shape, dtype=bool)
         for person, number in enumerate(self._people):
             held = self._inside_person(person, times, poses)
-            # Who is inside of two others is inside once.
+            # The power of a part that is inside of two others counts once.
             self._keep(number, times, held, power * ~counted)
             counted |= held
 
@@ -300,10 +310,13 @@ class Inside:
 
     def _inside_person(self, person: int, times: Array, poses: Poses) -> Bools:
         """Which parts (time, part) of others have their centres inside a person."""
+        # The centres of other people's parts, in the axes where each part of this person is the
+        # unit sphere.
         own, other = self._owner == person, np.flatnonzero(self._owner != person)
         away = poses.centres[:, other, None] - poses.centres[:, None, own]
         local = np.einsum("tqji,tpqj->tpqi", poses.frames[:, own], away)
         within = ((local / poses.semi_axes[own]) ** 2).sum(axis=-1) < 1
+        # A trunk inside another trunk is an error, a hand is not.
         bad = (within & self._trunk[own]).any(axis=-1) & self._trunk[other]
         if bad.any():
             time, part = np.argwhere(bad)[0]
@@ -326,6 +339,7 @@ class Inside:
         walls = len(self._scene.walls)
         for number in range(walls):
             self._refuse(number, part_power > REFUSED_FRACTION * of_owner)
+        # Which of the things are walls, furniture, objects and people.
         objects = walls + sum(one.moving is None for one in self._solids)
         people = len(self._things) - len(self._people)
         untouched = "taken as if it were not there"
@@ -337,6 +351,7 @@ class Inside:
             ("inside_person", "another person, in whom they are hidden", people, None),
         ):
             first_s, names = self._first_s[first:last], self._things[first:last]
+            # Each part in each thing, with the first time that it was inside.
             said = [
                 f"the {self._names[part]} in '{names[number]}' from {first_s[number, part]:.2f} s"
                 for number, part in np.argwhere(np.isfinite(first_s))
@@ -369,6 +384,7 @@ class _Solid:
 
     def holds(self, times: Array, points: Array) -> NDArray[np.bool_]:
         """Tell which of the points (time, point, 3) [m] are inside at their times (time,) [s]."""
+        # In the axes of the object, where its mesh stands still.
         if self.moving is not None:
             rotation, place = self.moving.pose(times)
             points = np.einsum("tji,tpj->tpi", rotation, points - place[:, None])
@@ -377,6 +393,8 @@ class _Solid:
     def places(self, times: Array) -> Array:
         """Return places (time, place, 3) of the body of an object [m]."""
         assert self.moving is not None
+        # Corners and middles of faces, thinned to a few and moved in a little, so that touching
+        # does not count.
         found = np.concatenate([self.mesh.vertices, self.mesh.corners.mean(axis=1)])
         found = found[:: -(-len(found) // _PLACES)]
         middle = (found.min(axis=0) + found.max(axis=0)) / 2
@@ -390,6 +408,7 @@ def objects_inside(scene: Scene, duration_s: float) -> list[Limit]:
     times = np.linspace(0.0, duration_s, _INSTANTS)
     solids = [_Solid(piece) for piece in (*scene.furniture, *scene.objects)]
     said, share = [], np.zeros(_INSTANTS, dtype=bool)
+    # Every object that moves against every closed piece.
     for one in solids:
         if one.moving is None:
             continue
@@ -407,9 +426,9 @@ def objects_inside(scene: Scene, duration_s: float) -> list[Limit]:
 
 
 def _inside_wall(wall: Wall, poses: Poses) -> NDArray[np.bool_]:
-    """Which parts (time, part) are inside: the centre is in the slab, or the slab is thinner.
+    """Which parts (time, part) are inside a wall: those whose centre is in the slab.
 
-    A thin slab counts where it runs through the part, of half its size.
+    A slab that is thinner than a part counts where it runs through the part at half its size.
     """
     depth = wall.depth_m(poses.centres)
     # Half the extent of an ellipsoid along the normal.

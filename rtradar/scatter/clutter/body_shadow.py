@@ -1,30 +1,30 @@
 """The moving shadow in the clutter: what people and objects that move take from a room's echoes.
 
 Each leg of an echo, from an antenna to a point, from wall to wall or back, is a spherical wave that
-passes them. What is lost of its field is Kirchhoff's integral over the silhouette of all parts and
-triangles together, across the leg, in units of the Fresnel zone there
-(`rtradar.kernels.scatter.silhouettes`): a complex number that begins before the edge arrives and is
-a half where it is in the middle. An echo keeps the product of what its legs keep. Of what walls
-reflect every leg of every Tx and Rx is computed, at `SWEEP_NODES` frequencies, for zones narrow
-over the sweep.
+passes people and objects. The fraction of its field that is lost is Kirchhoff's integral over the
+silhouette of all parts and triangles together, across the leg, in units of the Fresnel zone there
+(`rtradar.kernels.scatter.silhouettes`). It is a complex number that begins before the edge arrives,
+and is a half where the edge is in the middle. An echo keeps the product of what its legs keep. For
+echoes over walls every leg of every Tx and Rx is computed, at `SWEEP_NODES` frequencies, because
+zones become narrower over the sweep.
 
 Points on furniture and on rough walls, which all antennas share, are many. A few hundred of them
-return most: these are computed for every Tx and at three frequencies, the weak ones from the
-array's middle at the sweep's centre. How many count as strong, the time between keyframes, and that
-between the fewer ones of weak points follow from errors that are measured beforehand. Where nothing
-may be in error all points are computed as `EXACT` says.
+return most of the power: these are computed for every Tx and at three frequencies, the weak ones
+from the array's middle at the sweep's centre. How many count as strong, the time between keyframes,
+and the longer time between keyframes of weak points follow from errors that are measured
+beforehand. Where no error is allowed, all points are computed as `EXACT` says.
 
-Mitsuba is not asked. A ray is free or not, and what is wanted is the wave near an edge, whose field
-is between both over a Fresnel zone. Clutter that furniture hides is not in the room's echoes
-already; what hides is a product of the free wave and the moving screen, as if the edge of
-furniture, which is fixed, were far from that of the body in Fresnel zones.
+Mitsuba is not asked. A ray is free or not, but what is wanted is the wave near an edge, whose field
+is between both over a Fresnel zone. Clutter that furniture hides is already missing from the room's
+echoes. The rest is a product of the free wave and the moving screen, as if the fixed edge of
+furniture were many Fresnel zones away from the edge of the body.
 
-How far from its edge a screen's fringes are those of a body says the series of a conducting
-cylinder between two line sources (`validation/other_methods/shadow.py`). Up to two Fresnel radii
-from the edge Kirchhoff's integral is off by -12 to -15 dB of the shadow's change, with its sign
-by polarisation. Beyond, where a wave turns by more than (2/ka)^(1/3), it is the ray reflected at
-grazing incidence, a ghost of the person that has its own echo, and not the edge's fringe. With
-the damping ``eps`` = 0.1 both together are as near as any damping comes.
+The series of a conducting cylinder between two line sources says how far from its edge the fringes
+of a screen are those of a body (`validation/other_methods/shadow.py`). Up to two Fresnel radii from
+the edge, Kirchhoff's integral is off by -12 to -15 dB of the shadow's change, with a sign that
+depends on polarisation. Farther away, where a wave turns by more than (2/ka)^(1/3), the wave is the
+ray reflected at grazing incidence, a ghost of the person that has its own echo, and not the edge's
+fringe. With the damping ``eps`` = 0.1 both together are as near as any damping comes.
 """
 
 from __future__ import annotations
@@ -70,18 +70,18 @@ KEYFRAMES_S, SHORTEST_S, TRIED_S = 50e-3, 4e-3, 10e-3
 """Longest and shortest time between keyframes of the shadow, and that for which the error of the
 cubics in between is measured [s]. `validation/other_methods/shadow.py` judges the one chosen."""
 ERROR_DB, _ERROR_POWER = -32.0, 3.0
-"""Error that is aimed at, over what changes of the shadow in `_CHANGE_S` [dB], and the power of the
-time between keyframes with which its power grows, as `validation/other_methods/shadow.py` has
-it."""
+"""Error that is aimed at, over the change of the shadow in `_CHANGE_S` [dB]; and the exponent with
+which its power grows with the time between keyframes, as measured by
+`validation/other_methods/shadow.py`."""
 _OF_KEYFRAMES, _OF_POINTS, _OF_SLOW = 0.15, 0.7, 0.15
-"""Parts of the power that may be in error which keyframes, points, and the keyframes of weak points
-may take."""
+"""Fractions of the error that is allowed, as a power: for keyframes, for points, and for the
+keyframes of weak points."""
 SLOW_S, SLOW_TRIED_S = 0.4, 0.1
-"""As `KEYFRAMES_S` and `TRIED_S`, of weak points."""
+"""`KEYFRAMES_S` and `TRIED_S` for weak points."""
 _STRONG = (0.8, 0.95, 0.99)
 """Parts of the power of points, the strongest of which may be computed as `USUAL`."""
 _LEFT_OUT, _THIN = 1e-4, 4
-"""Part of the power of points that is left out, and one in how many weak points is looked at."""
+"""Part of the power of points that is left out; and of how many weak points one is looked at."""
 _ENDS = np.array([-1.5, -0.5, 0.5, 1.5])
 """Keyframes about the middle between two of them."""
 _CHANGE_S, _TESTS, _FEW = 0.1, 12, 4
@@ -102,14 +102,14 @@ _TRACK_S, _MOST_INSTANTS = 0.05, 400
 class ClutterShadow:
     """Shadow that a moving body, and ``objects`` that move, cast in the clutter of a room.
 
-    What is approximated may be in error by ``allowed_m2``, a mean power of IF samples [m^2], and by
-    `ERROR_DB` of what changes if that is more; ``error_m2`` is what it is expected to be.
+    Approximations may be in error by ``allowed_m2``, a mean power of IF samples [m^2], or by
+    `ERROR_DB` of what changes if that is more; ``error_m2`` is the error that is expected.
 
-    ``step`` is the number of chirps between keyframes, ``slower`` that of keyframes between those
-    of weak points, 0 where none are apart; ``starts (object + 1,)`` the first echo of
-    each object of the clutter in the count through all, ``mirrors`` the numbers of those that walls
-    reflect; ``frequency (node,)`` are the frequencies of their shadow, ``point_frequency (node,)``
-    those of the others' [Hz].
+    ``step`` is the number of chirps between keyframes, ``slower`` the number of keyframes between
+    those of weak points, 0 where no points are weak. ``starts (object + 1,)`` is the first echo
+    of each object of the clutter, counted through all, and ``mirrors`` are the numbers of the
+    objects that walls reflect. ``frequency (node,)`` are the frequencies of the shadow of these,
+    ``point_frequency (node,)`` those of the shadow of points [Hz].
     """
 
     def __init__(
@@ -120,6 +120,7 @@ class ClutterShadow:
         self._faces = [
             (moving, small_facets(moving.shape.corners, 0, _EDGE_M).corners) for moving in objects
         ]
+        # Paths over walls are few, and each leg of every channel is computed.
         self.starts = np.cumsum([0, *(own.n_echoes for own in clutter.objects)])
         self.frequency = sweep_nodes(self._radar, SWEEP_NODES)
         numbered = enumerate(clutter.objects)
@@ -127,6 +128,8 @@ class ClutterShadow:
         mirrors = [clutter.objects[number] for number in self.mirrors]
         self._legs = _mirror_legs(mirrors, self._radar)
         self._mirror_m = np.array([np.abs(own.amplitude).max() for own in mirrors])
+        # Points are many: only those that something comes near during the capture, and that return
+        # most of the power, are kept.
         points = _shared_points(clutter, self.starts)
         count = min(int(body.duration_s / _TRACK_S) + 2, _MOST_INSTANTS)
         last = body.duration_s / self._radar.chirp_interval_s
@@ -156,8 +159,10 @@ class ClutterShadow:
         chirps = np.array([chirp])
         radar = self._radar.gapless
         at = chirp_poses(radar, self._body, chirps)
+        # The map to the axes where each part is the unit sphere.
         maps = np.swapaxes(at.frames[0], 1, 2) / at.semi_axes[:, :, None]
         corners, closed = [np.empty((0, 3, 3))], [np.empty(0, dtype=bool)]
+        # The triangles of objects are posed at the same time.
         for moving, own in self._faces:
             (rotation,), (place,) = moving.pose(radar.centres_of(chirps))
             corners.append(own @ rotation.T + place)
@@ -176,12 +181,16 @@ class ClutterShadow:
         Measured are the error of points, and that of cubics between keyframes `TRIED_S` and
         `SLOW_TRIED_S` apart, in the samples of one Tx.
         """
+        # Errors are measured for one Tx, which is about a quarter along the array.
         tx = np.array([self._radar.n_tx // 4])
         fields = _fields(clutter, self.starts, near.number, tx)
+        # Where an error is allowed, fewer points may be computed with less precision.
         strong, precision, of_points = np.ones(len(near.power), dtype=bool), EXACT, 0.0
         if allowed_m2 > 0:
             strong, precision, of_points = self._enough(near, fields, tx, _OF_POINTS * allowed_m2)
         self._points = PointShadow(self._radar, near.some(strong), precision)
+        # How fast the shadow changes is measured with the cheap precision, about some instants of
+        # the capture.
         points = PointShadow(self._radar, near.some(strong), FAINT)
         around = np.array([0.0, *(_ENDS * TRIED_S), -_CHANGE_S / 2, _CHANGE_S / 2])
         lost = [
@@ -196,10 +205,12 @@ class ClutterShadow:
             self._settle_weak(near.some(~strong), fields[..., ~strong], _OF_SLOW * allowed_m2)
 
     def _settle_weak(self, weak: SharedPoints, fields: Field, allowed_m2: float) -> None:
-        """Choose the keyframes of weak points, by one in `_THIN`, whose powers add up."""
+        """Choose the keyframes of weak points, from one in `_THIN` of them, whose powers add up."""
         self._weak = PointShadow(self._radar, weak, FAINT)
         some = np.arange(len(weak.power))[::_THIN]
         points = PointShadow(self._radar, weak.some(some), FAINT)
+        # Scaled so that the points that are looked at stand for all weak ones, and the sum of
+        # powers is the mean power of a sample.
         own = np.sqrt(_THIN / fields[..., 0].size) * fields[..., some]
         lost = [
             [points.samples(own, posed).ravel() for posed in row]
@@ -212,6 +223,7 @@ class ClutterShadow:
 
     def _tests(self, count: int, around: Array) -> list[list[Posed]]:
         """Poses at times ``around`` some instants of the capture [s]."""
+        # Instants spread over the capture, each with the times around it.
         middles = (np.arange(count) + 0.5) * self._body.duration_s / count
         times = np.clip(middles[:, None] + around, 0, self._body.duration_s)
         chirps = times / self._radar.chirp_interval_s
@@ -220,14 +232,16 @@ class ClutterShadow:
     def _enough(
         self, near: SharedPoints, fields: Field, tx: Indices, allowed_m2: float
     ) -> tuple[Bools, Precision, float]:
-        """Find how few points need more than `FAINT`, and whether `USUAL` or `CLOSE`.
+        """Find how few points need more than `FAINT`, and whether they need `USUAL` or `CLOSE`.
 
-        The mean power of the error of samples follows [m^2], beside those of `FINE`. Of weak points
-        one in `_THIN` is looked at, whose errors add up as powers do.
+        Returned is also the mean power of the error of samples against `FINE` [m^2]. One in `_THIN`
+        of the weak points is looked at, whose errors add up as powers do.
         """
+        # Points by their strength: group 0 returns most of the power.
         group = np.searchsorted(_STRONG, near.shares(), side="right")
         poses = [own for (own,) in self._tests(_FEW, np.zeros(1))]
         error = np.zeros((3, len(_STRONG) + 1, len(poses), *fields.shape[:-1]), np.complex128)
+        # The error of each precision, group by group, against the fine one.
         for number in range(len(_STRONG) + 1):
             thin = 1 if number < 2 else _THIN
             which = np.flatnonzero(group == number)[::thin]
@@ -240,6 +254,7 @@ class ClutterShadow:
                 )
             )
             error[:, number] = np.array(others) - fine
+        # The fewest strong groups, and the cheaper precision, that keep the error that is allowed.
         for strong in range(len(_STRONG) + 2):
             weak = error[2, strong:].sum(axis=0)
             for precision, own in zip((USUAL, CLOSE), error[:2], strict=True):
@@ -250,10 +265,11 @@ class ClutterShadow:
         return group >= 0, FINE, 0.0
 
     def _lost(self, points: PointShadow, fields: Field, posed: Posed) -> Field:
-        """Samples of what is lost of points, for the array's middle, and of mirrors [m].
+        """What the samples lose of points and, for the array's middle, of mirrors [m].
 
-        The sum of their powers is that of the mean sample.
+        The sum of their powers is the mean power of a sample.
         """
+        # One channel in the middle of the array stands for all, for the paths over walls.
         middle = self._radar.n_channels // 2
         some = np.flatnonzero(self._legs.channel == middle)
         of_mirrors = 1 - self._mirrors_kept(self._legs.some(some), posed, np.ones(1))[:, middle, 0]
@@ -276,6 +292,7 @@ class ClutterShadow:
         some = np.flatnonzero(lost.any(axis=1))
         shape = len(self.mirrors), self._radar.n_channels, len(scales)
         kept = np.ones(shape, dtype=np.complex128)
+        # A path keeps the product of what its legs keep.
         np.multiply.at(kept, (legs.mirror[some], legs.channel[some]), 1 - lost[some])
         return kept
 
@@ -287,12 +304,14 @@ def _apart_s(
 
     Each row has what is lost at an instant, at `_ENDS` about it, and at times of a change.
     """
+    # The error in the middle between keyframes, and how much the shadow changes in a given time.
     error = change = 0.0
     for now, *rest in lost:
         error += float((np.abs(now - cubic_weights([0.5])[0] @ rest[:4]) ** 2).sum()) / len(lost)
         change += float(np.var([now, *rest[4:]], axis=0).sum()) / len(lost)
     if not error > 0:
         return limits_s[1], 0.0
+    # The power of the error grows with a power of the time between keyframes.
     goal = max(change * 10 ** (ERROR_DB / 10), allowed_m2)
     apart_s = tried_s * (goal / error) ** (1 / _ERROR_POWER)
     apart_s = float(min(limits_s[1], max(limits_s[0], apart_s)))
@@ -314,6 +333,7 @@ def _fields(clutter: Clutter, starts: Indices, numbers: Indices, tx: Indices) ->
     radar, found = clutter.radar, []
     nodes = sweep_nodes(radar, FINE.nodes)
     k = 2 * np.pi / SPEED_OF_LIGHT_MPS * nodes[:, None, None, None]
+    # Each number belongs to the last object that begins at or before it.
     own = np.searchsorted(starts, numbers, side="right") - 1
     for number in np.unique(own):
         echoes, which = clutter.objects[number], numbers[own == number] - starts[number]
@@ -352,6 +372,7 @@ def _mirror_legs(mirrors: list[RoomEchoes], radar: Radar) -> _Legs:
         # The echoes of one object are delays in the walls, on one path.
         received = (own.amplitude != 0).any(axis=(0, 3))
         stops = [array[received] for array in (tx, *np.moveaxis(own.points[:, :, 0], 2, 0), rx)]
+        # Every stretch between two places of a path is a leg, with the path before it.
         size = np.linalg.norm(np.diff(stops, axis=0), axis=2)
         before = np.cumsum(np.concatenate([np.zeros((1, size.shape[1])), size]), axis=0)
         of_path = size.sum(axis=0), number, np.flatnonzero(received)

@@ -4,8 +4,9 @@ The machinery is that of the model `rays`: facets are tubes, Mitsuba says which 
 sees past all furniture, and lengths and phases are float64. A closed piece returns one bounce: each
 facet reflects by the Fresnel coefficients of a half-space of its material, TE and TM apart, at its
 own angle and the sweep's centre frequency. A thin sheet, which is of metal, reflects on both sides
-and up to `SHEET_BOUNCES` times: a corner reflector. Bounces between different pieces, and between
-pieces and walls, are left out; walls on the way transmit what their slabs do, once a group.
+and up to `SHEET_BOUNCES` times, as a corner reflector does. Bounces between different pieces, and
+between pieces and walls, are left out. What walls on the way transmit is applied once to each
+group.
 
 Facets that are within half a range bin of each other, and side by side, are one echo: the phase
 that is left over the sweep is small enough for a polynomial through `FURNITURE_NODES` frequencies.
@@ -44,7 +45,7 @@ _BOW_RAD = 0.3
 _OF_PIECE = 0.125
 """Largest facet over the longest extent of a piece, where nothing else asks for smaller ones.
 
-What corners and other pieces occlude is occluded by whole facets. A trihedral is then within 0.1 dB
+Corners and other pieces occlude whole facets. With facets of this size a trihedral is within 0.1 dB
 of the closed form (`validation/closed_forms/room_clutter.py`).
 """
 _PATIENCE_S = 2.0
@@ -62,6 +63,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     They are of the kind ``furniture``, or ``reflector`` for sheets. Mitsuba, ``mi``, has its
     variant set. An `InputError` is raised if a mesh cannot be used, or would take too many facets.
     """
+    # All pieces are traced as one mesh, because they occlude one another.
     pieces = [(piece, piece.triangles()) for piece in scene.furniture]
     if not pieces:
         return
@@ -85,6 +87,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
 
 def _facet_edge(corners: Array, radar: Radar) -> float:
     """Longest side of facets [m], by the bow of paths over it, the group and the piece."""
+    # The distance from the nearest antenna to the box of the mesh bounds the bow of the paths.
     antennas, (low, high) = np.concatenate([radar.tx, radar.rx]) @ radar.axes, _box(corners, radar)
     nearest = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min()
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
@@ -95,7 +98,7 @@ def _facet_edge(corners: Array, radar: Radar) -> float:
 def _box(places: Array, radar: Radar) -> Array:
     """Least and largest coordinates (2, 3) of places (..., 3), in the radar's axes [m].
 
-    So radar and room give the same, however they are turned together.
+    In these axes the result is the same however radar and room are turned together.
     """
     seen = places.reshape(-1, 3) @ radar.axes
     return np.stack([seen.min(axis=0), seen.max(axis=0)])
@@ -109,11 +112,12 @@ def flat_edge(extent: float, nearest: float, wavenumber: float) -> float:
 
 
 def small_facets(corners: Array, first: int, edge: float) -> MeshGrid:
-    """Faces, numbered from ``first`` on, halved across their longest sides until these fit."""
+    """Halve faces, numbered from ``first`` on, across their longest sides until these fit."""
     face = np.arange(first, first + len(corners))
     done: list[tuple[Array, Indices]] = []
     count = 0
     while len(corners):
+        # Triangles without area are dropped, small ones are done.
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         flat = np.linalg.norm(normals, axis=1) <= 1e-12 * sides.max(axis=1) ** 2
@@ -146,9 +150,10 @@ class FacetGroups:
     """
 
     def __init__(self, middles: Array, radar: Radar) -> None:
+        # Depth along the range, and two axes across the line of sight.
         self._origin, self._bin = np.array(radar.position_m), radar.range_bin_m
         way = (middles - self._origin).mean(axis=0)
-        # In the radar's axes, as in `_box`.
+        # The axes across are chosen in the radar's axes, for the reason given in `_box`.
         self._sides = np.linalg.svd((way @ radar.axes)[None])[2][1:] @ radar.axes.T
         cells = self._cells(middles)
         self._least, self._count = cells.min(axis=0), np.ptp(cells, axis=0) + 1
@@ -163,7 +168,7 @@ class FacetGroups:
         return np.searchsorted(self._keys, self._key(self._cells(points)))
 
     def _cells(self, points: Array) -> Indices:
-        # Axis by axis, so that a point is rounded alike in any company.
+        # Axis by axis, so that a point is rounded alike whatever other points come with it.
         x, y, z = (points[:, axis] - self._origin[axis] for axis in range(3))
         width = _WIDTH_BINS * self._bin
         across = [(x * side[0] + y * side[1] + z * side[2]) / width for side in self._sides]
@@ -182,22 +187,25 @@ class PathGroups:
     """
 
     def __init__(self, places: Array, radar: Radar, order: int) -> None:
+        # The middle of the piece's box is the point of reference of all paths.
         low, high = _box(places, radar)
         self._middle = radar.axes @ (low + high) / 2
         self._step, self.order = radar.range_bin_m, order
         self._origin = np.array(radar.position_m)
-        # From face to face and back, no path differs from that over the middle by more.
+        # No path from face to face and back differs by more from the one over the middle.
         self._half = int(np.ceil((order + 1) * np.linalg.norm(high - low) / self._step))
         self.count = 2 * self._half + 1
         self._weight, self._sum = np.zeros(self.count), np.zeros((self.count, 3))
 
     def of(self, footprints: Footprints, tx: Array) -> Indices:
         """Return the group of each footprint, and add these to its `centres`."""
+        # The path in steps of half a bin, against that over the middle.
         places = footprints.places[:, 3]
         path = footprints.path[:, 3] + np.linalg.norm(places - self._origin, axis=1)
         middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(self._origin - self._middle)
         number = np.rint((path - middle) / self._step).astype(np.int64)
         group = np.clip(number + self._half, 0, self.count - 1)
+        # The mean place of a group, weighted by power, is summed up over all Tx.
         power = footprints.power()
         self._weight += np.bincount(group, weights=power, minlength=self.count)
         self._sum += np.stack(
@@ -223,6 +231,7 @@ class PathGroups:
 def _returns(
     piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid, radar: Radar, scene: Scene
 ) -> RoomEchoes | None:
+    # Tubes of rays to the facets of this piece, which a sheet reflects from either side.
     bounces, places = 1 if closed else SHEET_BOUNCES, grid.tubes.places
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
     polarization = Polarization(radar.polarization, radar.axes)
@@ -235,8 +244,10 @@ def _returns(
         antenna=radar.tx_antenna,
         two_sided=not closed,
     )
+    # Single bounces are grouped by where they are, several bounces by the length of their path.
     groups = FacetGroups(places[:, 3], radar)
     chains = [PathGroups(places, radar, order) for order in range(2, bounces + 1)]
+    # The shortest waves settle how rough tubes may be; the sums are at nodes over the sweep.
     nodes = sweep_nodes(radar, FURNITURE_NODES)
     k = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
 
@@ -253,6 +264,7 @@ def _returns(
                 lengths.append(chains[order - 1].lengths(footprints, group, tx, rx))
             else:
                 group = groups.of(footprints.places[:, 3])
+            # The sum of each group's footprints, with what the material reflects.
             visible = exits(surfaces, footprints, rx)
             turn, lit = _reflected(footprints, piece.material, radar.centre_frequency_hz)
             lit = replace(lit, surface=group)
@@ -260,14 +272,16 @@ def _returns(
             sums.append(turn * own)
         return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
 
+    # Every Tx with the Rx that are kept with it; a piece that nobody sees returns nothing.
     shots = list(map(shot, radar.tx, radar.rx[radar.rx_of_tx]))
     amplitude = np.stack([amplitude for _, amplitude in shots], axis=1)
     if not amplitude.any():
         return None
     centres = np.concatenate([groups.centres, *(chain.centres() for chain in chains)])
-    # A group, which its bounces leave last, is small against what a pattern resolves.
+    # A pattern changes little over a group, so the place of its last bounce stands for all of it.
     ways = centres - radar.rx[radar.rx_of_tx][:, :, None]
     amplitude *= pattern_of(radar.rx_antenna, ways, polarization)
+    # The groups of one bounce, then those of each further number of bounces.
     orders = [1, *(chain.order for chain in chains)]
     counts = [len(groups.centres), *(chain.count for chain in chains)]
     returns = RoomEchoes(
@@ -295,8 +309,10 @@ def _reflected(
     """
     if material.conducts or len(footprints) == 0:
         return 1.0, footprints
+    # The angle of incidence on each facet gives both coefficients.
     ways, normals = footprints.directions[:, 3], footprints.normals[:, 3]
     cosine = np.clip(-np.einsum("ti,ti->t", ways, normals), 0.0, 1.0)
+    # The phase at normal incidence is taken out of both, which leaves real factors.
     eta = material.eta(frequency_hz)
     straight = reflection(eta, 1.0, "tm")
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j

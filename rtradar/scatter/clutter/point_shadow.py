@@ -28,8 +28,9 @@ _LEGS_A_THREAD = 256
 class Precision(NamedTuple):
     """How the shadow in shared points is computed.
 
-    ``nodes`` are the frequencies; ``along_tx`` and ``along_rx`` the places along each line of
-    antennas, none for the array's middle; ``lines`` those of the integral, ``reach`` as `REACH`.
+    ``nodes`` is the number of frequencies; ``along_tx`` and ``along_rx`` are the numbers of places
+    along each line of antennas, 0 for the array's middle; ``lines`` is the number of lines of the
+    integral, and ``reach`` is as `REACH`.
     """
 
     nodes: int
@@ -43,9 +44,9 @@ EXACT = Precision(5, 99, 99, 256, 4.0)
 """-25 dB of the change of the samples in a kick, where nothing may be in error
 (``validation/other_methods/shadow.py``)."""
 FINE = Precision(3, 99, 2, 128, REACH)
-"""Beside this errors are measured. Each approximation for itself is below -25 dB of the change of
-the samples in a walk; of a kick, which changes more, all together are at -15 dB: what two places
-on a line of receivers and three frequencies leave out, and fringes beyond `REACH`, count alike."""
+"""Errors are measured against this. Each approximation by itself is below -25 dB of the change of
+the samples in a walk. In a kick, which changes more, all together are at -15 dB: what two places on
+a line of receivers and three frequencies leave out counts as much as fringes beyond `REACH`."""
 CLOSE = FINE._replace(lines=40)
 """-12 dB of what changes in 0.1 s of a kick."""
 USUAL = Precision(3, 99, 2, 24, 2.0)
@@ -74,12 +75,15 @@ class SharedPoints(NamedTuple):
 
     def near(self, radar: Radar, poses: Sequence[Posed]) -> Bools:
         """Which points have something in the Fresnel zone of their legs in any of some poses."""
+        # A ball about all antennas stands for each of them.
         antennas = np.concatenate([radar.tx, radar.rx])
         middle = antennas.mean(axis=0)
         extent = float(np.linalg.norm(antennas - middle, axis=1).max())
         ways = self.places - middle
         squares = np.maximum((ways**2).sum(axis=1), 1e-30)
         found = np.zeros(len(ways), dtype=bool)
+        # The place on each line of sight that is nearest to a ball of occluders, and the Fresnel
+        # zone there.
         for place, radius in (ball for posed in poses for ball in _balls(posed)):
             away = place - middle
             along = ways @ away
@@ -112,6 +116,8 @@ class PointShadow:
         self, radar: Radar, points: SharedPoints, precision: Precision, tx: Indices | None = None
     ) -> None:
         self.precision, self._radar, self._points = precision, radar, points
+        # From places along the lines of antennas, with weights in each antenna, or from the middle
+        # of the array alone.
         if precision.along_tx:
             own = radar, precision.along_tx, precision.along_rx
             places, tx_weights, rx_weights = shadow_nodes(*own)
@@ -126,24 +132,27 @@ class PointShadow:
         self._scales = sweep_nodes(radar, precision.nodes) / radar.centre_frequency_hz
 
     def at(self, posed: Posed) -> tuple[Indices, Field]:
-        """Which echoes are occluded, and the fraction (node, tx, rx, echo), one of all antennas."""
+        """Return which echoes lose something, and the lost fraction (node, tx, rx, echo)."""
         which, fraction = self._find(posed)
         return self._points.number[which], fraction
 
     def samples(self, fields: Field, posed: Posed) -> Field:
         """Sum what all points lose of ``fields (node, tx, rx, point)``, over the points.
 
-        What is lost at one frequency, or for one Tx, is that of all.
+        A loss at one frequency, or for one Tx, stands for all.
         """
         which, fraction = self._find(posed)
         return np.asarray((fields[..., which] * fraction).sum(axis=-1))
 
     def _find(self, posed: Posed) -> tuple[Indices, Field]:
+        # Only points that have something in their Fresnel zones are computed, and of those only the
+        # ones that lose something are kept.
         near = np.flatnonzero(self._points.near(self._radar, [posed]))
         lost = self._seen_from(self._antennas, near, posed)
         some = lost.any(axis=(0, 2))
         lost, near = lost[:, some], near[some]
-        # Not by BLAS, whose threads cost more than these few numbers.
+        # BLAS is not used, because its threads cost more than these few numbers.
+        # What an echo keeps is the product of what both of its legs keep.
         of_tx, of_rx = (
             1 - np.einsum("an,nef->fae", weights, lost)
             for weights in (self._tx_weights, self._rx_weights)
@@ -163,7 +172,7 @@ class PointShadow:
 def lost_on_legs(
     radar: Radar, geometry: tuple[Array, ...], posed: Posed, reach: float, lines: int, scales: Array
 ) -> Field:
-    """Fraction of the field that is taken from each leg (leg, node), as `occluded_fractions`."""
+    """Fraction of the field that each leg loses (leg, node); see `occluded_fractions`."""
     out = np.zeros((len(geometry[0]), len(scales)), dtype=np.complex128)
 
     def fill(begin: int) -> None:

@@ -50,8 +50,8 @@ class RoomEchoes:
     lengths, defined as in `Echoes` [m], at ``frequency (node,)`` [Hz]. ``points (tx or 1, rx or 1,
     echo, hop, 3)`` are the corners of the path, world [m]; 1 where all antennas share them.
     ``off_m`` is the largest known error of the polynomial through the nodes, if it is above what
-    was asked for [m]. Of walls ``image`` (3, 3) and (3,) [m] says where a Tx has its image: at the
-    product and the sum.
+    was asked for [m]. For walls ``image``, a matrix (3, 3) and a shift (3,) [m], gives the image of
+    a Tx: the product with the matrix plus the shift.
     """
 
     name: str
@@ -76,13 +76,14 @@ class RoomEchoes:
 
     def strongest_cell_m2(self, radar: Radar) -> float:
         """Return the largest power of a channel in a range bin, with phases of echoes [m^2]."""
+        # Echoes of each channel in the cells of its range axis, summed as fields.
         middle, bins = len(self.frequency) // 2, radar.samples_per_chirp
         wavenumber = 2 * np.pi * self.frequency[middle] / SPEED_OF_LIGHT_MPS
         field = self.amplitude[middle] * np.exp(1j * wavenumber * self.length)
         field = field.reshape(-1, self.n_echoes)
         channel = np.arange(len(field))[:, None] * (bins + 1)
         strongest = 0.0
-        # Once more with bins half a bin further: no pair of neighbours is always separated.
+        # Once more with all bins shifted by half a bin, so that no neighbours stay separated.
         for shift in (0.0, 0.5):
             cells = np.minimum(self.length / (2 * radar.range_bin_m) + shift, bins)
             cells = cells.astype(np.int64).reshape(field.shape)
@@ -126,6 +127,7 @@ class RoomEchoes:
         The error is relative to ``strongest_m`` [m], or to the strongest of these echoes.
         """
         most = error * (self.strongest_m() if strongest_m is None else strongest_m)
+        # Interpolating to fewer nodes and back shows the error, at the frequencies that are known.
         for count in _NODES:
             nodes = sweep_nodes(radar, count)
             there = interpolation_weights(self.frequency, nodes)
@@ -165,6 +167,7 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     one echo: their delays differ by the distance of Tx and Rx.
     """
     points = returns.points[0, 0, :, 0]
+    # Points that some antenna sees through a wall, and these walls.
     behind, crossed = np.zeros(len(points), dtype=bool), set[int]()
     edges = WallEdges.of(scene.walls, radar)
     for number, antennas in product(range(len(scene.walls)), (radar.tx, radar.rx)):
@@ -174,9 +177,11 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
             crossed.add(number)
     if not behind.any():
         return returns
+    # Only those points need more nodes, and what their walls transmit.
     count, series = _series_behind(scene.walls, crossed, radar)
     nodes, hidden = sweep_nodes(radar, count), returns.take(behind)
     hidden = replace(hidden, amplitude=hidden.at_nodes(nodes), frequency=nodes)
+    # Echoes that are not behind walls go on as they are.
     parts, off = _transmitted(hidden, radar, scene, series)
     parts = [returns.take(~behind), *parts]
     strongest_m = max(part.strongest_m() for part in parts)
@@ -196,9 +201,9 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
 def _series_behind(
     walls: tuple[Wall, ...], crossed: set[int], radar: Radar
 ) -> tuple[int, tuple[WallSeries, ...]]:
-    """Number of nodes, and the terms of all walls: of those that are crossed one, if it can be.
+    """Return the number of nodes and the terms of all walls, one for crossed walls if possible.
 
-    A pane of glass is then one echo of each point in place of a dozen, at a few nodes more.
+    A pane of glass then makes one echo of each point in place of a dozen, at a few nodes more.
     """
     for count in (FURNITURE_NODES, _PANE_NODES):
         series = delayed(walls, radar, count)
@@ -216,19 +221,21 @@ def _transmitted(
     polarization = Polarization(radar.polarization, radar.axes)
 
     def legs(antennas: Array) -> list[_Leg]:
+        # The co-polar field that arrives, as one wave for each way through the slabs.
         ways = points - antennas[:, None]
         directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
         sent = antenna_field(directions, polarization, x_for_steep=True)
         waves = walls.transmitted(0, walls.start(sent), antennas[:, None], points)
         return [_Leg(wave, (wave.field * sent).sum(axis=-1).conj()) for wave in waves]
 
+    # Pairs of waves that pass each wall equally often are one echo.
     groups: dict[tuple[tuple[int, int], ...], list[tuple[_Leg, _Leg]]] = {}
     for out, back in product(legs(radar.tx), legs(radar.rx)):
         passes = Counter[int]()
         for one in (*out.wave.passages, *back.wave.passages):
             passes[one.wall] += one.passes
         groups.setdefault(tuple(sorted(passes.items())), []).append((out, back))
-    # A bound of each echo, for most are not worth what they hold in memory.
+    # A bound on each echo tells which are worth it: most would only take memory.
     strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
     bounds = [
         sum(np.prod([np.abs(leg.left).max(axis=(0, 1)) for leg in pair], axis=0) for pair in pairs)
@@ -236,6 +243,7 @@ def _transmitted(
         for pairs in groups.values()
     ]
     sizes, parts, off = np.array(bounds), list[RoomEchoes](), 0.0
+    # Each group has its own points: those for which it is worth an echo.
     for pairs, size, some in zip(groups.values(), sizes, _worth(sizes), strict=True):
         if some.any():
             parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
@@ -248,9 +256,9 @@ def _transmitted(
 def _together(
     returns: RoomEchoes, pairs: list[tuple[_Leg, _Leg]], some: Bools, kept: NDArray[np.int64]
 ) -> RoomEchoes:
-    """Some of the echoes by all pairs of waves, at their mean length.
+    """Sum some of the echoes over all pairs of waves, at their mean length.
 
-    What each is longer is in its amplitude.
+    What each wave is longer than the mean is in the amplitude.
     """
 
     def longer(out: _Leg, back: _Leg) -> Array:
@@ -261,11 +269,13 @@ def _together(
 
     # Pair by pair and node by node, which takes less memory.
     middle, total, weighted = len(returns.frequency) // 2, np.zeros(1), np.zeros(1)
+    # The mean length of a group, weighted by the fields of its waves.
     for pair in pairs:
         size = np.abs(left(*pair, middle))
         total, weighted = total + size, weighted + size * longer(*pair)
     mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
     amplitude = np.zeros_like(returns.amplitude)
+    # Each wave is turned by what its length differs from the mean.
     for node, wavenumber in enumerate(2 * np.pi * returns.frequency / SPEED_OF_LIGHT_MPS):
         for pair in pairs:
             turn = np.exp(1j * wavenumber * (longer(*pair) - mean))
@@ -275,7 +285,7 @@ def _together(
 
 
 def _worth(sizes: Array) -> Bools:
-    """All but the weakest, whose rms sum is a small fraction of the strongest."""
+    """Select all but the weakest, whose rms sum is a small fraction of the strongest."""
     order = np.argsort(sizes, axis=None)
     together = np.sqrt(np.cumsum(sizes.ravel()[order] ** 2))
     worth = np.ones(sizes.size, dtype=bool)

@@ -2,21 +2,21 @@
 
 It holds specular reflections by walls up to an order of images, furniture by physical optics over
 facets, corner reflectors with several bounces, and the diffuse returns of rough walls. It does not
-hold the direct coupling from Tx to Rx, which is the radar's and not the room's; bounces between
-furniture and walls or other furniture; waves diffracted at edges of walls. Antennas look as their
-patterns say: isotropic ones receive what is right below, above and behind the radar as no real ones
-would. A room at rest is the same in every TDM cycle: its IF is computed once.
+hold the direct coupling from Tx to Rx, which belongs to the radar and not to the room; bounces
+between furniture and walls or other furniture; and waves diffracted at edges of walls. Antennas
+look as their patterns say: isotropic antennas receive what is right below, above and behind the
+radar, as no real antenna would. A room at rest is the same in every TDM cycle: its IF is computed
+once.
 
-**What walls return** is specular reflections by images, and diffuse returns of rough faces.
-A wall reflects like an infinite one where the specular point lies well inside its rectangle, and
-fades at edges that are free (`rtradar.scatter.multipath.wall_edges`); only furniture occludes it.
-The
-field on a path of length L is that of free space times what the walls do, so an echo is F = -2
-sqrt(pi) (p_rx . E) / L, whose square is a radar cross-section: with a conductor, which reverses E,
-+2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's coefficient, or echoes
-of their own where no polynomial over the sweep follows that
-(`rtradar.scatter.multipath.slabs`). Left out are those between a wall and a pane right before
-it (a reflection by the pane's back is in, once), and the direct coupling from Tx to Rx.
+**What walls return** is specular reflections by images, and diffuse returns of rough faces. A wall
+reflects like an infinite one where the specular point lies well inside its rectangle, and fades at
+edges that are free (`rtradar.scatter.multipath.wall_edges`); only furniture occludes it. The field
+on a path of length L is that of free space times what the walls do. So an echo is F = -2 sqrt(pi)
+(p_rx . E) / L, whose square is a radar cross-section; with a conductor, which reverses E, it is
++2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's coefficient, or are
+echoes of their own where no polynomial over the sweep follows that coefficient
+(`rtradar.scatter.multipath.slabs`). Left out are waves between a wall and a pane right before it (a
+reflection by the pane's back is in, once), and the direct coupling from Tx to Rx.
 
 The fraction of the reflected power that roughness takes from the specular wave,
 1 - exp(-(2 k s)^2 cos_i cos_s) (Ament, Proc. IRE 41 (1953) 142, made reciprocal by the mean of both
@@ -26,10 +26,10 @@ S^2 from the height of the surface instead of a fit. So the power per area is
 
     sigma0 = 4 S^2 |R|^2 cos_i cos_s,
 
-R of the smooth slab at the angle of each leg, its polarisation as it arrives. Over half of space it
-adds up to S^2 |R|^2 of what arrives, and specular and diffuse power together to what a smooth wall
-reflects. All of it counts as co-polar. A point represents its cell of a jittered grid, two range
-bins wide: near cells give a grainier return than a real wall, with the right mean power.
+with R of the smooth slab at the angle of each leg, for the polarisation that arrives. Over half of
+space this adds up to S^2 |R|^2 of what arrives, and specular and diffuse power together to what a
+smooth wall reflects. All of it counts as co-polar. A point represents its cell of a jittered grid,
+two range bins wide: near cells give a grainier return than a real wall, with the right mean power.
 """
 
 from __future__ import annotations
@@ -101,11 +101,13 @@ def specular_returns(
     There is one object for each sequence of walls. Furniture, which `Occluders` know, occludes
     legs.
     """
+    # The first face must have a Tx before it, the last one an Rx.
     faces = [Face(wall, back) for wall in scene.walls for back in (False, True)]
     lit, received = (
         [face for face in faces if (height(face.wall, antennas, back=face.back) > 0).any()]
         for antennas in (radar.tx, radar.rx)
     )
+    # All sequences of faces, in which no wall follows itself.
     for bounces in range(1, order + 1):
         choices = [lit, *[faces] * (bounces - 2), received]
         if bounces == 1:
@@ -120,25 +122,28 @@ def specular_returns(
 def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomEchoes | None:
     """Echoes over these faces, in as few terms as polynomials over the sweep follow."""
     tx, rx = radar.tx[:, None], radar.rx[radar.rx_of_tx]
-    # By the edge of a right-angled corner the path goes over both walls in either order, each of
-    # them with half of its weight: no two or none of it.
+    # At the edge of a right-angled corner the path goes over both walls in either order. With
+    # margins of either sign each order gets half of its weight, so that both count as one.
     edges = WallEdges.of(scene.walls, radar)
     (stops, wide), (_, narrow) = (edges.leg(leg, tx, rx, margin) for margin in (_EDGE_M, -_EDGE_M))
     weight = (wide + narrow) / 2
+    # The length is that from the image of the Tx over all faces.
     images = image_chain(leg, np.broadcast_to(tx, rx.shape))
     length = np.linalg.norm(rx - images[-1], axis=-1)
     which = np.flatnonzero(weight)
     ends = [stop.reshape(-1, 3)[which] for stop in stops]
     free = np.ones(len(which), dtype=bool)
+    # Only channels whose sections are all free of furniture go on.
     for start, end in pairwise(ends):
         free &= occluders.clear(start, end)
     which, ends = which[free], [end[free] for end in ends]
     if not len(which):
         return None
-    # A leg is straight from an image, also in the crease of a corner, where it has no length.
+    # Directions are taken from images, because in the crease of a corner a section has no length.
     sources = [image.reshape(-1, 3)[which] for image in images]
     ways = [end - source for source, end in zip(sources, ends[1:], strict=True)]
     ways = [way / np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+    # The field that is sent towards the first wall, and what the receiver would send back.
     polarization = Polarization(radar.polarization, radar.axes)
     ahead = sent_field(radar.tx_antenna, ways[0], polarization, x_for_steep=True)
     sent = ahead * weight.ravel()[which, None]
@@ -146,10 +151,13 @@ def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomE
     spread = -2 * sqrt(pi) / length.ravel()[which]
     frequency = sweep_nodes(radar, DENSE_NODES)
     best = None
+    # First every wall as one term; if no polynomial follows that over the sweep, its terms as
+    # delayed echoes.
     for series in (whole_walls, lambda walls: delayed(walls, radar)):
         walls = WallResponse(edges, series(scene.walls), frequency)
         waves = walls.along(leg, ends, ways, sent)
         returned = [spread * np.conj((wave.field * received).sum(axis=-1)) for wave in waves]
+        # Faint terms are dropped; each of the others is an echo with its own length.
         sizes = [float(np.abs(one).max()) for one in returned]
         worth = [number for number, size in enumerate(sizes) if size > _FAINT * max(sizes)]
         amplitude = np.zeros((len(frequency), length.size, len(worth)), dtype=np.complex128)
@@ -159,6 +167,7 @@ def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomE
             lengths[which, echo] += waves[number].extra_m
         if not amplitude.any():
             return None
+        # At as few nodes as the error allows; the better of both attempts is kept.
         found = RoomEchoes(
             name=" + ".join(face.wall.name for face in leg),
             kind="mirror",
@@ -178,6 +187,7 @@ def _follow(radar: Radar, scene: Scene, occluders: Occluders, leg: Leg) -> RoomE
 
 def _image(leg: Leg) -> tuple[Array, Array]:
     """Rotation and shift that give the image of any point over a leg."""
+    # Images of the origin and of the unit vectors give shift and rotation.
     origin = images(leg, np.zeros(3))
     return (images(leg, np.eye(3)) - origin).T, origin
 
@@ -203,6 +213,7 @@ def rough_returns(radar: Radar, scene: Scene, occluders: Occluders) -> Iterator[
 def _points(face: Face, cell_m: float, rng: np.random.Generator) -> tuple[Array, float, Array]:
     """Points (point, 3) of a jittered grid, the area of a cell [m^2] and phases (point,)."""
     wall = face.wall
+    # One point at random in each cell, with a random phase, none in an opening.
     edges = np.array(wall.edge_u_m), np.array(wall.edge_v_m)
     cell_m = max(cell_m, np.sqrt(wall.area_m2 / MOST_POINTS))
     counts = [ceil(np.linalg.norm(edge) / cell_m) for edge in edges]
@@ -226,6 +237,7 @@ def _rough_face(
 
     def legs(antennas: Array, element: Antenna | None) -> tuple[Array, Array, Array]:
         """Distances, cosines and fields that a smooth wall would reflect, (antenna, point)."""
+        # A point of the wall as each antenna sees it, with what a smooth wall would reflect there.
         ways = points - antennas[:, None]
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
@@ -235,10 +247,12 @@ def _rough_face(
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * clear
         return distance, np.maximum(-(ways @ normal), 0.0), strength
 
+    # Both legs of every channel: every Tx with the Rx that are kept with it.
     kept = radar.rx_of_tx
     far_t, cos_t, field_t = legs(radar.tx, radar.tx_antenna)
     far_r, cos_r, field_r = legs(radar.rx, radar.rx_antenna)
     cosines = cos_t[:, None] * cos_r[kept]
+    # What roughness takes from the specular wave goes into all directions by Lambert's law.
     waves = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * wall.roughness_m
     scattered = -np.expm1(-((2 * waves) ** 2) * cosines)
     # |R|^2 is the geometric mean of those of both legs.
@@ -337,10 +351,11 @@ class Clutter:
     ) -> None:
         check_order(order)
         self.radar = radar
-        # Without what does not stand still.
+        # Only what stands still.
         still = Scene(name=scene.name, walls=scene.walls, furniture=scene.furniture)
         found = _returns(radar, still, _meshes(scene), select(variant), order)
         _refuse_not_followed([echoes for _, echoes in found], scene)
+        # The strongest first, without what lies beyond the sampled range.
         ranked = sorted(found, key=lambda one: -one[0].cell_m2)
         self.objects = tuple(echoes for _, echoes in ranked)
         self.kept, self.dropped = tuple(item for item, _ in ranked), tuple[ClutterItem, ...]()
@@ -385,6 +400,7 @@ class Clutter:
 
         That is what leaves or arrives at an angle of more than 90 degrees from boresight.
         """
+        # The first and the last point of a path say whether it leaves or arrives from behind.
         whole, of_objects = 0.0, {"": 0.0}
         for own in self.objects:
             power = np.abs(own.amplitude[len(own.frequency) // 2]) ** 2

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _KEPT_NODES = 32
-"""Radars at rest whose nodes are kept: of one that moves, poses that are looked at together."""
+"""Radars at rest whose nodes are kept; for a radar that moves these are poses used together."""
 
 
 def sweep_nodes(radar: Radar, count: int) -> Array:
@@ -39,10 +39,11 @@ def sweep_nodes(radar: Radar, count: int) -> Array:
 def interpolation_weights(nodes: Array, places: Array) -> Array:
     """Compute the values (place, node) at some places of the Lagrange polynomials of nodes.
 
-    Their product with values at the nodes is the polynomial through these. Nodes and places are in
-    the same unit, and the nodes are all different. SciPy's barycentric form takes the nodes in a
-    random order: its last bits would change from one run to the next.
+    The product of these with values at the nodes is the polynomial through the values. Nodes and
+    places are in the same unit, and the nodes are all different. SciPy's barycentric form takes the
+    nodes in a random order: its last bits would change from one run to the next.
     """
+    # Each polynomial is 1 at its own node and 0 at the others.
     others = ~np.eye(len(nodes), dtype=bool)
     columns = [
         np.prod((places[:, None] - nodes[own]) / (node - nodes[own]), axis=1)
@@ -55,8 +56,9 @@ def interpolation_weights(nodes: Array, places: Array) -> Array:
 
 
 def _tx_lines(radar: Radar) -> list[tuple[Indices, list[Indices]]]:
-    """Each line of Tx with the lines of the Rx that are kept with it, as indices among these."""
+    """List each line of Tx with the lines of Rx kept with it, which are indices among these Rx."""
     found = []
+    # The Rx of the first Tx of a line are those of all of its Tx.
     for line in radar.tx_lines:
         kept = radar.rx_of_tx[line[0]]
         groups = [np.flatnonzero(np.isin(kept, own)) for own in radar.rx_lines]
@@ -71,6 +73,7 @@ def _evenly(count: int) -> Array:
 
 def _straight(count: int, places: int = 2) -> Array:
     """Weights (antenna, place) of places spread evenly along a line in each of its antennas."""
+    # Linear interpolation between neighbouring places.
     fraction = np.linspace(0.0, places - 1.0, count)
     return np.maximum(1 - np.abs(fraction[:, None] - np.arange(places)), 0.0)
 
@@ -79,11 +82,11 @@ def _straight(count: int, places: int = 2) -> Array:
 class ArrayEnds:
     """Ends of the lines of a radar, for linear interpolation in between.
 
-    A line is a line of Tx with the Rx that are kept with it; ``line_of_tx (tx,)`` is that of each
-    Tx. ``tx (line, tx_end, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m], two for each line of
-    Rx, and of the Tx as many places as asked; ``tx_middle`` and ``rx_middle (line, 3)`` are mean
-    positions [m]. ``tx_weight (tx, tx_end)`` and ``rx_weight (tx, rx, rx_end)`` are the weights of
-    the ends in each Tx and each Rx kept with it.
+    A line is a line of Tx with the Rx that are kept with it; ``line_of_tx (tx,)`` is the line of
+    each Tx. ``tx (line, tx_end, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m]: two for each
+    line of Rx, and as many places along the Tx as are asked for. ``tx_middle`` and ``rx_middle
+    (line, 3)`` are mean positions [m]. ``tx_weight (tx, tx_end)`` and ``rx_weight (tx, rx,
+    rx_end)`` are the weights of the ends in each Tx and each Rx kept with it.
     """
 
     line_of_tx: Indices
@@ -101,9 +104,11 @@ class ArrayEnds:
         line_of_tx, tx_weight = np.empty(radar.n_tx, np.int64), np.empty((radar.n_tx, places))
         rx_weight = np.zeros((radar.n_tx, radar.n_rx, 2 * len(lines[0][1])))
         found = []
+        # Each line with its own ends, and where these stand.
         for number, (line, groups) in enumerate(lines):
             tx, rx = radar.tx[line], radar.rx[radar.rx_of_tx[line[0]]]
             line_of_tx[line], tx_weight[line] = number, _straight(len(line), places)
+            # Two ends for each line of Rx, whose weights are 0 in the antennas of other lines.
             for column, group in enumerate(groups):
                 own = slice(2 * column, 2 * column + 2)
                 rx_weight[line[:, None], group, own] = _straight(len(group))
@@ -116,22 +121,25 @@ class ArrayEnds:
 
 @lru_cache(maxsize=_KEPT_NODES)
 def shadow_nodes(radar: Radar, along_tx: int = 2, along_rx: int = 1) -> tuple[Array, Array, Array]:
-    """Return places along the lines of Tx and those of Rx (node, 3) [m], and their weights.
+    """Return places along the lines of Tx and of Rx (node, 3) [m], and their weights.
 
-    One place is the middle of a line, more are spread from end to end, as many as antennas at most.
-    The weights of the places in each antenna, (tx, node) and (rx, node), follow.
-    The radar is at rest.
+    A single place is the middle of a line; several are spread from end to end, and are at most as
+    many as the line has antennas. Then follow the weights of the places in each antenna, (tx, node)
+    and (rx, node). The radar is at rest.
     """
     blocks, found = [], []
     for antennas, lines, count in (
         (radar.tx, radar.tx_lines, along_tx),
         (radar.rx, radar.rx_lines, along_rx),
     ):
+        # Places along each line, and their weights in its antennas.
         for line in lines:
             own, places = antennas[line], min(count, len(line))
             ends = np.linspace(own[0], own[-1], places) if places > 1 else own.mean(axis=0)[None]
             blocks.append((ends, _straight(len(line), places)))
+        # Weights are made line by line: this puts them into the order of the antennas.
         found.append(np.argsort(np.concatenate(lines)))
+    # One line's places have no weight in another line, so all weights are one block each.
     weights = np.split(block_diag(*(weight for _, weight in blocks)), [radar.n_tx])
     tx, rx = (own[order] for own, order in zip(weights, found, strict=True))
     return np.concatenate([places for places, _ in blocks]), tx, rx
@@ -152,7 +160,7 @@ class ArrayNodes(NamedTuple):
 class _Block(NamedTuple):
     """A line of Tx with one of Rx: indices, ends, and places of the nodes from 0 to 1 along each.
 
-    The Rx are counted among those kept with these Tx; ``ends (tx or rx, first or last, 3)`` [m].
+    Indices of Rx are among the Rx kept with these Tx; ``ends (tx or rx, first or last, 3)`` [m].
     """
 
     tx: Indices
@@ -180,15 +188,18 @@ def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
     rest.
     """
     places, weights = list[Array](), list[Array]()
+    # Each line of Tx with each line of Rx is interpolated by itself.
     for block in _blocks(radar, (along_tx, along_rx)):
         tx, rx = (
             ends[0] + nodes[:, None] * (ends[1] - ends[0])
             for ends, nodes in zip(block.ends, (block.tx_nodes, block.rx_nodes), strict=True)
         )
+        # Every node of the one with every node of the other.
         places.append(np.stack([np.repeat(tx, len(rx), axis=0), np.tile(rx, (len(tx), 1))], axis=1))
         own = _product_weights(block, _evenly(len(block.tx)), _evenly(len(block.rx)))
         weights.append(np.zeros((radar.n_tx, radar.n_rx, own.shape[1])))
         weights[-1][np.ix_(block.tx, block.rx)] = own.reshape(len(block.tx), len(block.rx), -1)
+    # Nodes of several blocks at one place are one antenna.
     antennas, where = np.unique(np.concatenate(places).reshape(-1, 3), axis=0, return_inverse=True)
     return ArrayNodes(antennas, where.reshape(-1, 2), np.concatenate(weights, axis=2))
 
@@ -211,12 +222,13 @@ def _product_weights(block: _Block, tx: Array, rx: Array) -> Array:
 
 def at_nodes(amplitude: NDArray[Any], frequency: Array, nodes: Array) -> NDArray[Any]:
     """Evaluate amplitudes (node, ...), polynomials through a frequency (node,), at others [Hz]."""
+    # A single frequency stands for the whole sweep.
     if len(frequency) == 1:
         return np.broadcast_to(amplitude, (len(nodes), *amplitude.shape[1:]))
     if np.array_equal(frequency, nodes):
         return amplitude
     weights = interpolation_weights(frequency, nodes).astype(amplitude.real.dtype)
-    # Not by BLAS, whose threads cost more than these few sums.
+    # BLAS is not used, because its threads cost more than these few sums.
     pairs = zip(weights.T, amplitude, strict=True)
     return np.asarray(sum(np.multiply.outer(weight, own) for weight, own in pairs))
 
@@ -231,7 +243,7 @@ def field_of(echoes: Echoes, frequency: Array) -> NDArray[Any]:
 def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
     """Return some of the echoes, each as often as ``which (echo,)`` names it.
 
-    Of neighbours the arrays are views.
+    The arrays of neighbouring echoes are views.
     """
     side_by_side = len(which) > 0 and bool(np.all(np.diff(which) == 1))
     some = slice(int(which[0]), int(which[-1]) + 1) if side_by_side else which
@@ -246,7 +258,7 @@ def take(echoes: Echoes, which: NDArray[np.int64]) -> Echoes:
 
 
 def weakest(power: Array, most: float) -> NDArray[np.bool_]:
-    """Whether each is among the weakest, whose powers (echo,) add up to at most so much [m^2]."""
+    """Whether each echo is among the weakest, whose powers (echo,) add up to ``most`` [m^2]."""
     order = np.argsort(power)
     among = np.empty(len(power), dtype=bool)
     among[order] = np.cumsum(power[order], dtype=np.float64) <= most
@@ -256,8 +268,8 @@ def weakest(power: Array, most: float) -> NDArray[np.bool_]:
 def times_factor(echoes: Echoes, frequency: Array, factor: NDArray[Any]) -> Echoes:
     """Multiply amplitudes by a factor (node, chirp, rx, echo), a polynomial through a frequency.
 
-    The nodes of the product are the more numerous of both: what walls and a body change over the
-    sweep is little.
+    The nodes of the product are the more numerous of both, because walls and a body change little
+    over the sweep.
     """
     nodes = max(echoes.frequency, frequency, key=len)
     own = at_nodes(echoes.amplitude, echoes.frequency, nodes)

@@ -252,7 +252,7 @@ def keyframe_step(radar: Radar, apart_s: float = 10e-3) -> int:
 def keyframe_before(
     radar: Radar, chirps: NDArray[np.int64], step: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64] | NDArray[np.float64]]:
-    """Number of the keyframe before each chirp, and places from there to it.
+    """Number of the keyframe before each chirp, and how many chirps after it the chirp is.
 
     Keyframes follow each other evenly, also in the gaps between frames: keyframe k is in the middle
     of chirp k times ``step`` of `Radar.gapless`.
@@ -271,8 +271,8 @@ class KeyframeCache(Generic[_Key, _Value]):
 
     A recording is processed twice from its start, once for its power and once for its signal. If
     the last values were kept, a recording a little longer than this cache would find nothing left
-    of them when it starts again. Of later values those that were last asked for are held,
-    ``passing`` of them.
+    of them when it starts again. Of later values, the ``passing`` ones that were asked for last are
+    held.
     """
 
     def __init__(self, stay: int, passing: int) -> None:
@@ -285,11 +285,11 @@ class KeyframeCache(Generic[_Key, _Value]):
 
     def __getitem__(self, key: _Key) -> _Value:
         if key in self._later:
-            self._later[key] = self._later.pop(key)  # now the last to go
+            self._later[key] = self._later.pop(key)  # dictionaries keep order: it is now last
         return self._later[key] if key in self._later else self._staying[key]
 
     def get(self, key: _Key, find: Callable[[], _Value]) -> _Value:
-        """Return the value of a key, which is found now if it is not known."""
+        """Return the value of a key, which ``find`` computes if it is not known."""
         if key not in self:
             self.keep(key, find())
         return self[key]

@@ -45,10 +45,10 @@ class FacetShadows:
         self._tracer = BodyTracer(use(backend), semi_axes)
         self.facets = facets = ellipsoid_facets(semi_axes, counts)
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
-        # Coordinate by coordinate, as the tracer takes them.
+        # The tracer takes places coordinate by coordinate.
         self._places = np.ascontiguousarray(facets.vertices.T)
         self._first = np.ascontiguousarray(facets.ends[:, 0])
-        # Without a sign: what may be counted from an array's end keeps a loop from vector lanes.
+        # Unsigned, because an index that may be negative keeps a loop from vector lanes.
         self._corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
         # A facet is lit while its middle faces away by less than its bend; its corners by no more
         # than thrice that.
@@ -62,16 +62,18 @@ class FacetShadows:
         parts: Indices,
         apart: float = 0.0,
     ) -> Seen:
-        """What antennas (antenna, 3) see of the facets of some parts (n,) past the others.
+        """Return what antennas (antenna, 3) see of the facets of some parts (n,) past the others.
 
         ``centres (part, 3)`` and ``frames (part, 3, 3)`` are the pose of the whole body, world [m].
-        Facets that face an antenna away, by a cosine of more than ``apart``, are not looked at.
+        Facets that face away from an antenna, by a cosine of more than ``apart``, are left out.
         """
         facets = self.facets
         first = np.cumsum([0, *np.diff(facets.ends[:, 1])[parts]])
         fraction = np.ones((len(antennas), first[-1]), dtype=np.float32)
+        # A single part has nothing before it.
         if len(centres) == 1:
             return Seen(first[:-1], fraction)
+        # Which part occludes which vertex, and from that how much of each facet is seen.
         hidden_by = self._tracer.occluders(
             centres, frames, antennas, parts, self._places, self._first, self._margin + apart
         )
@@ -125,7 +127,8 @@ class FacetBody:
         return length, strength
 
     def seen(self, centres: Array, frames: Array, antennas: Array, parts: Indices) -> Seen:
-        """See `FacetShadows.seen`, for antennas of which any may light and any receive."""
+        """Do as `FacetShadows.seen`, for antennas of which any may transmit and any receive."""
+        # Where antennas are far apart, facets that face one of them away still radiate to it.
         ways = antennas[:, None] - centres[parts]
         apart = float(directions_apart(ways[:, None], ways[None]).max())
         return self._shadows.seen(
@@ -150,6 +153,7 @@ class FacetBody:
         """
         find = visible if left else radiated
         seen = self.seen(pose.centres[0], pose.frames[0], antennas, parts)
+        # The sum over the facets for all pairs, or what shadows leave of it.
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
         sent = Polarization(self._radar.polarization, self._radar.at(time).axes)
         links = Links(antennas[None], pairs, length[None], k, sent, self._spreading, shadow=False)

@@ -1,11 +1,11 @@
 """The slow part of a physical-optics echo, interpolated between keyframes, more where it bends.
 
-The envelope is the echo over that of the unobstructed specular point, carrier and all: 1 where
-optics is geometric, and slow. Where the second difference of a part's echo over neighbouring
-keyframes is more than a given fraction of its owner's, the interval is halved, and halved again,
-down to an eighth of 10 ms by `physical-optics`: there an edge crosses the part, or what it returns
-comes from far beside its specular point. Between keyframes runs a cubic with one slope on either
-side of each.
+The envelope is the echo divided by that of the unobstructed specular point, with its carrier: it is
+1 where optics is geometric, and slow. Where the second difference of a part's echo over
+neighbouring keyframes is more than a given fraction of its owner's echo, the interval is halved,
+and halved again, down to an eighth of 10 ms by `physical-optics`. There an edge crosses the part,
+or what it returns comes from far beside its specular point. Between keyframes runs a cubic, whose
+slope is the same on both sides of each keyframe.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ _KEPT_INTERVALS = TOGETHER + 8
 """More than these and one on either side."""
 
 _COARSE, _FINE = (2, 1), (6, 2)
-"""Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
+"""Tx times Rx nodes per line of the array: for parts that look alike all over it, and others."""
 
 _GRADUAL_S, _GRADUAL_PLACES, _GRADUAL_BEND, _GRADUAL_UNEVENNESS = 10e-3, 16, 0.05, 0.02
-"""Of visible fractions the time between keyframes [s], its parts where it is divided the most, and
-the changes in time and over the array that ask for more, as `ArrayEnvelope` has them. In 20 ms a
-limb at 4 m/s may pass unseen (``validation/other_methods/visible_fractions.py``)."""
+"""For visible fractions: the time between keyframes [s], the most parts into which it is divided,
+and the changes in time and over the array that ask for more, as in `ArrayEnvelope`. In 20 ms a limb
+at 4 m/s may pass unseen (``validation/other_methods/visible_fractions.py``)."""
 
 _WIDE = 0.1
 """Bandwidth over centre frequency above which visible fractions differ over the sweep: what an edge
@@ -78,8 +78,8 @@ class Envelope:
     ``sample(place, parts, whole)`` returns the `Sample` of parts (n,) at a place in time, counted
     in keyframes from the start; ``whole (part,)`` is `whole_echo` near by, or None where all parts
     are asked for. Several threads call it at once. ``tolerance`` is the second difference of a
-    part's echo over the root of the power of the whole person that halves an interval, ``places``
-    the parts, a power of two, into which an interval is divided at most.
+    part's echo, over the root of the power of the whole person, above which an interval is halved.
+    ``places``, a power of two, is the largest number of parts into which an interval is divided.
     """
 
     def __init__(
@@ -96,6 +96,7 @@ class Envelope:
 
     def prepare_keyframes(self, indices: Iterable[int]) -> None:
         """Find these keyframes, of `TOGETHER` intervals at most, with all cores."""
+        # Only what is not known yet is computed, all of it at once.
         missing = [index for index in sorted(set(indices)) if index not in self._keyframes]
         found = thread_map(
             lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing))
@@ -104,7 +105,8 @@ class Envelope:
             self._keyframes.keep(index, sample)
 
     def prepare_courses(self, indices: Iterable[int]) -> None:
-        """The same for the courses of these intervals."""
+        """Find the courses of these intervals, and of those beside them, with all cores."""
+        # Slopes at the ends of an interval need the intervals on both sides as well.
         around = {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
         missing = []
         for index in sorted(around):
@@ -112,6 +114,7 @@ class Envelope:
                 self._intervals[index]  # now the last to be dropped
             else:
                 missing.append(index)
+        # Those intervals in turn need the keyframes around them, to tell where the echo bends.
         self.prepare_keyframes(
             index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0
         )
@@ -125,9 +128,9 @@ class Envelope:
         return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> tuple[Field, Field, NDArray[np.bool_]]:
-        """Cubics from place to place of an interval, with the slopes of parabolas through three.
+        """Return the cubics of an interval, with the slopes of parabolas through three places.
 
-        Returned are ratio and slope (place, node, pair, part), where ``known (place, part)``.
+        They are ratio and slope (place, node, pair, part), where ``known (place, part)``.
         """
         self.prepare_courses([index])
         here, after = self._intervals[index], self._intervals[index + 1]
@@ -142,10 +145,12 @@ class Envelope:
     def _divided(
         self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample
     ) -> _Interval:
+        # Only the ends are known at first.
         ratio = np.full((self._places + 1, *first.ratio.shape), np.nan + 0j)
         ratio[0], ratio[self._places] = first.ratio, last.ratio
         known = np.zeros((self._places + 1, len(self._parts)), dtype=bool)
         known[[0, self._places]] = True
+        # A part that bends at either end is sampled in between, too.
         bends = [_bend(first.ratio, last.ratio, after.ratio, last.strength)]
         if before is not None:
             bends.append(_bend(before.ratio, first.ratio, last.ratio, first.strength))
@@ -167,11 +172,13 @@ class Envelope:
         """Sample these parts half-way, and go on where they bend there."""
         if right - left < 2 or len(parts) == 0:
             return
+        # Half-way, for these parts alone.
         middle, (ratio, known) = (left + right) // 2, interval
         found = self._sample(index + middle / self._places, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
         before, after = ratio[left][:, :, parts], ratio[right][:, :, parts]
+        # Both halves are divided again for parts that still bend.
         bent = _bend(before, found.ratio, after, found.strength) > self._tolerance * whole[parts]
         for ends in ((left, middle), (middle, right)):
             self._divide(index, interval, *ends, parts[bent], whole)
@@ -185,9 +192,9 @@ def _bend(
 
 
 def whole_echo(sample: Sample, owner: Indices) -> Scale:
-    """Root of the power of all of a part's owner (part,), mean over frequencies and pairs [m].
+    """Root of the power of a part's whole owner (part,), mean over frequencies and pairs [m].
 
-    Scales of one person are so the same whoever else is there.
+    So the scale of a person is the same whoever else is there.
     """
     power = (np.abs(sample.ratio * sample.strength) ** 2).mean(axis=(0, 1))
     return np.asarray(np.sqrt(np.bincount(owner, power)[owner]))
@@ -196,9 +203,10 @@ def whole_echo(sample: Sample, owner: Indices) -> Scale:
 def _slopes(before: _Interval, here: _Interval, after: _Interval, *, inside: bool) -> Field:
     """Slopes per place (place, node, pair, part) where a part is known.
 
-    They are those of the parabola through three places, the known ones on either side of it; at the
-    very start, not ``inside``, that of a straight line.
+    A slope is that of the parabola through a place and the known places on either side of it; at
+    the very start, where it is not ``inside``, that of a straight line.
     """
+    # Places of three intervals in a row, and for each the nearest known place on either side.
     last = len(here.known) - 1
     known = np.concatenate([before.known[:-1], here.known, after.known[1:]])
     number = np.arange(len(known))[:, None]
@@ -215,6 +223,7 @@ def _slopes(before: _Interval, here: _Interval, after: _Interval, *, inside: boo
         return np.asarray(several[interval, number - interval * last, :, :, part])
 
     value = ratio(at)
+    # The slope of the parabola weights the nearer chord more.
     rise, next_rise = (value - ratio(left)) / gap, (ratio(right) - value) / next_gap
     if not inside:
         rise = np.where((place == 0)[:, None, None], next_rise, rise)
@@ -229,11 +238,11 @@ def _slopes(before: _Interval, here: _Interval, after: _Interval, *, inside: boo
 class ArrayEnvelope:
     """The envelope of each part of a moving body over a capture, for every Tx and Rx.
 
-    It is the sum over the facets of a ``surface`` over the carriers, the echoes of the specular
-    points; or with ``gradual`` the visible fraction of these facets. Keyframes are ``anchor_s``
-    apart [s]. They come closer, down to that over ``places``, where a part bends by more than
-    ``tolerance`` of the whole person, and there are more places of the array where it differs over
-    that by more than ``unevenness`` of it.
+    It is the sum over the facets of a ``surface`` divided by the carriers, the echoes of the
+    specular points; or, with ``gradual``, the visible fraction of these facets. Keyframes are
+    ``anchor_s`` apart [s]. They come closer, down to ``anchor_s`` over ``places``, where the echo
+    of a part bends by more than ``tolerance`` of that of the whole person. More places of the array
+    are taken where the echo differs over the array by more than ``unevenness`` of it.
     """
 
     def __init__(
@@ -251,7 +260,7 @@ class ArrayEnvelope:
         self._radar, self._body, self._surface, self._gradual = radar, body, surface, gradual
         self.frequency = surface.frequency
         self._weights = array_nodes(radar, *_FINE).weights
-        # From coarse nodes to fine ones, which stand at antennas or between them.
+        # Weights from coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
@@ -259,10 +268,12 @@ class ArrayEnvelope:
 
     def _sample(self, place: float, parts: Indices, whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
+        # The pose in the middle of a chirp, counted without gaps.
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose, radar = self._body.at([time]), self._radar.at(time)
         coarse = self._at_nodes(time, pose, array_nodes(radar, *_COARSE), parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
+        # A part whose echo differs over the array is computed at more nodes.
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse, owners_of(self._body)) if whole is None else whole[parts]
         uneven = (
@@ -276,6 +287,7 @@ class ArrayEnvelope:
 
     def _at_nodes(self, time: float, pose: Poses, nodes: ArrayNodes, parts: Indices) -> Sample:
         antennas, pairs = nodes.antennas, nodes.pairs
+        # Each pair of nodes counts as a pose with one transmitter and one receiver.
         centres, frames = (
             np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
         )
@@ -287,8 +299,7 @@ class ArrayEnvelope:
             assert isinstance(self._surface, FacetBody)  # a skin has no fraction that is seen
             return Sample(self._surface.field(*given, left=True), np.abs(strength))
         amplitude = self._surface.field(*given)
-        # Without a specular point there is next to nothing to see either: antennas on opposite
-        # sides.
+        # Where there is no specular point, antennas are on opposite sides and see next to nothing.
         ratio = np.where(strength != 0, amplitude / np.where(strength != 0, strength, 1.0), 0.0)
         return Sample(ratio, np.abs(strength))
 
@@ -298,11 +309,13 @@ class ArrayEnvelope:
         Returned is (node, chirp, rx, part) in the phase convention of `Echoes`.
         """
         amplitude = np.empty((len(self.frequency), *strength.shape), dtype=np.complex128)
+        # Chirps interval by interval.
         intervals, rest = keyframe_before(self._radar, chirps, self._step)
         envelope, weights = self._envelope, self._weights
-        # Power is measured at keyframes, where nothing is asked of what comes after.
+        # Power is measured at keyframes: there no later keyframe is needed.
         between = set(intervals[rest != 0].tolist())
         in_order = sorted(set(intervals.tolist()))
+        # Intervals that are prepared together share the cores.
         for _, group in groupby(in_order, key=lambda interval: interval // TOGETHER):
             together = list(group)
             envelope.prepare_keyframes(k for k in together if k not in between)
@@ -310,6 +323,7 @@ class ArrayEnvelope:
             for interval in together:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
+                    # Between keyframes the cubic, at keyframes the value itself.
                     fraction = self._radar.slots_of(chirps[inside]) / self._step - interval
                     course = envelope.course(interval)
                     fill_envelope(inside, fraction, tx, weights, course, strength, amplitude)

@@ -4,9 +4,9 @@ Triangles move and turn with the part they belong to, so that what they add stay
 chirp to chirp. Their vertices are kept in the axes of the part; antennas are brought there, not
 triangles to the antennas.
 
-What they radiate is the reciprocal form of physical optics, of what both antennas see, as in a
-radar. Where Tx and Rx are far apart as the target sees them, the currents on all that Tx lights
-count. From `NEAR` to `WIDE` the one fades into the other.
+What they radiate is, for a radar, the reciprocal form of physical optics, over what both antennas
+see. Where Tx and Rx are far apart as the target sees them, the currents on all that Tx lights
+count. From `NEAR` to `WIDE` the one form fades into the other.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _LEAST_FACETS = 1280
 """Least number of facets of a part of a body, where the wavelength would take fewer."""
 
 LARGEST_KA = 400.0
-"""Facets for 0.1 dB are chosen up to here; above, the user names them, or gives a finer mesh."""
+"""Facets for 0.1 dB are chosen up to this ka; above it users name them or give a finer mesh."""
 
 FACETS_PER_SQUARE_KA = 6.0
 """Facets of a sphere over (ka)^2 for 0.07 dB of the closed form, which its terminator takes."""
@@ -69,15 +69,19 @@ def body_facets(semi_axes: NDArray[np.float64], wavenumber: float) -> Indices:
 
 
 def ellipsoid_facets(semi_axes: NDArray[np.float64], counts: Indices | int) -> Facets:
-    """Facets of ellipsoids, ``semi_axes (part, 3)`` [m]: spheres of at least so many, stretched.
+    """Return the facets of ellipsoids, ``semi_axes (part, 3)`` [m]: stretched spheres.
 
-    Their rise is :eq:`facet-rise` of the theory page.
+    Each has at least as many facets as ``counts`` asks for. Their rise is :eq:`facet-rise` of the
+    theory page.
     """
+    # A geodesic sphere of frequency n has 20 n^2 facets; each part is one, stretched by its
+    # semi-axes.
     frequencies = np.ceil(np.sqrt(np.broadcast_to(counts, len(semi_axes)) / 20)).astype(int)
     spheres = [geodesic_sphere(frequency) for frequency in frequencies.tolist()]
     faces, ends = joined(spheres)
     points = np.concatenate([own for own, _ in spheres])
     axes = np.repeat(np.asarray(semi_axes, dtype=np.float64), np.diff(ends[:, 0]), axis=0)
+    # The normal of the ellipsoid at a vertex is along the place over the squared semi-axes.
     vertices, smooth = points * axes, points / axes
     smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
     normals, areas = facet_normals(vertices, faces)
@@ -100,7 +104,7 @@ def joined(parts: Sequence[tuple[Sized, Indices]]) -> tuple[NDArray[np.int32], I
 
 
 def one_after_the_other(several: Sequence[Indices], counts: Sequence[int]) -> Indices:
-    """Put indices into arrays of these lengths together as those into one array of all."""
+    """Join indices into arrays of these lengths to indices into all arrays put together."""
     firsts = np.cumsum([0, *counts[:-1]])
     return np.concatenate([own + first for own, first in zip(several, firsts, strict=True)])
 
@@ -133,10 +137,12 @@ def smooth_bend(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> ND
     """
     corners = np.asarray(faces, dtype=np.int32)
     normals, areas = facet_normals(vertices, corners)
+    # The normal at each vertex, as the mean of its facets' by area.
     total = np.zeros_like(vertices)
     np.add.at(total, corners, (normals * areas[:, None])[:, None])
     size = np.linalg.norm(total, axis=1, keepdims=True)
     total /= np.where(size > 0, size, 1.0)
+    # How far each facet's normal is from those at its corners, except at vertices on an edge.
     apart = np.sum((total[corners] - normals[:, None]) ** 2, axis=2)
     farthest = np.zeros(len(vertices))
     np.maximum.at(farthest, corners, apart)
@@ -190,10 +196,10 @@ class Links(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What eyes see of facets of parts, of each from ``first (part,)`` on.
+    """What eyes, the places from which visibility is asked, see of the facets of parts.
 
-    It is their ``fraction (eye, facet)``, which need not mark what faces an eye away, and ``edge``
-    as in `Views`.
+    The facets of each part begin at ``first (part,)``. Seen is their ``fraction (eye, facet)``,
+    which need not mark facets that face away, and ``edge`` as in `Views`.
     """
 
     first: Indices
@@ -215,11 +221,13 @@ def radiated(
 ) -> Field:
     """Return the scattering length F of posed parts (pose, part, pair, node) [m].
 
-    It is for exp(+j omega t), and 0 where nothing is lit. ``parts (part,)`` are whose of the facets
-    those of the pose are; ``index (pose, antenna)`` the eye that each antenna of the links is.
+    It is for exp(+j omega t), and 0 where nothing is lit. ``parts (part,)`` are the numbers, among
+    the parts of the facets, of the parts of the pose; ``index (pose, antenna)`` is the eye that
+    each antenna of the links is.
     """
     centres, frames = pose
     nodes, shape = links.wavenumber.shape[1], centres.shape[:2]
+    # One task for each pose and part, with the antennas in the axes of the part.
     ways = links.antennas[:, None] - centres[:, :, None]
     views = Views(
         np.tile(parts, shape[0]),
@@ -232,6 +240,7 @@ def radiated(
     carrier = np.swapaxes(links.length, 1, 2).reshape(-1, len(links.pairs))
     k = np.broadcast_to(links.wavenumber[:, None], (*shape, nodes)).reshape(-1, nodes)
     waves = Waves(links.pairs, carrier, k, links.spreading)
+    # Reciprocal form or currents, by how far Tx and Rx are apart.
     to_tx, to_rx = (ways[:, :, links.pairs[:, side]] for side in (0, 1))
     given = to_tx, to_rx, frames, links.polarization
     waves, factor = with_obliquity(waves, *given, shadow=links.shadow)
@@ -249,9 +258,9 @@ def visible(
 ) -> Field:
     """Return the fraction of the `radiated` field that shadows leave, without forward scatter.
 
-    It is the sum over the facets of a part with shadows over that without: 0 where there is
-    nothing, and no more than `_MOST_LEFT` where the whole sum nearly cancels, as past the end of
-    optics.
+    It is the sum over the facets of a part with shadows over the sum without: 0 where there is
+    nothing, and no more than `_MOST_LEFT` where the whole sum nearly cancels, as beyond the limits
+    of optics.
     """
     # Parts in full view need no sum.
     cut = np.flatnonzero(hidden_parts(seen).any(axis=0))
@@ -261,11 +270,13 @@ def visible(
         own = parts[cut], (pose[0][:, cut], pose[1][:, cut])
         links = links._replace(length=links.length[..., cut], shadow=False)
         seen = seen._replace(first=seen.first[cut])
+        # The same sum with what the eyes see, and with all facets seen.
         shadowed = radiated(facets, *own, links, seen, index)
         all_seen = Seen(np.zeros_like(cut), np.ones_like(seen.fraction[:1]))
         free = radiated(facets, *own, links, all_seen, np.zeros_like(index))
         some = free != 0
         fraction = np.where(some, shadowed / np.where(some, free, 1.0), 0.0)
+        # Where the whole sum nearly cancels the fraction would grow without limit.
         fraction /= np.maximum(np.abs(fraction) / _MOST_LEFT, 1.0)
         left[:, cut] = np.where(some & (shadowed == free), 1.0, fraction)
     return left
@@ -301,18 +312,20 @@ def with_obliquity(
     ``to_tx`` and ``to_rx (pose, part, pair, 3)`` are the ways from the parts to the antennas [m],
     ``frames (pose, part, 3, 3)`` the axes of the parts. Where all antennas are near each other the
     factor is the co-polar fraction, and no currents are computed. Without ``shadow`` there is no
-    scatter straight ahead. Unit vectors of polarisation are
-    those at the middle of a part: of a sphere of radius a between antennas at R that leaves forward
-    scatter 4 a / (3 R) too weak.
+    scatter straight ahead. Unit vectors of polarisation are those at the middle of a part: for a
+    sphere of radius a between antennas at R, that leaves forward scatter too weak by 4 a / (3 R).
     """
     apart = directions_apart(to_tx, to_rx)
     factor = copolar(to_tx, to_rx, polarization)
     if not (apart > NEAR).any():
         return waves, factor
+    # The weight of the currents: 0 for antennas near each other, 1 for antennas far apart.
     fade = smoothstep(np.clip((apart - NEAR) / (WIDE - NEAR), 0.0, 1.0))[..., None]
     if not shadow:
         ahead = np.clip((apart - FORWARD[0]) / (FORWARD[1] - FORWARD[0]), 0.0, 1.0)
         fade = fade * (1 - smoothstep(ahead))[..., None]
+    # Coefficients of both obliquities; the vector is brought into the axes of the part, where the
+    # normals are.
     along, across = driven_currents(to_tx, to_rx, polarization)
     across = np.einsum("...ji,...nj->...ni", frames, across)
     parts = [fade * along[..., None], fade * across, (1 - fade) * factor[..., None]]
@@ -329,6 +342,7 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
     tasks = len(views.part)
     shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
     out = np.empty(shape, dtype=np.complex128)
+    # Few terms are summed in one thread, for waking others would cost as much.
     terms = out.size * len(facets.faces) / (len(facets.ends) - 1)
     at_once = 1 if terms >= _PARALLEL_TERMS else max(1, tasks)
     thread_map(
@@ -339,5 +353,5 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
 
 
 def _own(value: Any) -> Any:
-    # What may not be written to is another type to Numba, for which it would compile all again.
+    # A read-only array is another type to Numba, for which it would compile everything again.
     return np.require(value, None, ["C", "W"]) if isinstance(value, np.ndarray) else value

@@ -1,10 +1,10 @@
 """Facets of people as meshes that bend, and what antennas see of them.
 
-Facets are triangles of the skin: their corners move with it, so that what they add stays coherent
-from pose to pose, however it bends. They are so small that their sag is 0.1 rad. Mitsuba decides
-what antennas see past all people's skins, at the middles of the facets, on the mesh that is coarser
-by one division. Facets that face an antenna away are not lit by it, but radiate to it through what
-is behind them, if Tx and Rx are far apart.
+Facets are triangles of the skin. Their corners move with it, so that what they add stays coherent
+from pose to pose, however the skin bends. They are so small that their sag is 0.1 rad of phase.
+Mitsuba decides what antennas see past all people's skins, at the middles of the facets, on the mesh
+that is coarser by one division. Facets that face away from an antenna are not lit by it, but
+radiate to it through what is behind them, if Tx and Rx are far apart.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _KEPT = 48
 
 
 class Skin(NamedTuple):
-    """The skin of one person: a coarse mesh, and a fine one that has four triangles for each.
+    """The skin of one person: a coarse mesh, and a fine one with four triangles for each of those.
 
     ``coarse (face, 3)`` and ``fine (4 face, 3)`` are triangles; ``part (face,)`` the person's parts
     in ascending order; ``posed(time)`` gives the vertices of both [m], world.
@@ -71,7 +71,7 @@ class Skin(NamedTuple):
 
 
 class _Piece(NamedTuple):
-    """A part's fine facets: which of all, which vertices of all, and faces among these."""
+    """A part's fine facets: which of all facets, which vertices of all, and faces among these."""
 
     facets: slice
     vertices: Indices
@@ -83,6 +83,7 @@ def skin_of(person: Body, frequency_hz: float) -> Skin:
     mesh = person.mesh
     if mesh is None:
         return _skin_of_ellipsoids(person, frequency_hz)
+    # Each triangle of the mesh becomes four with each division; parts follow one another in order.
     divisions = min(MOST_DIVISIONS, max(1, mesh.divisions_for(frequency_hz)))
     part = np.repeat(mesh.part, 4 ** (divisions - 1))
     order = np.argsort(part, kind="stable")
@@ -95,13 +96,15 @@ def skin_of(person: Body, frequency_hz: float) -> Skin:
 
 
 def _skin_of_ellipsoids(person: Body, frequency_hz: float) -> Skin:
+    # The sphere of each ellipsoid has as many facets as the largest part needs.
     wavenumber = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
     facets = int(body_facets(person.semi_axes, wavenumber).max())
     levels = math.ceil(math.log(facets / 20, 4))
+    # The coarse sphere, and the fine one whose four triangles belong to each coarse one.
     sphere, faces = unit_sphere(levels - 1)
     smooth, finer = loop_subdivision(faces, len(sphere))
     fine = smooth @ sphere
-    # As far out as the facets of ellipsoids are where nobody has a mesh.
+    # Vertices are as far out as those of ellipsoids are where nobody has a mesh.
     radius = float(np.linalg.norm(unit_sphere(levels)[0], axis=1).mean())
     fine *= radius / np.linalg.norm(fine, axis=1, keepdims=True)
     parts = len(person.semi_axes)
@@ -142,6 +145,7 @@ class SkinFacets:
         stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
         self._skins = [skin_of(person, stop_hz) for person in body.people]
         parts = [len(person.semi_axes) for person in body.people]
+        # The skins of all people as one mesh, with all parts numbered in turn.
         fine = one_after_the_other(
             [skin.fine for skin in self._skins],
             [int(skin.fine.max()) + 1 for skin in self._skins],
@@ -182,20 +186,24 @@ class SkinFacets:
         vertices = np.concatenate([skin.posed(time)[1] for skin in self._skins])
         seen, radar = self._seen(time), self._radar.at(time)
         polarization = Polarization(radar.polarization, radar.axes)
+        # Each antenna takes the visibility of the eye that is nearest to it.
         apart = np.linalg.norm(antennas[:, None] - shadow_nodes(radar)[0], axis=2)
         index = np.argmin(apart, axis=1)[None]
         k = 2 * np.pi * self.frequency[None] / SPEED_OF_LIGHT_MPS
         to_tx, to_rx = (antennas[pairs[:, side]] - centres[parts, None] for side in (0, 1))
         wide = bool((directions_apart(to_tx, to_rx) > NEAR).any())
         given = k, polarization, self._spreading
+        # The fine facets of the parts that are asked for, about the middle of each part.
         pieces = [self._pieces[part] for part in parts]
         faces, ends = joined([(piece.vertices, piece.faces) for piece in pieces])
         own = vertices[np.concatenate([piece.vertices for piece in pieces])]
         own -= np.repeat(centres[parts], np.diff(ends[:, 0]), axis=0)
         normals, areas = facet_normals(own, faces)
-        # The current does not fall to nothing at the edge of the lit side.
+        # Where the currents count, they do not fall to nothing at the edge of the lit side: it is
+        # softened over the bend of the smooth surface.
         bend = smooth_bend(own, faces) if wide else np.zeros_like(areas)
         facets = Facets(own, faces, normals, areas, bend, np.zeros_like(areas), ends)
+        # The facets are posed already: their axes are the world's.
         unturned = centres[None, parts], np.broadcast_to(np.eye(3), (1, len(parts), 3, 3))
         links = Links(antennas[None], pairs, length[None], *given, shadow=False)
         lit = Seen(np.array([piece.facets.start for piece in pieces]), seen)
@@ -204,6 +212,7 @@ class SkinFacets:
 
     def _seen(self, time: float) -> NDArray[np.float32]:
         """Fraction of each facet (eye, facet) that is seen at a time [s]."""
+        # The two looks around this time; the tracer serves one thread at a time.
         look, fraction = divmod(time / self._look_s, 1.0)
         with self._tracing:
             before = self._looks.get(int(look), lambda: self._look(look * self._look_s))
@@ -217,12 +226,13 @@ class SkinFacets:
     def _look(self, time: float) -> NDArray[np.bool_]:
         """Which facets (eye, facet) are seen past all skins at a time [s].
 
-        Those that face an eye away are seen by it from where the way to it leaves the skin that
-        they are of, if the eyes are far apart.
+        If the eyes are far apart, a facet that faces away from an eye is seen by it from where the
+        line to it leaves the facet's own skin.
         """
         posed = [skin.posed(time)[0] for skin in self._skins]
         eyes = shadow_nodes(self._radar.at(time))[0]
-        # Each in a scene about its own middle: float32 rounds alike whoever else is there.
+        # Each skin has a scene about its own middle, so that float32 rounds alike whoever else is
+        # there.
         scenes = [
             MeshTracer(self._mi, vertices[skin.coarse], same=_SAME)
             for skin, vertices in zip(self._skins, posed, strict=True)
@@ -233,14 +243,17 @@ class SkinFacets:
         for skin, vertices, own in zip(self._skins, posed, scenes, strict=True):
             corners = vertices[skin.coarse]
             normals, _ = facet_normals(vertices, skin.coarse)
-            # Those at the corners, in their order, then the one between.
+            # The middles of the quarters at the corners, in their order, then of the one between.
             middles = in_four(corners).mean(axis=1).reshape(-1, 4, 3)[:, [0, 2, 1, 3]]
             seen = np.zeros((len(eyes), len(corners), 4), dtype=bool)
+            # Facets that face the eye are asked at their middles.
             for eye, place in enumerate(eyes):
                 faces = np.sum(normals * (place - corners[:, 0]), axis=1) > 0
                 facing, away = np.flatnonzero(faces), np.flatnonzero(~faces)
                 points, whose = middles[facing].reshape(-1, 3), np.repeat(facing, 4)
                 seen[eye, facing] = _clear(place, points, whose, own, scenes).reshape(-1, 4)
+                # Facets that face away radiate through their skin: they are asked from where the
+                # line leaves it.
                 if wide:
                     inside, whose = middles[away].reshape(-1, 3), np.repeat(away, 4)
                     inward = -np.repeat(normals[away], 4, axis=0)
@@ -261,6 +274,7 @@ def _clear(
 
 
 def _piece(fine: Indices, part: Indices, own: int) -> _Piece:
+    # The parts are in order, so the facets of one are a slice.
     first, last = np.searchsorted(part, [own, own + 1])
     facets = slice(4 * int(first), 4 * int(last))
     vertices, faces = np.unique(fine[facets], return_inverse=True)

@@ -1,9 +1,9 @@
 """Physical optics of one target over facets, for antennas anywhere.
 
-A mesh is closed, or open and then a thin sheet lit from both sides. Its triangles are flat, and
-stay so however they are divided: they are divided where spherical waves bend over them by more than
-linear phase can follow, and where the edge of a shadow runs through them, as Mitsuba finds at four
-points of each, down to a quarter of a wavelength.
+A mesh is closed, or it is open and then a thin sheet that is lit from both sides. Its triangles are
+flat, and stay so however they are divided. They are divided where spherical waves bend over them by
+more than linear phase can follow, and where the edge of a shadow runs through them. Mitsuba finds
+such edges at four points of each triangle, down to a quarter of a wavelength.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ _DIVISIONS = 7
 """Most divisions of a facet on the edge of a shadow."""
 
 _SAME = 1e-4
-"""Fraction of the mesh's size within which a hit is the point itself: at shared edges float32 does
-not know which face it met."""
+"""Fraction of the mesh's size within which a hit counts as the point itself: at shared edges
+float32 does not tell which face was met."""
 
 _FOUR = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
 """Middles of the four equal triangles that a triangle divides into, barycentric."""
@@ -80,6 +80,7 @@ def mesh_scattering(
     Antennas ``tx, rx (n, 3)`` are pair by pair [m], with their wavenumbers (n,) [rad/m].
     """
     _refuse_coarse(mesh, float(wavenumber.max()))
+    # The mesh is traced once; facets are divided anew for each pair of antennas.
     corners = np.ascontiguousarray(mesh.corners)
     tracer = MeshTracer(use(select(variant)), corners, same=_SAME)
     solid = _Solid(tracer, smooth_bend(mesh.vertices, mesh.faces), mesh.closed)
@@ -87,11 +88,14 @@ def mesh_scattering(
     field = np.empty(len(tx), dtype=np.complex128)
     for pair, k in enumerate(wavenumber):
         antennas = np.stack([tx[pair], rx[pair]])
+        # First where waves bend over a facet, then where the edge of a shadow runs through it.
         divided, face = _divide_bent(corners, antennas, k)
         wide = bool(directions_apart(*(antennas - middle)) > NEAR)
         divided, face, seen = _divide_edges(solid, divided, face, antennas, k, wide)
+        # About the middle of the mesh, so that paths keep their digits.
         own = (divided - middle).reshape(-1, 3), _own_faces(len(divided))
         facets = mesh_facets(*own, both_sides=not mesh.closed, bend=solid.bend[face])
+        # The phase of the path over the origin, and the spreading to it, are taken out.
         ranges = np.linalg.norm(antennas, axis=1)
         path, k_there = np.full((1, 1, 1), ranges.sum()), np.full((1, 1), k)
         links = Links(antennas[None], one_pair, path, k_there, polarization, True, shadow=True)
@@ -107,10 +111,11 @@ def _own_faces(count: int) -> NDArray[np.int64]:
 
 
 def _refuse_coarse(triangles: Triangles, wavenumber: float) -> None:
-    """A smooth mesh beyond ka = 400 needs its part of the 6 (ka)^2 facets of its sphere."""
+    """Refuse a smooth mesh beyond ka = 400 that is coarser than a sphere of 6 (ka)^2 facets."""
     import trimesh  # slow to import
 
     vertices = triangles.vertices
+    # The radius of the ball about the mesh stands for its radius of curvature.
     spread = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     radius = float(np.linalg.norm(spread, axis=1).max())
     ka = wavenumber * radius
@@ -118,7 +123,8 @@ def _refuse_coarse(triangles: Triangles, wavenumber: float) -> None:
         return
     mesh = trimesh.Trimesh(vertices, triangles.faces, process=False)
     angles = np.asarray(mesh.face_adjacency_angles)
-    # What meets at sharper angles is an edge, at less than a thousandth of a radian one plane.
+    # Faces that meet at more than half a radian have an edge, those at less than a thousandth are
+    # one plane: neither is part of a smooth surface.
     if np.count_nonzero((angles > 1e-3) & (angles < 0.5)) <= len(angles) / 2:
         return
     sphere = 4 * math.pi * radius**2
@@ -141,12 +147,13 @@ def _divide(
 ) -> tuple[Array, NDArray[np.int64], Array]:
     """Divide triangles (n, 3, 3), of the faces (n,), in four until none is too coarse.
 
-    ``coarse(corners, face, level)`` returns which are, (n,), and a value of each, (n, ...); the
-    values of those that stay are returned.
+    ``coarse(corners, face, level)`` returns which of them are, (n,), and a value of each, (n, ...);
+    the values of the triangles that stay are returned.
     """
     done: list[tuple[Array, NDArray[np.int64], Array]] = []
     level = count = 0
     while len(corners):
+        # Those that are fine enough stay, the others are cut in four and asked again.
         split, value = coarse(corners, face, level)
         done.append((corners[~split], face[~split], value[~split]))
         count += len(done[-1][0])
@@ -168,8 +175,8 @@ def _divide_bent(
     def coarse(corners: Array, _: NDArray[np.int64], __: int) -> tuple[NDArray[np.bool_], Array]:
         middle = corners.mean(axis=1)
         size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-        # No nearer than the facet's own middle less its size; an antenna on the surface divides
-        # only so far.
+        # The distance counts as no less than the size of the facet, so that an antenna on the
+        # surface does not divide it for ever.
         distances = (np.maximum(np.linalg.norm(middle - a, axis=1), size) for a in antennas)
         bend = sum(wavenumber * size**2 / (2 * distance) for distance in distances)
         return bend > _BENT_PHASE, size
@@ -182,11 +189,13 @@ def _divide_edges(
 ) -> tuple[Array, Indices, NDArray[np.float32]]:
     """Divide facets on edges of shadows of ``antennas``, a Tx and a Rx.
 
-    Returns corners (n, 3, 3), the triangles (n,) that they are of, and fractions (2, n): lit by Tx,
-    and received by Rx. Those that are not ``wide`` apart both light.
+    Returns corners (n, 3, 3), the triangles (n,) that they belong to, and the fractions (2, n) that
+    Tx lights and Rx receives. Antennas that are not ``wide`` apart both have to see a facet.
     """
 
     def coarse(corners: Array, face: Indices, level: int) -> tuple[NDArray[np.bool_], Array]:
+        # Both antennas are asked, and facets in which the answers differ from point to point are
+        # divided, down to a quarter of a wavelength.
         some = _Some.of(corners, face)
         lit = solid.lit(some, antennas[0])
         received = (
@@ -205,7 +214,7 @@ def _divide_edges(
 
 
 class _Some(NamedTuple):
-    """Facets: corners (n, 3, 3), the triangles (n,) that they are of, and unit normals (n, 3)."""
+    """Facets: corners (n, 3, 3), the triangles (n,) they belong to, and unit normals (n, 3)."""
 
     corners: Array
     face: Indices
@@ -233,8 +242,9 @@ class _Solid(NamedTuple):
         """Fraction of four points of each facet that an antenna sees, 0 for those that face away.
 
         The smooth surface that a facet stands for may still face the antenna where the facet does
-        not: then the antenna is seen from as far above it as that surface may be.
+        not. Then the points are taken as far above the facet as that surface may be.
         """
+        # Facets that face away count if their smooth surface may still face the antenna.
         facing = some.facing(antenna)
         chosen = np.flatnonzero((facing > -self.bend[some.face]) | (not self.closed))
         points = _FOUR @ some.corners[chosen]
@@ -247,12 +257,14 @@ class _Solid(NamedTuple):
     def received(self, some: _Some, antenna: Array, lit: NDArray[np.bool_]) -> Array:
         """Fraction of four points of each lit facet from which nothing else hides an antenna.
 
-        From a facet that faces away the way leads through the solid first, which hides nothing.
+        From a facet that faces away, the line leads through the solid first, which hides nothing.
         """
+        # Facets that face the antenna are asked directly.
         behind = (some.facing(antenna) <= 0) & self.closed
         near, away = np.flatnonzero(lit & ~behind), np.flatnonzero(lit & behind)
         points = _FOUR @ some.corners[near]
         seen = self._fractions(points, some.face[near], antenna, near, len(lit))
+        # From the others, rays leave through the solid, and are asked from where they come out.
         inside = (_FOUR @ some.corners[away]).reshape(-1, 3)
         normals, own = np.repeat(some.normals[away], 4, axis=0), np.repeat(some.face[away], 4)
         exits, met = self.tracer.way_out(inside, -normals, antenna, own)
@@ -328,10 +340,12 @@ def visible_fractions(
 ) -> NDArray[np.complex128]:
     """Visible fraction (n, part) of each part past the others, pair by pair.
 
-    It is the sum over the facets of a part with shadows over that without, in the forms of
-    `facet_scattering` but for forward scatter: 1 in full view, 0 where a part is hidden. Facets are
-    four times as many as a moving body has, if a look at few facets tells that parts are cut.
+    It is the sum over the facets of a part with shadows over the sum without, in the forms of
+    `facet_scattering` but without forward scatter: 1 in full view, 0 where a part is hidden. There
+    are four times as many facets as a moving body has, if a look at few facets tells that parts are
+    cut.
     """
+    # A look at few facets tells whether any part is cut at all.
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     given = target, (tx, rx, wavenumber), Polarization(polarization), variant
     few = _block_by_block(*given, lambda *_: _FEW_FACETS, _hidden)
@@ -358,14 +372,15 @@ def _block_by_block(
     count: Callable[[float, bool], Indices | int],
     find: Callable[..., NDArray[Any]],
 ) -> NDArray[np.complex128]:
-    """What `radiated` or `visible` finds of each part (n, part), for pairs near and far apart.
+    """Return what `radiated` or `visible` finds of each part (n, part), near and far apart alike.
 
-    ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber, wide)`` is
-    the numbers of facets of the parts (part,), or one for all, that either need.
+    ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber, wide)``
+    gives the numbers of facets of the parts (part,), or one for all, that either kind needs.
     """
     tx, rx, wavenumber = pairs
     parts = np.arange(len(target.centres))
     found = np.empty((len(tx), len(parts)), dtype=np.complex128)
+    # Pairs whose Tx and Rx are far apart need more facets, so they are summed apart.
     to_tx, to_rx = (antennas[:, None] - target.centres for antennas in (tx, rx))
     apart = directions_apart(to_tx, to_rx).max(axis=1)
     for wide in (False, True):
@@ -375,10 +390,12 @@ def _block_by_block(
         enough = count(float(wavenumber[some].max()), wide)
         shadows = FacetShadows(select(variant), target.semi_axes, enough)
         facets = shadows.facets
+        # As many pairs at once as memory for their visibility allows.
         block = max(1, _VIEWS_AT_ONCE // (32 * len(facets.faces)))
         for first in range(0, len(some), block):
             own = some[first : first + block]
             ends = np.stack([tx[own], rx[own]], axis=1)
+            # Visibility is asked once for each place where an antenna stands.
             antennas, index = np.unique(ends.reshape(-1, 3), axis=0, return_inverse=True)
             beyond = float(apart[own].max()) if wide else 0.0
             seen = shadows.seen(target.centres, target.frames, antennas, parts, apart=beyond)
@@ -386,6 +403,8 @@ def _block_by_block(
                 np.repeat(array[None], len(own), axis=0)
                 for array in (target.centres, target.frames)
             )
+            # The path over the origin is the carrier of all parts, so that their fields can be
+            # added.
             path = np.linalg.norm(ends, axis=2).sum(axis=1)[:, None, None]
             path = np.broadcast_to(path, (len(own), 1, len(parts)))
             k = wavenumber[own, None]
@@ -396,7 +415,7 @@ def _block_by_block(
 
 
 def _for_directions(enough: Indices | int, wide: bool) -> Indices:
-    """Facets of pairs far apart: the current does not fall to nothing at the edge of the light."""
+    """Return more facets for pairs far apart: their current does not fade at the terminator."""
     return np.minimum(4 * enough if wide else enough, MAXIMUM_FACETS)
 
 
@@ -404,6 +423,7 @@ def _enough_facets(
     target: Ellipsoids, facets: int | None, wavenumber: float, wide: bool
 ) -> Indices | int:
     """Facets per part: those asked for, or as many as the thickest part takes."""
+    # The thickest part decides, by its middle semi-axis.
     ka = wavenumber * float(np.median(target.semi_axes, axis=1).max())
     needed = max(_FEW_FACETS, math.ceil(FACETS_PER_SQUARE_KA * ka**2))
     if facets is not None:

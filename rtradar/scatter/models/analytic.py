@@ -48,16 +48,19 @@ def plane_wave_echo(
 
     The range is that of the centre, and waves are plane over the array, with the middles of all Tx
     and of all Rx at ``places (chirp, 3)``. Other parameters and returns are those of
-    `far_field_echo`. The cross-section is the right one, not the paper code's. Where walls mirror
-    Tx and Rx differently, it is that for the direction half-way between both arrays.
+    `far_field_echo`. The cross-section is the right one, not that of the paper's code. Where walls
+    mirror Tx and Rx differently, it is the one for the direction half-way between both arrays.
     """
     distances, sights = [], []
+    # Distances and directions of all centres from the middle of the Tx, and from that of the Rx.
     for place in places:
         sight = at.centres - place[:, None]
         distances.append(np.linalg.norm(sight, axis=-1))
         sights.append(sight / distances[-1][..., None])
+    # A plane wave reaches an antenna earlier by its offset along the line of sight.
     lead = np.einsum("ci,cpi->cp", at.tx - places[0], sights[0])[:, None]
     lead = lead + np.einsum("cri,cpi->crp", at.rx - places[1][:, None], sights[1])
+    # The direction half-way between both arrays, as seen from the centre, in the axes of each part.
     normal = np.einsum("cpji,cpj->cpi", at.frames, -unit(sights[0] + sights[1]))
     theta = np.arccos(np.clip(normal[..., 2], -1, 1))
     phi = np.arctan2(normal[..., 1], normal[..., 0])
@@ -133,6 +136,7 @@ class AnalyticPaper(Analytic):
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         radar, at = self._radar, chirp_poses(self._radar, self._body, chirps)
+        # The middles of all Tx and of all Rx, wherever the radar is at that time.
         tx, rx = radar.antennas_at(np.minimum(radar.centres_of(chirps), self._body.duration_s))
         middles = tx.mean(axis=1), rx.mean(axis=1)
         length, amplitude = plane_wave_echo(Geometry.of(at), middles, spreading=self._spreading)

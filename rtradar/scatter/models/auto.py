@@ -6,10 +6,11 @@ page,
 
     hypot(0.4 lambda^(1/4), 1 / (k rho)),   lambda in metres,
 
-for a specular point is visible or not, and an edge takes the longer to cross a part the wider the
-Fresnel zone is. The second is twice the next term of geometric optics, for the mean radius rho of a
-person's parts. Of a punch at 3, 6, 12 and 24 GHz the error is 1.08, 0.94, 0.94 and 0.95 of that.
-`physical-optics`, which sums at keyframes and at some places of the array, is taken to leave 0.03.
+because a specular point is visible or not, while an edge takes the longer to cross a part the wider
+the Fresnel zone is. The other term is twice the next order of geometric optics, for the mean radius
+rho of a person's parts. For a punch at 3, 6, 12 and 24 GHz the error is 1.08, 0.94, 0.94 and 0.95
+of the estimate. `physical-optics`, which sums at keyframes and at some places of the array, is
+taken to leave 0.03.
 
 A tolerance on power allows a field that is off by 1.5 times as large a fraction: a frame holds many
 looks at how echoes interfere, and in the worst frame of four activities the power is off by 0.56
@@ -54,11 +55,13 @@ _LEAST_COMPLEX = 1e-3
 def optics_error(radar: Radar, body: Body) -> float:
     """Estimate the rms error of the received field by `specular`, over the rms field.
 
-    Of several people it is that of the one with the smallest parts. A convex part returns, averaged
-    over directions, a quarter of its surface, 4 pi rho^2; a person's error is the mean over the
-    parts so weighted.
+    Among several people the one with the smallest parts decides. Averaged over directions, a convex
+    part returns a quarter of its surface 4 pi rho^2; a person's error is the mean over the parts
+    with these weights.
     """
     wavelength_m = SPEED_OF_LIGHT_MPS / radar.centre_frequency_hz
+    # Each part's squared radius is its surface over 4 pi; the person with the smallest mean
+    # decides.
     squares, owner = ellipsoid_areas(body.semi_axes) / (4 * math.pi), owners_of(body)
     rho = math.sqrt((np.bincount(owner, squares) / np.bincount(owner)).min())
     return math.hypot(_SHARP * wavelength_m**0.25, wavelength_m / (2 * math.pi * rho))
@@ -80,6 +83,8 @@ def choose_level(
     allowed = _FIELD_OVER_POWER * (1 - 10 ** (-tolerance_db / 10))
     if tolerance_complex is not None:
         allowed = min(allowed, _MARGIN * tolerance_complex)
+    # The first level, from the cheapest on, whose expected error is allowed; `reference` if none
+    # is.
     left = {"specular": optics_error(radar, body), "physical-optics": _INTERPOLATED}
     enough = (name for name, error in left.items() if error <= allowed)
     why = "a field off by {:.3f} is allowed; estimated are {}".format(

@@ -1,7 +1,7 @@
 """The echo models of physical optics: `physical-optics` and `reference`.
 
-The former has a carrier at every chirp, times a slow envelope; the latter sums over every facet, at
-every chirp and receiver.
+The former computes a carrier at every chirp, times a slow envelope; the latter sums over every
+facet, at every chirp and receiver.
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ def optics_scattering(
         raise InputError(_NO_DOUBLES.format("give rt.Ellipsoids"))
     pairs = tx, rx, frequency
     field = facet_scattering(target, *pairs, polarization, variant, facets)
+    # Reflections from part to part are added by geometric optics.
     if bounces == 2 and isinstance(target, Ellipsoids):
         tracer = BodyTracer(use(select(variant)), target.semi_axes)
         field += double_scattering(target, *pairs, polarization, tracer)
@@ -129,6 +130,7 @@ class PhysicalOptics(TwoBounceModel):
         frequencies: int = 3,
         bounces: int = 1,
     ) -> None:
+        # Options first, before anything is traced.
         check_bounces("physical-optics", bounces)
         allowed = f"a whole number from 1 to {_MOST_FREQUENCIES}"
         fine = frequencies in range(1, _MOST_FREQUENCIES + 1)
@@ -136,6 +138,7 @@ class PhysicalOptics(TwoBounceModel):
         positive = {"anchor_s": anchor_s, "tolerance": tolerance, "unevenness": unevenness}
         for name, value in positive.items():
             check_option("physical-optics", name, value, 0 < value < math.inf, "positive")
+        # The facets, of ellipsoids or of skins, and what antennas see of them.
         self._radar, self._body = radar, body
         self._surface = facets_of_people(
             "physical-optics",
@@ -154,6 +157,7 @@ class PhysicalOptics(TwoBounceModel):
                 raise InputError(_NO_DOUBLES.format("take body = 'ellipsoids'"))
             tracer = BodyTracer(use(select(variant)), body.semi_axes)
             self.doubles = DoubleReflections(radar, body, tracer, spreading=spreading)
+        # The sum over facets divided by the carrier, from keyframe to keyframe.
         self._envelope = ArrayEnvelope(
             radar,
             body,
@@ -167,6 +171,7 @@ class PhysicalOptics(TwoBounceModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
+        # The carrier of the specular point, exact at every chirp, times the slow envelope.
         length, strength = self._surface.carriers(at)
         amplitude = self._envelope.times(chirps, at.tx_index, strength)
         single = one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)
@@ -222,7 +227,9 @@ class Reference(BuiltInModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
+        # Lengths are those of the specular points; the phases of the facets are relative to them.
         length, _, _ = solve_specular_points(at)
+        # One Tx and all Rx at each chirp: every pair of the first with another one.
         antennas = np.concatenate([at.tx[:, None], at.rx], axis=1)
         pairs = np.array([(0, 1 + receiver) for receiver in range(at.rx.shape[1])])
         times = np.minimum(self._radar.centres_of(chirps), self._body.duration_s)

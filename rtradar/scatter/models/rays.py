@@ -68,6 +68,7 @@ def rays_scattering(
     if len(tx) == 0:
         return field
     mi = use(select(variant))
+    # Facets are as small as the shortest wavelength asks for.
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     sent = Polarization(polarization)
     surfaces, grid = _scene(mi, solid, 2 * np.pi / wavenumber.max() / rays_per_wavelength)
@@ -79,22 +80,27 @@ def rays_scattering(
         polarization=sent,
         two_sided=not (isinstance(solid, Ellipsoids) or solid.closed),
     )
+    # Rays are shot once for each Tx, and summed for each Rx.
     for transmitter, of_tx in _alike(tx):
         shots = shooter.shoot(transmitter)
         for receiver, of_rx in _alike(rx[of_tx]):
             own = of_tx[of_rx]
+            # All footprints are one sum, whose phase is relative to the path over the origin.
             length = np.full((1, 1), np.linalg.norm(transmitter) + np.linalg.norm(receiver))
             for order, each in enumerate(shots):
                 to = exits(surfaces, each, receiver[None]), receiver[None], wavenumber[own], length
+                # The integral is tapered where light comes over another part of a curved body, and
+                # not for one bounce.
                 tapered = order > 0 and not surfaces.flat
                 sums = radiate(each, *to, polarization=sent, tapered=tapered)
                 field[own] += sums[:, 0, 0]
+            # Scattering lengths are without the spreading to the origin.
             field[own] *= np.linalg.norm(transmitter) * np.linalg.norm(receiver)
     return field
 
 
 def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surfaces, Grid]:
-    """What rays meet, and facets with edges of this length [m] at which they are aimed."""
+    """Return what rays meet, and facets with edges of this length [m] at which they are aimed."""
     if isinstance(solid, Ellipsoids):
         return _Ellipsoids(mi, solid.semi_axes, edge).posed(solid)
     grid = MeshGrid.cut(solid.corners, MeshGrid.divisions(solid.corners, edge))
@@ -112,7 +118,7 @@ class _Ellipsoids:
         self._grid = EllipsoidGrid.cover(semi_axes, edge)
 
     def posed(self, pose: Ellipsoids, _time_s: float = 0.0) -> tuple[Surfaces, Grid]:
-        """What rays meet in a pose, and where they are aimed."""
+        """Return what rays meet in a pose, and the facets at which they are aimed."""
         self._tracer.pose(pose.centres, pose.frames)
         return self._tracer, replace(self._grid, pose=pose)
 
@@ -126,7 +132,7 @@ def check_options(rays_per_wavelength: float, bounces: int) -> None:
 
 
 def _alike(points: Array) -> list[tuple[Array, NDArray[np.int64]]]:
-    """Each point that occurs, with the rows where it does."""
+    """List each point that occurs, with the rows where it does."""
     unique, inverse = np.unique(points, axis=0, return_inverse=True)
     return [(point, np.flatnonzero(inverse.ravel() == index)) for index, point in enumerate(unique)]
 
@@ -223,14 +229,17 @@ class Rays(BuiltInModel):
         frequency = self._nodes(orders > 1)
         length = np.zeros((len(at.tx), at.rx.shape[1], orders * parts))
         amplitude = np.zeros((len(frequency), *length.shape), dtype=np.complex128)
+        # Cubics over the four keyframes about each chirp, with the shot of the Tx that is on.
         intervals, rest = keyframe_before(self._radar, chirps, self._step)
         places = zip(intervals, cubic_weights(rest / self._step), at.tx_index, strict=True)
         for index, (before, weights, tx) in enumerate(places):
             for place, weight in enumerate(weights, start=int(before) - 1):
+                # Before the start of the capture the first keyframe stands for the earlier one.
                 if weight != 0:
                     shot = self._shot(max(place, 0) * self._step, int(tx))
                     length[index] += weight * shot.length
                     amplitude[:, index] += weight * shot.amplitude
+        # Echoes of one bounce have the exact path of their specular point.
         length[:, :, :parts] = solve_specular_points(at)[0]
         return Echoes(
             length=length,
@@ -242,12 +251,13 @@ class Rays(BuiltInModel):
         )
 
     def _shot(self, chirp: int, tx: int) -> _Shot:
-        """What every Rx receives of one Tx in the pose of that chirp."""
+        """Return what every Rx receives from one Tx in the pose of that chirp."""
         return self._shots.get((chirp, tx), partial(self._shoot, chirp, tx))
 
     def _shoot(self, chirp: int, tx: int) -> _Shot:
         time_s = keyframe_time(self._radar, self._body, chirp)
         radar, (centres, frames, axes) = self._radar.at(time_s), self._body.at([time_s])
+        # All Tx of one keyframe share the posed body.
         if self._posed is None or self._posed[0] != chirp:
             pose = Ellipsoids(centres[0], frames[0], axes)
             self._posed = chirp, *self._target.posed(pose, time_s)
@@ -261,15 +271,19 @@ class Rays(BuiltInModel):
             polarization=sent,
             spreading=self._spreading,
         )
+        # Lengths of single reflections are those of the specular points.
         place, rx = radar.tx[tx], radar.rx[radar.rx_of_tx[tx]]
         antennas = place[None], rx[None]
         specular = solve_specular_points(Geometry(*antennas, centres, frames, axes))[0][0]
         frequency = self._nodes(self._bounces > 1)
         lengths, amplitudes = [], []
+        # Each number of bounces has an echo for each part that was met last, at the mean path of
+        # its tubes.
         for order, footprints in enumerate(shooter.shoot(place)):
             free = exits(surfaces, footprints, rx)
             own = replace(footprints, surface=self._target.part[footprints.surface])
             lengths.append(own.mean_paths(own.surface, rx, specular) if order else specular)
+            # One bounce needs fewer frequencies: it is brought to the nodes of the others.
             nodes = self._nodes(order > 0)
             sums = radiate(
                 own,
@@ -297,7 +311,7 @@ class Rays(BuiltInModel):
 class _Skins:
     """People of whom some have a mesh: their skins, cut into facets as those of `_Ellipsoids`.
 
-    Of a skin the flat triangles scatter that `physical-optics` sums, however they are cut.
+    A skin scatters by the flat triangles that `physical-optics` sums, however they are cut.
     """
 
     def __init__(self, mi: Any, radar: Radar, body: Body, edge: float) -> None:
@@ -305,7 +319,7 @@ class _Skins:
         self._skins: list[Skin] = [skin_of(person, stop_hz) for person in body.people]
         counts = [len(person.semi_axes) for person in body.people]
         self.part = np.repeat(one_after_the_other([own.part for own in self._skins], counts), 4)
-        # As at the start, so that each facet keeps its place in the material.
+        # Cut as at the start of the recording, so that each facet keeps its place in the material.
         self._divisions = MeshGrid.divisions(self._corners(0.0), edge, by_area=True)
 
     def posed(self, _pose: Ellipsoids, time_s: float) -> tuple[Surfaces, Grid]:

@@ -57,9 +57,11 @@ def _scattering_length(
     """Scattering length of one target."""
     _check(bounces, terms, visibility)
     at, sent = target_geometry(target, tx, rx), Polarization(polarization)
+    # Each part as if it stood alone.
     length, amplitude, points = solve_specular_points(at, polarization=sent, points=True)
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
     tracer.pose(target.centres, target.frames)
+    # What other parts leave of it: a fraction of its facets, or all or nothing.
     if visibility == "gradual":
         given = target, tx, rx, frequency, polarization, variant
         left = visible_fractions(*given)[:, None]
@@ -139,6 +141,7 @@ class Specular(TwoBounceModel):
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at, visibility = chirp_poses(self._radar, self._body, chirps), self._visibility
+        # Sharp visibility is known at keyframes, which also say where the search begins.
         weight, start = (
             visibility.at(chirps) if isinstance(visibility, SpecularVisibility) else (1.0, None)
         )
@@ -150,8 +153,10 @@ class Specular(TwoBounceModel):
             spreading=self._spreading,
             points=self._terms == 2,
         )
+        # A ramp between visible and occluded is a real weight, the same for the whole sweep.
         frequency = np.array([self._radar.centre_frequency_hz])
         echo = (amplitude * weight)[None].astype(np.complex128)
+        # What is left of the facets is complex, and may change over the sweep.
         if isinstance(visibility, ArrayEnvelope):
             echo = visibility.times(chirps, at.tx_index, amplitude)
             frequency = visibility.frequency

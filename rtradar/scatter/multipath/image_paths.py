@@ -4,11 +4,11 @@ A leg over walls is straight from the mirror image of its antenna (image method)
 faces: its front is the rectangle itself, and waves from behind meet the back, one thickness deeper.
 All of this is closed form in float64; nothing is traced.
 
-**Large flat faces of furniture** show a person as walls do. A face is a set of triangles in one
+**Large flat faces of furniture** reflect a person as walls do. A face is a set of triangles in one
 plane that hang together and fill a rectangle. It reflects as the surface of a half-space of its
-material, by the extent of that rectangle (`rtradar.scatter.multipath.wall_edges`). Nothing passes
-through it: furniture occludes. Faces that are smaller than a Fresnel zone, or no rectangles, send
-no ghosts.
+material, with the extent of that rectangle (`rtradar.scatter.multipath.wall_edges`). Nothing passes
+through it: furniture occludes. Faces that are smaller than a Fresnel zone, or are no rectangles,
+send no ghosts.
 """
 
 from __future__ import annotations
@@ -74,6 +74,8 @@ def wall_paths(
     The middle of the array, ``place (3,)`` [m], or its image, settles which face of a wall
     reflects. Each of the ``others``, faces of furniture, reflects once on a path, without walls.
     """
+    # Each leg is extended by every wall but the one that it met last; the image of the array
+    # settles which face it meets.
     legs: list[Leg] = [()]
     for depth in range(1, order + 1):
         legs += [
@@ -83,6 +85,7 @@ def wall_paths(
             for wall in walls
             if not leg or leg[-1].wall is not wall
         ]
+    # Any leg out may go with any leg back.
     paths = [WallPath(*both) for both in product(legs, legs)]
     for face in others if order else ():
         paths += [WallPath((), (face,)), WallPath((face,), ())]
@@ -131,13 +134,15 @@ def specular_point(
 ) -> tuple[Array, Bools]:
     """Find where a wall reflects a wave from origins to targets (..., 3) [m].
 
-    The margin [m] is added to the rectangle, and before the face for the target. Returned are the
-    point on the plane of the front, or of the back (..., 3) [m], which is NaN where the ends are on
-    different sides, and whether both ends are before that face and the point lies in the rectangle,
-    or as far beside it as ``beside_m`` (...).
+    The margin [m] is added to the rectangle; the target may also be behind the face by the margin.
+    Returned are the point on the plane of the front, or of the back (..., 3) [m], which is NaN
+    where the ends are on different sides, and whether both ends are before that face and the point
+    lies in the rectangle, or at most ``beside_m`` (...) beside it.
     """
     origins, targets = np.broadcast_arrays(origins, targets)
     first, second = height(wall, origins, back=back), height(wall, targets, back=back)
+    # The line from the origin to the image of the target crosses the face where the wave is
+    # reflected.
     before = (first > abs(margin_m)) & (second > -margin_m)
     fraction = np.where(before, first, np.nan) / np.where(before, first + second, 1.0)
     point = origins + fraction[..., None] * (image(wall, targets, back=back) - origins)
@@ -176,6 +181,8 @@ def corners(
     antennas, points = np.broadcast_arrays(antennas, points)
     valid = np.ones(points.shape[:-1], dtype=bool)
     along = [points]
+    # From the point back to the antenna: seen from there, each wall shows the image of the antenna
+    # over the walls before it.
     sources = image_chain(leg, antennas)[:-1]
     for (wall, back), source in zip(reversed(leg), reversed(sources), strict=True):
         margins = {"margin_m": margin_m, "beside_m": beside_m}
@@ -192,7 +199,7 @@ def corners(
 class ImageRadar(Radar):
     """A radar whose Tx stand at their images over one leg, and whose Rx at those over another.
 
-    What mirrors do to polarisation and to the patterns of antennas belongs to the legs: here
+    What walls do to polarisation and to the patterns of antennas belongs to the legs: here the
     antennas are isotropic, and turned as those of the radar are.
     """
 
@@ -228,7 +235,7 @@ _TIMES = 50
 FAINT_DB = 40.0
 """Faces whose ghosts are expected further below the direct echoes are left out [dB]."""
 _FILLED = 0.9
-"""Least part of its rectangle that a facet fills; it is reflected by that part."""
+"""Least part of its rectangle that a facet fills; it reflects by that part."""
 _KEPT_PIECES = 64
 """Pieces of furniture whose faces are kept for the next run."""
 _NARROWEST_M = 0.03
@@ -241,8 +248,8 @@ _SIDES = (("front", "back"), ("left", "right"), ("top", "bottom"))
 class SolidFace(Wall):
     """A face of a piece of furniture, with a half-space of material behind it.
 
-    The face consists of ``patches`` in its rectangle, as openings are given, and fills ``fraction``
-    of these. A thin ``sheet`` reflects on both sides.
+    The face consists of ``patches`` in its rectangle, given as openings are, and fills the
+    ``fraction`` of them. A thin ``sheet`` reflects on both sides.
     """
 
     thickness_m: float = 0.0
@@ -269,13 +276,15 @@ def reflecting_faces(
 ) -> tuple[tuple[Face, ...], tuple[FaceSummary, ...]]:
     """Find the faces of furniture over which the radar may see parts of a body at some time.
 
-    Their specular points, for the middle of the array at a place (3,) [m], are at most the radius
-    of the Fresnel zone beside the face, the face is as wide as that, furniture leaves both legs
-    free, and the ghosts are not expected more than `FAINT_DB` below the direct echoes, in the mean
-    over the parts and `_TIMES` poses. Returned are these faces, and what became of every face.
+    The specular points on such a face, for the middle of the array at a place (3,) [m], are at most
+    the radius of the Fresnel zone beside it, the face is as wide as that radius, and furniture
+    leaves both legs free. In the mean over the parts and `_TIMES` poses the ghosts are expected at
+    most `FAINT_DB` below the direct echoes. Returned are these faces, and what became of every
+    face.
     """
     points = body.at(np.linspace(0.0, body.duration_s, _TIMES)).centres.reshape(-1, 3)
     found, summaries = [], []
+    # A face is worth paths over it if the ghosts that it sends are expected above a level.
     for own in chain.from_iterable(map(faces_of, scene.furniture)):
         above = float(height(own, place))
         face, expected, reason = Face(own, back=above < 0), 0.0, "looks away from the radar"
@@ -300,16 +309,19 @@ def _expected(
     """Power of a ghost at points that are seen over a face, over that of the direct echo there."""
     wall = face.wall
     narrow = float(min(np.linalg.norm(edge) for edge in (wall.edge_u_m, wall.edge_v_m)))
+    # Where the face would reflect each point, if it were endless.
     (_, met, _), valid = corners((face,), place, points, beside_m=np.inf)
     met, points = met[valid], points[valid]
     first, last = np.linalg.norm(met - place, axis=1), np.linalg.norm(met - points, axis=1)
     cosine = np.abs((met - place) @ wall.normal) / first
+    # Only places within the Fresnel zone of the face count, and only if the face is as wide.
     zone = np.sqrt(radar.wavelength_m * first * last / (first + last))
     near = (zone <= narrow) & inside(wall, met, zone / cosine)
     if room is not None:
         near[near] = room.clear(place, met[near]) & room.clear(met[near], points[near])
     eta = wall.material.eta(radar.centre_frequency_hz)
     reflected = [np.abs(reflection(eta, cosine, kind)) ** 2 for kind in POLARIZATIONS]
+    # The longer path, and the part of the rectangle that the face fills, take from the field.
     lost = np.linalg.norm(points - place, axis=1) / (first + last) * near
     return np.asarray(np.max(reflected, axis=0) * (lost * filled) ** 2)
 
@@ -321,6 +333,7 @@ def faces_of(piece: Furniture) -> Iterator[SolidFace]:
     found = _flat_faces(triangles.vertices.tobytes(), faces.tobytes())
     count = Counter[str]()
     for own in found:
+        # The side of the piece that the face is on gives its name.
         looks = piece.axes.T @ np.cross(own["edge_u_m"], own["edge_v_m"])
         axis = int(np.abs(looks).argmax())
         side = _SIDES[axis][int(looks[axis] < 0)]
@@ -343,6 +356,7 @@ def _flat_faces(vertices: bytes, faces: bytes) -> tuple[dict[str, Any], ...]:
 
     places = np.frombuffer(vertices).reshape(-1, 3)
     mesh = Trimesh(places, np.frombuffer(faces, dtype=np.int64).reshape(-1, 3), process=False)
+    # Facets in one plane are one surface: they are found by their rounded normal and distance.
     planes: dict[tuple[float, ...], list[int]] = {}
     for number in np.argsort(-mesh.facets_area, kind="stable").tolist():
         normal, origin = mesh.facets_normal[number], mesh.facets_origin[number]
@@ -359,19 +373,21 @@ def _flat_faces(vertices: bytes, faces: bytes) -> tuple[dict[str, Any], ...]:
 
 
 def _face(corners: Sequence[Array], areas: Array, normal: Array) -> dict[str, Any] | None:
-    """Make the rectangle and the patches of what lies in one plane, the largest facet first.
+    """Make the rectangle and the patches of facets in one plane, the largest facet first.
 
-    ``corners`` are those (corner, 3) of the triangles of each facet; what is no rectangle along the
-    largest one is left out.
+    ``corners`` are the corners (corner, 3) of the triangles of each facet. A facet that is no
+    rectangle along the axes of the largest one is left out.
     """
     from trimesh.bounds import oriented_bounds_2D
 
     least_box: Any = oriented_bounds_2D  # has no types
+    # The axes of the smallest rectangle around the largest facet.
     along = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     axes = np.stack([along, np.cross(normal, along)]) / np.linalg.norm(along)
     turn = least_box(corners[0] @ axes.T)[0][:2, :2]
     # A proper rotation: the second axis is a quarter turn on from the first.
     axes = np.stack([turn[0], [-turn[0, 1], turn[0, 0]]]) @ axes
+    # Only facets that nearly fill a rectangle along these axes, and are not too narrow.
     boxes = []
     for own, area in zip(corners, areas, strict=True):
         low, high = (end(own @ axes.T, axis=0) for end in (np.min, np.max))
@@ -379,6 +395,7 @@ def _face(corners: Sequence[Array], areas: Array, normal: Array) -> dict[str, An
             boxes.append((low, high, area))
     if not boxes:
         return None
+    # One rectangle around all, with the facets as patches in it.
     lows, highs, filled = (np.array(column) for column in zip(*boxes, strict=True))
     least, size = lows.min(axis=0), highs.max(axis=0) - lows.min(axis=0)
     start = least @ axes + (corners[0][0] @ normal) * normal

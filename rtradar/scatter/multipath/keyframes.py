@@ -2,10 +2,10 @@
 
 A leg carries the field of its antenna as a vector, over and through walls by the coefficients of
 their slabs, to the specular point on the body. Both legs begin at their antennas: by reciprocity a
-receiver receives what it would send. Specular points are those for the middles of the lines of
+receiver receives what it would send. The specular point is that for the middles of the lines of
 antennas. Legs run from the ends of the lines, in free space from every Tx. A slab that delays makes
-several waves of one, each with its own delay: an echo has a column for each pair of those of its
-legs.
+several waves of one, each with its own delay: an echo has a column for each pair of such waves on
+its two legs.
 
 Keyframes are computed many at a time, kept, and found again.
 """
@@ -100,23 +100,27 @@ def path_keyframes(
     """Compute what is left of the echoes at some poses, with objects where they are at ``times``.
 
     Columns that are met for the first time are added. Whether other parts occlude a direct echo,
-    and any of a ``whole_level`` on its last sections, is decided by the model, not here.
+    and any echo of a ``whole_level`` on its last sections, is decided by the model, not here.
     """
+    # Each path carries the fields of its legs by itself.
     numbers = np.unique(columns.path).tolist()
     paths = thread_map(
         lambda place: _over(around, columns, numbers[place], poses), range(len(numbers))
     )
+    # Where legs exist, and where the search for specular points begins at the chirps.
     shape = len(times), *around.ends.tx.shape[:2], around.ends.rx.shape[1], len(columns.path)
     keyframes, lines, tx_ends, rx_ends, echoes = shape
     free = np.zeros((keyframes, lines, tx_ends + rx_ends, echoes), dtype=bool)
     start = np.empty((keyframes, lines, tx_ends, echoes, 3), dtype=np.float32)
     for own in paths:
         free[..., own.echo], start[..., own.echo, :] = own.free, own.start
+    # What solids leave of the straight sections multiplies the fields of the legs.
     sections = [section for own in paths for section in own.sections]
     left = free.astype(np.complex128)
     if around.occluders is not None:
         _past_solids(around.occluders[1], sections, free, times, left)
     of_pairs = _both(left, tx_ends)
+    # The strongest term of each echo says which echoes are seen at all, and which terms are faint.
     strength = np.zeros(shape)
     for own in paths:
         for found in own.fields.values():
@@ -124,10 +128,12 @@ def path_keyframes(
             size = np.abs(found).max(axis=0)
             strength[..., own.echo] = np.maximum(strength[..., own.echo], size)
     seen = strength > 0
+    # The body is asked only about legs of echoes that are seen.
     if around.occluders is not None:
         asked = np.concatenate([seen.any(axis=3), seen.any(axis=2)], axis=2)
         clear = _past_body(around.occluders[0], sections, asked, poses, columns.part)
         seen &= _both(clear, tx_ends)
+    # Factors that hardly change over the sweep are made equal at all nodes.
     factor = _in_columns(columns, paths, strength, len(around.walls.frequency))
     middle = factor[len(factor) // 2]
     change = np.abs(factor - middle) <= _FLAT * np.abs(middle)
@@ -137,12 +143,13 @@ def path_keyframes(
 
 
 def _both(of_legs: NDArray[Any], tx_ends: int) -> NDArray[Any]:
-    """Product of both legs (keyframe, line, tx_end, rx_end, echo), of those from all ends."""
+    """Multiply both legs, given from all ends: (keyframe, line, tx_end, rx_end, echo)."""
     return np.asarray(of_legs[:, :, :tx_ends, None] * of_legs[:, :, None, tx_ends:])
 
 
 def _in_columns(columns: EchoColumns, paths: Sequence[_Over], strength: Array, nodes: int) -> Field:
     """Factors (node, keyframe, line, tx_end, rx_end, column), without terms faint everywhere."""
+    # A term has a column of its own if it is not faint at some keyframe.
     parts = []
     for own in paths:
         for met, found in own.fields.items():
@@ -164,9 +171,9 @@ def _in_columns(columns: EchoColumns, paths: Sequence[_Over], strength: Array, n
 class _Section(NamedTuple):
     """A straight section of the legs of some echoes, from origins to targets (..., 3) [m].
 
-    It is of the legs from the ends of a line from ``first`` on, those of Tx before those of Rx; it
-    may be the ``last`` one, of which the model may know what the body hides (``known``), and be
-    reflected ``at_solid``, a face of furniture.
+    It belongs to the legs from the ends of a line from ``first`` on, where the ends of Tx come
+    before those of Rx. It may be the ``last`` section, for which the model may know what the body
+    hides (``known``), and its leg may be reflected ``at_solid``, a face of furniture.
     """
 
     echo: NDArray[np.int64]
@@ -181,9 +188,9 @@ class _Section(NamedTuple):
 class _Over(NamedTuple):
     """The echoes ``echo (n,)`` of one path.
 
-    ``fields (node, keyframe, line, tx_end, rx_end, n)`` are the co-polar ones over the bare return,
-    by what slabs delay; ``free (keyframe, line, end, n)`` says where the legs from all ends of a
-    line exist, ``start`` is that of `PathKeyframes`.
+    ``fields (node, keyframe, line, tx_end, rx_end, n)`` are the co-polar fields over the bare
+    return, by the passages that delay them; ``free (keyframe, line, end, n)`` says where the legs
+    from all ends of a line exist; ``start`` is that of `PathKeyframes`.
     """
 
     echo: NDArray[np.int64]
@@ -197,6 +204,7 @@ def _over(around: Surroundings, columns: EchoColumns, number: int, poses: Poses)
     """Carry the fields of all antennas over both legs of a path, and put them together."""
     path, echo = around.paths[number], np.flatnonzero(columns.path == number)
     part, (ends, radar) = columns.part[echo], (around.ends, around.radar)
+    # Both legs end at the specular point for the middle of the lines, and begin at their ends.
     points, near, exists = specular_points(path, part, ends, poses)
     known = around.whole_level or not path.order
     legs, sections = [], []
@@ -211,6 +219,7 @@ def _over(around: Surroundings, columns: EchoColumns, number: int, poses: Poses)
             last = step == len(leg)
             start, stop = np.broadcast_arrays(*between)
             sections.append(_Section(echo, first, start, stop, last, last and known, at_solid))
+    # Every wave that arrives, with every wave that the receiver would send.
     out, back = legs
     fields = {
         (sent.passages, received.passages): _left(
@@ -235,6 +244,7 @@ def specular_points(
     tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
     count, pairs = len(poses.centres), tx.shape[:2]
     rx = np.repeat(images(path.back, ends.rx_middle), pairs[1], axis=0)
+    # Keyframes and lines become poses, with one transmitter and one receiver each.
     antennas = np.tile(images(path.out, tx).reshape(-1, 3), (count, 1)), np.tile(rx, (count, 1))
     centres, frames = poses.centres[:, part], poses.frames[:, part]
     posed = [np.repeat(own, len(rx), axis=0) for own in (centres, frames)]
@@ -256,9 +266,10 @@ def _left(
 ) -> Field:
     """Co-polar field over that of the bare return, (node, keyframe, line, tx_end, rx_end, echo).
 
-    The unit ``ways (keyframe, line, end, echo, 3)`` go from the body back over both legs. The bare
-    return of what is ``known`` holds the co-polar fraction of a conductor.
+    The unit ``ways (keyframe, line, end, echo, 3)`` go from the body back over both legs. If
+    ``known``, the bare return holds the co-polar fraction of a conductor already.
     """
+    # All ends of Tx with all ends of Rx.
     to_tx, to_rx = ways[0][:, :, :, None], ways[1][:, :, None]
     if around.surfaces.conduct:
         shape = *sent.shape[:4], received.shape[3], len(part)
@@ -280,7 +291,7 @@ def _left(
 def _rays(
     sections: Sequence[_Section], asked: NDArray[np.bool_]
 ) -> tuple[Array, Array, NDArray[np.bool_], tuple[NDArray[np.int64], ...]]:
-    """Sections of the legs that are asked about (keyframe, line, end, echo), one after the other.
+    """List the sections of the legs that are asked about (keyframe, line, end, echo).
 
     Returned are both ends (ray, 3) [m], whether they are the last of their leg, and which leg.
     """
@@ -304,13 +315,13 @@ def _past_solids(
 ) -> None:
     """Multiply what is left of legs (keyframe, line, end, echo) by what solids leave.
 
-    Asked are those that are ``free`` of walls.
+    Only legs that are ``free`` of walls are asked about.
     """
     for at_solid in (False, True):
         own = [section for section in sections if section.at_solid == at_solid]
         if own:
             starts, stops, _, legs = _rays(own, free)
-            # What a face of furniture reflects has its edges already.
+            # A wave that a face of furniture reflects has the edges of that face already.
             passed = solids.left(starts, stops, times[legs[0]], bent=not at_solid)
             np.multiply.at(left, legs, passed)
 
@@ -322,15 +333,15 @@ def _past_body(
     poses: Poses,
     part: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
-    """Whether the body leaves legs free, of those ``asked`` (keyframe, line, end, echo).
+    """Whether the body leaves the legs free that are ``asked`` (keyframe, line, end, echo).
 
-    Of the last sections of the ``known`` ones the model knows that itself.
+    What it occludes of ``known`` sections the model knows itself.
     """
     own = [section for section in sections if not section.known]
     if not own:
         return asked
     starts, stops, last, legs = _rays(own, asked)
-    # At the specular point the part itself cannot be in the way, before a wall it can.
+    # A part cannot occlude its own specular point, but it can occlude a leg before a wall.
     target = np.where(last, part[legs[3]], -1)
     occluded = ~body.clear(starts, stops, np.arange(len(starts)), target, legs[0], poses)
     clear = asked.copy()
@@ -358,6 +369,7 @@ def _turning(radar: Radar, duration_s: float) -> float:
     """Largest rate at which a radar turns [rad/s]."""
     if not radar.is_moving:
         return 0.0
+    # The largest rotation from one keyframe to the next.
     axes = radar.poses_at(np.arange(0.0, duration_s + KEYFRAMES_S, KEYFRAMES_S))[0]
     turns = Rotation.from_matrix(np.swapaxes(axes[:-1], 1, 2) @ axes[1:])
     return float(turns.magnitude().max(initial=0.0)) / KEYFRAMES_S
@@ -374,7 +386,7 @@ class RoomKeyframes:
         self._cache: KeyframeCache[int, PathKeyframes] = KeyframeCache(0, _KEYFRAMES_AT_ONCE)
 
     def direct(self) -> RoomKeyframes:
-        """Return those of the direct echoes alone, with what is already known of them."""
+        """Return the keyframes of the direct echoes alone, with what is already known of them."""
         other, keep = copy.copy(self), self.columns.direct
         other.columns = copy.copy(self.columns)
         other.restrict(keep[np.array(self.columns.echo)], keep)
@@ -389,12 +401,14 @@ class RoomKeyframes:
         of each interval; where specular points are expected, in the axes of the parts (chirp, echo,
         3) [m]; and which echoes may be seen (chirp, echo).
         """
+        # The keyframes at both ends of the interval of each chirp.
         numbers, rest = keyframe_before(self._around.radar, chirps, self.step)
         starts, interval = np.unique(numbers, return_inverse=True)
         fraction = rest / self.step
         # Where every chirp of an interval is its first, the keyframe after it does not matter.
         stops = starts + (np.bincount(interval, weights=fraction) > 0)
         known, ends = self._find(np.union1d(starts, stops).tolist()), self._around.ends
+        # Each chirp interpolates between the ends of the line of its own Tx.
         line, weight = ends.line_of_tx[tx], ends.tx_weight[tx]
         factors, points = list[PathFactors](), list[Array]()
         wanted = np.zeros((len(chirps), len(self.columns.path)), dtype=bool)
@@ -418,6 +432,8 @@ class RoomKeyframes:
         """Keyframes with these numbers, from the cache or many at a time."""
         cache = self._cache
         found = {number: cache[number] for number in numbers if number in cache}
+        # Keyframes that are not in the cache are computed many at a time; those of a radar that
+        # moves one by one, since each has antennas of its own.
         missing, radar = [number for number in numbers if number not in found], self._around.radar
         at_once = 1 if radar.is_moving else _KEYFRAMES_AT_ONCE
         for first in range(0, len(missing), at_once):
@@ -431,6 +447,7 @@ class RoomKeyframes:
             keyframes = path_keyframes(around, self.columns, poses, times)
             for place, number in enumerate(some):
                 own = PathKeyframes(*(array[place].copy() for array in keyframes))
+                # How many keyframes stay follows from how large one is.
                 cache.stay = int(_KEPT_BYTES / sum(array.nbytes for array in own))
                 cache.keep(number, own)
                 found[number] = own
@@ -449,6 +466,6 @@ class RoomKeyframes:
 
 
 def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:
-    """Add empty columns for what was not yet known."""
+    """Add empty columns for those that were not yet known at this keyframe."""
     missing = columns - factor.shape[-1]
     return factor if not missing else np.pad(factor, [(0, 0)] * (factor.ndim - 1) + [(0, missing)])

@@ -42,12 +42,14 @@ class LegImages:
     """
 
     def __init__(self, paths: Sequence[WallPath], tx: Array, rx: Array, middle: Array) -> None:
+        # Paths share legs: the images over each leg are computed once.
         legs = list(dict.fromkeys(leg for path in paths for leg in (path.out, path.back)))
         self.of_path = np.array([[legs.index(path.out), legs.index(path.back)] for path in paths])
         self.antennas = LegAntennas(
             np.array([images(leg, tx) for leg in legs]),
             np.array([images(leg, rx) for leg in legs]),
         )
+        # The kernel takes receivers side by side.
         self._in_lanes = np.ascontiguousarray(np.swapaxes(self.antennas.rx, 2, 3))
         self._middle = np.array([images(leg, middle) for leg in legs])
 
@@ -76,12 +78,14 @@ class LegImages:
         shape = (*poses.rx.shape[:2], len(path))
         length, amplitude = np.empty(shape), np.empty(shape)
         (tx, rx), bodies = self.antennas, Ellipsoids(*poses[3:6])
+        # Specular points are followed from where the keyframes expect them.
         if formula is None:
             legs = np.ascontiguousarray(self.of_path[path].T)
             antennas = Images(tx, self._in_lanes, self._middle, legs[0], legs[1], part)
             given = antennas, poses.tx_index, bodies, near, length, amplitude
             in_threads(nearby_echoes, len(length), *given)
             return length, amplitude
+        # A formula takes all parts over a path at once, before the images of the antennas.
         for number in np.unique(path):
             own, (out, back) = path == number, self.of_path[number]
             parts = part[own]
@@ -133,6 +137,7 @@ class EchoColumns:
 
     def keep(self, column: NDArray[np.bool_], echo: NDArray[np.bool_]) -> None:
         """Leave out all other columns for good, and all other echoes, which have no columns."""
+        # Echoes and columns that stay are numbered anew.
         number = np.cumsum(echo) - 1
         chosen = np.flatnonzero(column)
         self.echo = [int(number[self.echo[i]]) for i in chosen]
@@ -161,6 +166,7 @@ class EchoColumns:
         the antennas of ``at``. The points towards which echoes leave the body (chirp, echo, 3) are
         in the axes of their part [m].
         """
+        # The table of delays is made again whenever columns were added or left out.
         if self._delays is None:
             self._delays = self._list_delays()
         out = np.empty((*length.shape[:2], len(self)))
@@ -173,6 +179,7 @@ class EchoColumns:
     def _list_delays(self) -> SlabDelays:
         legs = np.zeros((len(self), 2, 3), dtype=np.int64)
         passes, slabs = list[int](), list[Array]()
+        # For each column the passages on both of its legs, one after the other.
         for number, (echo, met) in enumerate(zip(self.echo, self.met, strict=True)):
             path = self._paths[self.path[echo]]
             for side, leg in enumerate((path.out, path.back)):

@@ -55,13 +55,14 @@ def summarize(
 ) -> PathSummary:
     """Summarize one path.
 
-    By echo: whether it takes this path and whether it is kept, its power [m^2], the name of its
-    part, and whether it is among the ``weakest``, which a tolerance leaves out. ``noise`` is the
-    noise power over the gain of processing [m^2].
+    Given for each echo are whether it takes this path and whether it is kept, its power [m^2], the
+    name of its part, and whether it is among the ``weakest``, which a tolerance leaves out.
+    ``noise`` is the noise power over the gain of processing [m^2].
     """
     total = float(power[own].sum())
     lost = own & ~keep
     why = []
+    # Echoes are left out for up to three reasons.
     if (power[lost] == 0).any():
         why.append(
             "never seen: no specular point in the wall, or in the shadow of furniture or body"
@@ -91,12 +92,12 @@ class Ghost(NamedTuple):
 def ghosts(model: RoomModel | None, radar: Radar, time_s: float) -> list[Ghost]:
     """Find where the echoes over walls show at one time [s], path by path.
 
-    Each is the mean of its parts, weighted by their power. The azimuth is that from which the last
-    leg comes, or that of its antenna's image mirrored back. Without a model, of nobody in a room,
-    there are none.
+    Each ghost is the mean of its parts, weighted by their power. The azimuth is that from which the
+    last leg comes. Without a model, when nobody is in the room, there are none.
     """
     if model is None:
         return []
+    # Two instants a few cycles apart, within one frame, give the velocity.
     cycle, step = round(time_s / radar.cycle_duration_s - _STEP_CYCLES / 2), _STEP_CYCLES
     if radar.frame_period_s is not None:
         step = min(step, max(radar.cycles_per_frame - 1, 1))
@@ -112,6 +113,7 @@ def ghosts(model: RoomModel | None, radar: Radar, time_s: float) -> list[Ghost]:
     azimuth = np.arcsin(np.clip(-slope, -1, 1))
     values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
     found = []
+    # The mean of the echoes over each path, weighted by their power.
     for path in dict.fromkeys(echoes.path.tolist()):
         own = (echoes.path == path) & (echoes.bounces > 1) & (power > 0)
         if own.any():

@@ -1,10 +1,10 @@
 """A room around an echo model: echoes over walls, floor and ceiling, and through walls.
 
-A leg over a wall is straight from the antenna's image, so lengths and amplitudes of every path are
-those of the same geometric optics with images for antennas, in float64 at every chirp. What walls,
-polarisation, the surface of the body and occluders do to the field changes slowly: it is computed
-at keyframes 20 ms apart for the ends of the lines of antennas. In between factors change linearly,
-and what appears or vanishes fades smoothly.
+A leg over a wall is straight from the antenna's image, so lengths and amplitudes of every path
+follow from the same geometric optics with images for antennas, in float64 at every chirp. What
+walls, polarisation, the surface of the body and occluders do to the field changes slowly: it is
+computed at keyframes 20 ms apart for the ends of the lines of antennas. In between, factors change
+linearly, and what appears or vanishes fades smoothly.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ FIELD_ERROR = 0.02
 """Largest error of the field of an echo over or through a wall, over the sweep, without a limit."""
 
 _ENOUGH, _MOST_NODES = 0.015, 3
-"""Part of it that polynomials through so many nodes may take; one pass of `synthesize` takes 3."""
+"""Part of that error that polynomials over the sweep may take, and their largest number of nodes:
+one pass of `synthesize` takes 3."""
 
 _CHIRPS_AT_ONCE = 64
 
@@ -67,8 +68,8 @@ _PLACES = 9
 """Places on the path of a radar that moves, from which walls and faces are looked for."""
 
 _LOOK_EVERY, _LEAST_LOOKS = 5, 25
-"""One of how many keyframes is looked at to tell which echoes are above the noise, and the least
-number of these."""
+"""One keyframe in this many is looked at to tell which echoes are above the noise; and the least
+number of keyframes that are."""
 
 
 class RoomModel:
@@ -82,14 +83,14 @@ class RoomModel:
     legs together, 0 to 3; 0 leaves the direct echoes, through walls and behind furniture.
     ``variant`` asks for the backend that traces what occludes; None is for no occlusion.
 
-    Of a model that says ``fast_over_walls`` the room takes one formula for the echoes over all
-    paths, ``conductor_echo``, or the direct echoes, one a part, and follows specular points over
-    walls itself. Of any other level each path has a model before the images of the antennas over
-    its legs. ``paths`` are all paths, the direct one first, and ``path_names`` theirs; ``faces``
-    says of each face of furniture whether paths lead over it; ``not_followed``, known after
-    `prune`, are the walls whose frequency response is not known to `FIELD_ERROR`, with the fraction
-    of the echo power that meets each. Of the weakest echoes that a tolerance leaves out
-    ``left_out`` is the number and ``left_out_m2`` the mean power [m^2].
+    From a model that says ``fast_over_walls`` the room takes one formula for the echoes over all
+    paths, ``conductor_echo``; or it takes the direct echoes, one a part, and follows specular
+    points over walls itself. For any other level each path has a model before the images of the
+    antennas over its legs. ``paths`` are all paths, the direct one first, and ``path_names`` their
+    names; ``faces`` says of each face of furniture whether paths lead over it; ``not_followed``,
+    known after `prune`, are the walls whose frequency response is not known to `FIELD_ERROR`, with
+    the fraction of the echo power that meets each. ``left_out`` is the number of the weakest echoes
+    that a tolerance leaves out, and ``left_out_m2`` their mean power [m^2].
     """
 
     def __init__(
@@ -105,12 +106,15 @@ class RoomModel:
     ) -> None:
         check_order(order)
         self._before, self._radar, self._body = before, radar, body
+        # The level itself, a conductor before the radar's own antennas.
         self._conductor = conductor = before(radar)
         self._fast = bool(getattr(conductor, "fast_over_walls", False))
         self._models: dict[int, EchoModel] = {0: conductor}
+        # What the walls do to a wave over the sweep.
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
         )
+        # What occludes: furniture and objects, and the body itself.
         room, occluders = None, None
         self.person: EchoModel = self
         if not scene.is_empty:
@@ -122,6 +126,7 @@ class RoomModel:
             self.variant, mi = backend.kind, use(backend)
             room = Occluders(mi, scene)
             occluders = BodyTracer(mi, body.semi_axes), SolidEdges(room, scene, radar)
+        # Which faces of furniture are worth paths, from any place of a radar that moves.
         faces: tuple[Face, ...] = ()
         self.faces: tuple[FaceSummary, ...] = ()
         places = _places(radar)
@@ -134,16 +139,18 @@ class RoomModel:
             found = [reflecting_faces(scene, radar, own, body, room) for own in places]
             faces = tuple(dict.fromkeys(face for some, _ in found for face in some))
             self.faces = _summaries([summaries for _, summaries in found])
+        # All paths from all these places, each once, those with fewer reflections first.
         paths = [wall_paths(scene.walls, place, order, faces) for place in places]
         self.paths = tuple(
             sorted(dict.fromkeys(chain.from_iterable(paths)), key=lambda path: path.order)
         )
         self.path_names = tuple(path.name for path in self.paths)
+        # Everything that a path may meet, for the keyframes.
         every = *series.walls, *(HALF_SPACE,) * len(faces)
         walls = WallResponse(WallEdges.of(scene.walls, radar, faces), every, series.frequency)
         self._legs = LegImages.of(radar, self.paths)
         columns = EchoColumns(self.paths, len(body.part_names), walls, self._legs)
-        # Of one path it costs little to look from every Tx.
+        # With one path alone it costs little to look from every Tx.
         ends = ArrayEnds.of(radar, max(map(len, radar.tx_lines)) if scene.is_empty else 2)
         self._around = Surroundings(
             radar,
@@ -177,8 +184,8 @@ class RoomModel:
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Compute the echoes at some chirps.
 
-        Of a fast model the direct echo of each part comes first, then those over walls, then what
-        slabs delay; of any other the echoes come path by path.
+        For a fast model the direct echo of each part comes first, then the echoes over walls, then
+        those that slabs delay; for any other model the echoes come path by path.
         """
         chirps = np.asarray(chirps, dtype=np.int64)
         return self.optical_echoes(chirps) if self._fast else self._by_paths(chirps)
@@ -195,6 +202,7 @@ class RoomModel:
         formula = getattr(self._conductor, "conductor_echo", None) if self._fast else None
         n_direct, by_model = at.centres.shape[1], self._fast and formula is None
         wanted |= ghosts
+        # The direct echoes of a level that is no formula come from its own model.
         wanted[:, :n_direct] &= not (ghosts or by_model)
         # Lengths and bare amplitudes, as if walls were perfect mirrors.
         there, legs = self._images(at)
@@ -208,7 +216,7 @@ class RoomModel:
             length = columns.lengths(legs, there, points, length)
             # Contiguous, or Numba would compile the same for another layout.
             bare = np.ascontiguousarray(bare[..., echo])
-        # Times what walls, the body's surface and occluders leave.
+        # Multiply by what walls, the body's surface and occluders leave.
         frequency = self._around.walls.frequency
         if all(bool((own.factor == own.factor[:, :1]).all()) for own in factors):
             # Nothing changes over the sweep, as with the direct echoes of a conductor.
@@ -263,15 +271,17 @@ class RoomModel:
         left = np.empty((len(nodes), *extra.shape), dtype=np.complex64)
         in_threads(path_amplitudes, len(extra), np.ones(extra.shape), *factors, blend, left)
         found = []
+        # Each path's own model, times what is left of it.
         for path in np.unique(columns.path[echo]).tolist():
             own = self._model(path).echoes(chirps)
             # Each of its echoes in each column of its part.
             column = np.flatnonzero(columns.path[echo] == path)
+            # An echo of the model appears once for each column of its part.
             which, place = np.nonzero(own.part[:, None] == columns.part[echo[column]])
             column = column[place]
             factor = left[..., column]
             if not around.surfaces.conduct:
-                # Each further bounce, wherever it is, takes what one straight on does.
+                # Each further bounce, wherever it is, counts as one at normal incidence.
                 straight = around.surfaces.straight[own.part[which]]
                 factor = factor * straight ** (own.bounces[which] - 1)
             found.append(
@@ -307,17 +317,18 @@ class RoomModel:
         """Leave out echoes over walls that are too weak to matter, and summarize each path.
 
         One chirp every 100 ms of the capture is evaluated, by geometric optics; without noise, or
-        if these were too few, one every 20 ms. Left out is an echo whose mean power, after the gain
-        of the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the noise of
-        one IF sample [m^2]; without noise, what is never visible. Window functions, which lose 1.8
-        dB each (Hann), are not counted: what is left out is weaker than that. Of the others the
-        weakest go whose mean powers add up to at most ``tolerated_m2`` [m^2]. Direct echoes always
-        stay.
+        if these were too few, one every 20 ms. An echo is left out if its mean power, after the
+        gain of the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the
+        noise of one IF sample [m^2]; without noise, if it is never visible. Window functions, which
+        lose 1.8 dB each (Hann), are not counted: what is left out is weaker than that. Then the
+        weakest of the others go, whose mean powers add up to at most ``tolerated_m2`` [m^2]. Direct
+        echoes always stay.
         """
         radar, columns = self._radar, self._columns
         evaluated = chirps_by_steps(radar, n_chirps, self._keyframes.step)
         if noise_power_m2 > 0:
             evaluated = evaluated[:: max(1, min(_LOOK_EVERY, len(evaluated) // _LEAST_LOOKS))]
+        # The mean power of each column; new columns may be found on the way.
         power = np.zeros(len(columns))
         for first in range(0, len(evaluated), _CHIRPS_AT_ONCE):
             echoes = self.optical_echoes(evaluated[first : first + _CHIRPS_AT_ONCE])
@@ -325,16 +336,19 @@ class RoomModel:
             found[: len(power)] += power
             power = found
         power /= len(evaluated)
+        # Which fraction of the power meets walls whose response is not followed well enough.
         walls = columns.not_followed()
         self.not_followed = {
             name: float(power[[name in own for own in walls]].sum() / power.sum())
             for name in sorted(set().union(*walls))
             if power.sum() > 0
         }
+        # The noise after the gain of a frame, against which each echo is judged.
         noise = noise_power_m2 / (
             radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
         )
         worth = (power > 0) & (power >= noise * 10 ** (-MARGIN_DB / 10))
+        # Of the ghosts that are strong enough, the weakest still go, up to the tolerance.
         echo, direct = np.array(columns.echo), columns.direct
         echo_power = np.zeros(len(direct))
         np.add.at(echo_power, echo, power)
@@ -342,6 +356,7 @@ class RoomModel:
         lost = ghosts[weakest(power[ghosts], tolerated_m2)]
         self.left_out, self.left_out_m2 = len(lost), float(power[lost].sum())
         worth[lost] = False
+        # An echo stays if any of its columns does.
         keep, faint = direct.copy(), np.zeros_like(direct)
         keep[echo[worth]], faint[echo[lost]] = True, True
         names = np.array(self._body.part_names, dtype=object)[columns.part]
@@ -378,5 +393,5 @@ def _places(radar: Radar) -> Array:
 
 
 def _summaries(found: Sequence[tuple[FaceSummary, ...]]) -> tuple[FaceSummary, ...]:
-    """What became of each face: that of the first place at which it was taken, or of the first."""
+    """Summarize each face: as at the first place from which it was taken, or at the first place."""
     return tuple(min(own, key=lambda one: bool(one.reason)) for own in zip(*found, strict=True))

@@ -1,10 +1,11 @@
 """What a wall reflects and transmits: a few echoes, each with its delay and a smooth coefficient.
 
-The wave goes to and fro between the faces of a slab. After ``p`` passes, each a factor q, it has
-left by the far face if p is odd and by the near one if p is even: the terms of a series whose sum
-is the slab's coefficient. The phase of q is a delay, tens of radians over the sweep for a brick: it
-goes into the length of an echo, and the rest into its amplitude. A term may hold the rest of the
-series too. For a thin slab one term serves, which holds all of the series and has no delay.
+The wave goes to and fro between the faces of a slab. After ``p`` passes, each a factor q, it leaves
+by the far face if p is odd and by the near one if p is even. These are the terms of a series whose
+sum is the slab's coefficient. The phase of q is a delay, tens of radians over the sweep for a
+brick: it goes into the length of an echo, and the rest into its amplitude. A term may hold the rest
+of the series too. For a thin slab one term is enough, which holds the whole series and has no
+delay.
 
 **Fields** after reflections and passages are vectors: a wave carries its electric field as a
 complex 3-vector, for exp(+j omega t), without the phase of its straight path through air. A wall
@@ -48,7 +49,7 @@ DENSE_NODES = 33
 """Number of frequencies that stand for the whole sweep."""
 _COSINES = np.linspace(0.2, 1.0, 9)
 _FAINT = 1e-3
-"""Smaller coefficients, with their power in the echo, need no accuracy: they are 60 dB down."""
+"""Coefficients below this need no accuracy, with the power that they have in an echo: -60 dB."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ class Term:
         """
         if not self.index_squared:
             return np.zeros_like(cosine)
+        # The refracted path within the slab, times the index; a transmitted wave saves the air of
+        # one passage.
         within = self.passes * thickness_m * np.sqrt(self.index_squared - 1 + cosine**2)
         return np.asarray(within - thickness_m * cosine if self.passes % 2 else within)
 
@@ -85,15 +88,18 @@ class Term:
     ) -> Field:
         """Compute the factor (...) for the field, without the phase of `extra_m`.
 
-        A transmitted field is relative to that after the same way through air.
+        A transmitted field is relative to the field after the same path through air.
         """
         if self.solid:
             return reflection(wall.material.eta(frequency), cosine, polarization)
+        # A whole slab has a closed form; else this many passes, and perhaps all later ones.
         arguments = wall.material.eta(frequency), wall.thickness_m, frequency, cosine, polarization
         if self.whole:
             factor = slab(*arguments)[self.passes % 2]
         else:
             factor = slab_passes(*arguments, self.passes, rest=self.rest)
+        # The phase of the extra length is taken out. A transmitted wave is relative to air, whose
+        # phase over the thickness is taken out as well.
         extra = self.extra_m(wall.thickness_m, cosine)
         if self.passes % 2:
             extra = extra + wall.thickness_m * cosine
@@ -135,6 +141,7 @@ def room_series(
     ``bounces``, on a path; at most 2 count. A wall is always transmitted through both ways.
     """
     powers = min(max(bounces, 1), 2), 2
+    # Walls of one material and thickness have one series.
     known: dict[tuple[Material, float], tuple[WallSeries, int]] = {}
     for wall in walls:
         key = wall.material, wall.thickness_m
@@ -145,6 +152,7 @@ def room_series(
             )
             known[key] = WallSeries((back, on), (one, other)), max(first, second)
     chosen = tuple(known[wall.material, wall.thickness_m][0] for wall in walls)
+    # One set of nodes serves all walls.
     nodes = max((nodes for _, nodes in known.values()), default=1)
     return RoomSeries(chosen, sweep_nodes(radar, nodes))
 
@@ -160,13 +168,15 @@ def _fewest(
     """Terms, how many nodes they need, and whether ``most_nodes`` are enough for them."""
     if wall.material.conducts:
         return (WHOLE[passes],), 1, True
+    # Candidates are judged against the exact coefficient at many frequencies and angles.
     dense = sweep_nodes(radar, DENSE_NODES)
     index_squared = _index_squared(wall.material, radar)
     # The stronger polarisation at each angle.
     whole = _products(wall, (WHOLE[passes],), dense, power)
     scale = np.sqrt((np.abs(whole) ** 2).mean(axis=1)).max(axis=(0, 1))
     if not (scale > _FAINT).any():
-        # Next to nothing is reflected or transmitted: that is delayed, but not known well.
+        # Next to nothing is reflected or transmitted. Transmission has a delay all the same, and
+        # counts as not followed.
         return ((WHOLE[0],) if passes == 0 else next(_delayed(1, index_squared))), 1, passes == 0
     scale = np.where(scale > _FAINT, scale, np.inf)
 
@@ -177,6 +187,8 @@ def _fewest(
         known = np.einsum("fn,tnpc->tfpc", weights, _products(wall, terms, nodes, power))
         return float((np.abs(known - exact).sum(axis=0).max(axis=(0, 1)) / scale).max())
 
+    # First the whole coefficient as one term, then series of more and more delayed terms: the first
+    # that polynomials follow, or the best of all.
     least = math.inf
     best: tuple[Term, ...] = (WHOLE[passes],)
     for terms in ((WHOLE[passes],), *_delayed(passes, index_squared)):
@@ -209,6 +221,7 @@ def _products(wall: Wall, terms: Sequence[Term], frequency: Array, power: int) -
 
 def _index_squared(material: Material, radar: Radar) -> float:
     """Square of the group index, by which the sweep as a whole is delayed at normal incidence."""
+    # The group index is the slope of the phase over frequency.
     ends = radar.start_frequency_hz + np.array([0.0, radar.bandwidth_hz])
     phase = ends * np.sqrt(material.eta(ends)).real
     return max(float((phase[1] - phase[0]) / (ends[1] - ends[0])), 1.0) ** 2
@@ -226,14 +239,15 @@ def after_slab(
     """Compute the field after reflection, or behind the wall, by one term of its slab.
 
     The incident field (node, ..., 3), or (..., 3) for all nodes, travels along the unit vectors
-    ``directions (..., 3)``. The roughness s of the wall takes exp(-2 (k s cos)^2) off what is
-    reflected (Ament, Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3), without the
-    phase of its path and of the term's extra length: at the face that reflects, or behind the wall
-    over that of the same way through air. A transmitted ray goes straight on: its small shift to
-    the side is left out, its phase is not.
+    ``directions (..., 3)``. The roughness s of the wall multiplies the reflected field by
+    exp(-2 (k s cos)^2) (Ament, Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3),
+    without the phase of its path and of the term's extra length: at the face that reflects, or
+    behind the wall relative to the same path through air. A transmitted ray goes straight on: its
+    small shift to the side is left out, its phase is not.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     ways, reflects = np.asarray(directions, dtype=np.float64), term.passes % 2 == 0
+    # Direction after the face, and the coefficient of each node and angle, TE and TM apart.
     along = ways @ wall.normal
     leaving = ways - 2 * along[..., None] * wall.normal if reflects else ways
     cosine, each = np.minimum(np.abs(along), 1.0), frequency.reshape(-1, *[1] * along.ndim)
@@ -268,7 +282,7 @@ class Wave(NamedTuple):
 
 
 class Carried(NamedTuple):
-    """A leg by its corners [m], what the extents of its faces leave, directions, and the waves."""
+    """A leg by its corners [m], what the extents of its faces leave, its directions and waves."""
 
     corners: list[Array]
     extent: Field
@@ -318,6 +332,8 @@ class WallResponse(NamedTuple):
         the directions (..., 3) the unit vectors of the sections between corners.
         """
         waves = self.start(field)
+        # Every section first reflects at the corner where it begins, then passes the walls on its
+        # way.
         for section, (origins, targets) in enumerate(pairwise(corners)):
             if section:
                 wall = self.edges.surfaces.index(leg[section - 1].wall)
@@ -333,6 +349,7 @@ class WallResponse(NamedTuple):
         wall = self.edges.surfaces[number]
         cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
         out = []
+        # Each wave becomes as many as the wall has terms.
         for passages, extra, field in waves:
             for term in self.series[number].terms[0]:
                 sent = after_slab(wall, field, directions, self.frequency, term)
@@ -350,12 +367,15 @@ class WallResponse(NamedTuple):
         spreading and without the phase of the section's length, and 0 behind metal. What goes past
         the edges of a wall, or through its openings, goes on as it is.
         """
+        # Only walls that some section crosses need a closer look.
         crossed = self.edges.crossed(origins, targets)
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
         )
         for number in crossed:
             wall = self.walls[number]
+            # The part of the wave that meets the wall is taken off what goes past, and comes back
+            # by the terms of the slab.
             across, met = self.edges.passage(number, origins, targets)
             if not across.any():
                 continue
@@ -364,10 +384,12 @@ class WallResponse(NamedTuple):
             cosine = np.minimum(np.abs(ways @ wall.normal), 1.0)
             came, waves = waves, []
             for passages, extra, field in came:
-                # Those that do not cross go on as they are.
+                # Waves that do not cross the wall go on as they are.
                 past, comes = field.copy(), field[:, across] * met[:, None]
                 past[:, across] -= comes
                 for term in self.series[number].terms[1]:
+                    # A term without a delay joins what goes past in one wave; each delayed term is
+                    # a wave of its own.
                     passed = past if term.whole else np.zeros_like(field)
                     passed[:, across] += after_slab(wall, comes, ways, self.frequency, term)
                     if not term.whole:

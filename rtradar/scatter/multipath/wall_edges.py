@@ -2,14 +2,14 @@
 
 Physical optics sums over the face what each of its points sends on. About the specular point that
 sum is a product of two Fresnel integrals, one for each direction along the rectangle, between its
-edges (Born and Wolf, Principles of Optics, section 8.7). Each edge counts by the way that the wave
-makes longer over it, the detour: exact for a straight edge alone, at any incidence. By Babinet's
-principle a wave goes past a wall with 1 minus what its face would send on, and an opening takes its
-own part from its wall.
+edges (Born and Wolf, Principles of Optics, section 8.7). Each edge counts by the detour, which is
+how much longer the path over the edge is: this is exact for a straight edge alone, at any
+incidence. By Babinet's principle a wave goes past a wall with 1 minus what its face would send on,
+and an opening takes its own part from its wall.
 
-An edge that lies on another wall is not free: there the face goes on in the image of the other, and
-ends as the image method has it. What comes over an edge later than the range resolution of the
-sweep shows elsewhere, and weakly: it is left out.
+An edge that lies on another wall is not free: there the face goes on in the image of the other
+wall, and ends as the image method has it. What comes over an edge with a delay beyond the range
+resolution of the sweep shows elsewhere, and weakly: it is left out.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class WallEdges:
     @classmethod
     @lru_cache(maxsize=8)
     def of(cls, walls: tuple[Wall, ...], radar: Radar, faces: tuple[Face, ...] = ()) -> WallEdges:
-        """Make those for the sweep of a radar."""
+        """Make the edges for the sweep of a radar."""
         light = SPEED_OF_LIGHT_MPS
         return cls(walls, light / radar.centre_frequency_hz, light / radar.bandwidth_hz, faces)
 
@@ -96,10 +96,13 @@ class WallEdges:
         reflection may also lie beside their rectangles, and the factor (...) for the field, 0 where
         there is no such leg. The margin [m] moves the edges that are not free.
         """
+        # The leg as if its faces were endless; each face then weights it by its own extent.
         along, valid = corners(leg, antennas, points, margin_m, beside_m=np.inf)
         weight = valid.astype(np.complex128)
         sources = np.broadcast_arrays(*image_chain(leg, antennas), points)[1:-1]
         ends = np.broadcast_to(points, along[0].shape)
+        # Each face is passed by the straight line from the image before it to the far end, which is
+        # mirrored in turn.
         for face, source in zip(reversed(leg), reversed(sources), strict=True):
             number = self.surfaces.index(face.wall)
             weight[valid] *= self.weight(
@@ -113,6 +116,7 @@ class WallEdges:
 
         The ends (..., 3) [m] broadcast against each other. Most legs in a room cross none.
         """
+        # A leg crosses a wall if its ends are on different sides of the middle plane.
         sides = [np.asarray(ends) @ self._normals.T - self._middles for ends in (origins, targets)]
         across = sides[0] * sides[1] < 0
         return np.flatnonzero(across.any(axis=tuple(range(across.ndim - 1)))).tolist()
@@ -132,8 +136,8 @@ class WallEdges:
         """Tell which straight legs pass through a wall, and how much of each.
 
         The ends (..., 3) [m] of those that do are on different sides of the slab's middle plane, so
-        a leg that ends on a face does not cross it. Returned are (...), and the factor (crossing,)
-        of what meets the wall; the rest goes past it, or through its openings.
+        a leg that ends on a face does not cross it. Returned are which legs pass (...), and the
+        factor (crossing,) of what meets the wall; the rest goes past it, or through its openings.
         """
         wall = self.walls[number]
         origins, targets = np.broadcast_arrays(origins, targets)
@@ -141,7 +145,8 @@ class WallEdges:
         across = (height(wall, origins) + half) * (height(wall, targets) + half) < 0
         if not across.any():
             return across, np.zeros(0, dtype=np.complex128)
-        # Where they pass the front: the fronts of a room meet, the middles of its slabs do not.
+        # Extents count where legs pass the front: the fronts of a room meet, but the middles of its
+        # slabs do not.
         met = self.weight(number, origins[across], targets[across])
         across[across] = met != 0
         return across, met[met != 0]
@@ -155,12 +160,13 @@ class WallEdges:
         back: bool = False,
         margin_m: float = 0.0,
     ) -> Field:
-        """Compute what a face sends on of waves, over all that an endless one would, (leg,).
+        """Compute the fraction of a wave that a face sends on, an endless one being 1, (leg,).
 
         The straight legs from sources to targets (leg, 3) [m] cross the plane of the front, or of
         the back; in a reflection sources are images.
         """
         wall = self.surfaces[number]
+        # An opening takes its own part from that of its wall; patches of a face add up.
         source, target = (_on_face(wall, points, back) for points in (sources, targets))
         parts = [self._between(sides, source, target, margin_m) for sides in self._sides[number]]
         if isinstance(wall, SolidFace):
@@ -168,11 +174,13 @@ class WallEdges:
         return np.asarray(parts[0] - sum(parts[1:]))
 
     def _between(self, sides: Sides, source: Array, target: Array, margin_m: float) -> Field:
-        """The same for one rectangle; source and target (3, leg) are in the axes of the face."""
+        """Do as `weight` for one rectangle; source and target (3, leg) are in the face's axes."""
+        # Where the straight leg meets the plane of the face.
         gap = source[2] - target[2]
         fraction = source[2] / np.where(gap == 0, 1.0, gap)
         places = source[:2] + fraction * (target[:2] - source[:2])
         whole = np.ones(source.shape[1], dtype=np.complex128)
+        # The product of the two directions; along each it is the sum over both edges, less 1.
         for axis, (ends, free) in enumerate(zip(sides.ends, sides.free, strict=True)):
             part = np.full(whole.shape, -1.0 + 0j)
             for side, end, soft in zip((1, -1), ends, free, strict=True):
@@ -188,8 +196,9 @@ class WallEdges:
     def _past_edge(self, depth: Array, detour: Array) -> Field:
         """Field of a half plane over that of a whole one, by the depth of the leg within it [m]."""
         out = (depth >= 0).astype(np.complex128)
-        # Over the sweep, what an edge sends turns against the rest: the mean of it stays.
+        # Over the sweep, the wave of an edge turns against the straight one: its mean stays.
         near = detour < self.resolution_m
+        # A detour over the range resolution shows elsewhere: there the edge counts as sharp.
         longer, lit = detour[near], out[near]
         number = np.copysign(2 * np.sqrt(longer / self.wavelength_m), depth[near])
         out[near] += (half_plane(number) - lit) * np.sinc(longer / self.resolution_m)
@@ -207,6 +216,8 @@ def half_plane(number: Array) -> Field:
 
 def _detour(source: Array, target: Array, axis: int, end: float) -> Array:
     """How much longer the shortest way over the line of an edge is than the straight leg [m]."""
+    # The distances of both ends from the line of the edge. Unfolded about that line, the shortest
+    # path over it is straight.
     one, other = (np.stack([place[axis] - end, place[2]]) for place in (source, target))
     first, last = np.hypot(*one), np.hypot(*other)
     over = np.hypot(first + last, source[1 - axis] - target[1 - axis])
@@ -238,6 +249,7 @@ def _rectangles(wall: Wall) -> list[Array]:
 def _free(wall: Wall, ends: Array, walls: Sequence[Wall]) -> Bools:
     """Which edges of a rectangle do not lie on another wall, (2, 2)."""
     along_u, along_v, _ = _axes(wall)
+    # An edge is free if some place along it lies on no other wall.
     free = np.empty((2, 2), dtype=bool)
     for axis, side in np.ndindex(2, 2):
         across = ends[1 - axis, 0] + _PLACES * np.ptp(ends[1 - axis])
