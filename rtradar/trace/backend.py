@@ -4,11 +4,12 @@ Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for
 process. Versions 15 and 16 are loaded and then abort the process, so a library is tried in another
 process before it is loaded here.
 
-Dr.Jit has one thread in this process until many rays come at once, and none is taken away. Its
-threads wait for work awake, 20 ms each time, on cores on which ours have other work: for few rays
-that costs more than it saves. To take them away again is not possible. Dr.Jit 1.5.0 tells a thread
-to stop and then looks whether it sleeps, without a fence in between. One that falls asleep in that
-moment gets no message, and `set_thread_count` waits for it for ever.
+Dr.Jit has one thread in this process until many rays come at once; threads are then added and never
+taken away. Its threads stay awake for 20 ms while they wait for work, on cores on which our threads
+have other work: for few rays that costs more than it saves. Threads cannot be taken away again.
+Dr.Jit 1.5.0 tells a thread to stop and then looks whether it sleeps, without a fence in between. A
+thread that falls asleep in that moment gets no message, and `set_thread_count` waits for it for
+ever.
 """
 
 from __future__ import annotations
@@ -57,10 +58,10 @@ class BackendWarning(UserWarning):
 class Backend:
     """A Mitsuba variant that works on this machine.
 
-    ``kind`` is the name that users give it, ``variant`` Mitsuba's. ``llvm_path`` is the libLLVM for
-    Dr.Jit, whatever the kind: it is loaded once and must work if the kind is changed later;
-    ``llvm_version`` is that of this library. ``warning`` says in one line why the variant is slower
-    than it could be, and what to install.
+    ``kind`` is the name that users give it, ``variant`` is Mitsuba's name. ``llvm_path`` is the
+    libLLVM for Dr.Jit, whatever the kind: it is loaded once and must work if the kind is changed
+    later; ``llvm_version`` is the version of this library. ``warning`` says in one line why the
+    variant is slower than it could be, and what to install.
     """
 
     kind: Kind
@@ -72,7 +73,7 @@ class Backend:
 
 @warming_up()
 def select(variant: str = "auto") -> Backend:
-    """The backend to use.
+    """Choose the backend to use.
 
     ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does,
     with a `BackendWarning`. A GPU traces rays only where ``cuda`` is named. An `InputError` is
@@ -88,10 +89,13 @@ def select(variant: str = "auto") -> Backend:
             raise BackendError(
                 f"the package {package} is not installed; install it: pip install mitsuba"
             )
+    # A libLLVM is settled whatever the kind, because Dr.Jit loads one when it is imported and keeps
+    # it.
     library, result, trouble = _first_good()
     kind = next((name for name in VARIANTS if name == variant), "llvm" if library else "scalar")
     if kind == "llvm" and library is None:
         raise BackendError(trouble)
+    # A GPU has to be tried each time; it may have gone.
     if kind == "cuda":
         probed = probe_backend(VARIANTS["cuda"], library)
         if not probed.good:
@@ -100,6 +104,7 @@ def select(variant: str = "auto") -> Backend:
                 "with OptiX; use --variant auto to run on the CPU"
             )
     path, version = (library.path, result.version) if library and result else (None, None)
+    # Only a choice that fell to scalar by itself is warned of.
     warning = None
     if kind == "scalar" and variant != "scalar":
         warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
@@ -109,24 +114,27 @@ def select(variant: str = "auto") -> Backend:
 
 @warming_up()
 def use(backend: Backend) -> ModuleType:
-    """Mitsuba with that variant set; may be called again, with the same backend or another one.
+    """Set Mitsuba's variant and return Mitsuba; may be called again, also with another backend.
 
     Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
     thread until many rays come (`grow_for`); where it was imported before, it keeps the threads it
     has. A `BackendError` is raised if Dr.Jit was imported with another libLLVM since the backend
     was selected, or the variant cannot be set.
     """
+    # What Dr.Jit has loaded stays for the life of the process.
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules
     if backend.kind == "llvm" and loaded not in (None, backend.llvm_version):
         raise BackendError(_loaded_before(loaded))
+    # Dr.Jit reads the variable when it is imported: what the user named there is put back
+    # afterwards.
     named = os.environ.get(ENVIRONMENT_VARIABLE)
     try:
         if backend.llvm_path is not None:
             os.environ[ENVIRONMENT_VARIABLE] = backend.llvm_path
         import mitsuba as mi
 
-        # Whoever imported Dr.Jit before us may have computed with it, and sets its threads.
+        # A program that imported Dr.Jit before us may have computed with it: its threads stay.
         if first:
             import drjit as dr
 
@@ -138,7 +146,7 @@ def use(backend: Backend) -> ModuleType:
         raise BackendError(
             f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor"
         ) from error
-    finally:  # only Dr.Jit was to read it
+    finally:  # the variable was meant for Dr.Jit alone
         os.environ.pop(ENVIRONMENT_VARIABLE, None)
         if named is not None:
             os.environ[ENVIRONMENT_VARIABLE] = named
@@ -168,6 +176,7 @@ def _first_good() -> tuple[Library | None, ProbeResult | None, str]:
     """The first library that works and its result, or None twice and what is wrong."""
     loaded = loaded_llvm_version()
     refused = []
+    # The first candidate that works is taken, unless Dr.Jit has loaded another one already.
     for library in candidates():
         result = probe_backend(VARIANTS["llvm"], library)
         if result.good and loaded in (None, result.version):
@@ -201,6 +210,7 @@ def grow_for(mi: Any, rays: int) -> None:
         return
     import drjit as dr
 
+    # Threads are added once, by whichever thread of ours comes first.
     with _ONE_AT_A_TIME:
         if dr.thread_count() < thread_count():
             dr.set_thread_count(thread_count())

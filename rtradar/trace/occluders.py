@@ -19,22 +19,24 @@ from rtradar.trace.tracers import BodyTracer, MeshTracer
 Array = NDArray[np.float64]
 
 _KEPT = 8
-"""Poses of meshes that are kept, 5 MB each: all paths ask for the same times."""
+"""Poses of meshes that are kept, 5 MB each, because all paths ask for the same times."""
 
 
 class Occluders:
     """The furniture and the moving objects of a scene, and people if there is a ``body``.
 
-    People are ellipsoids, or the mesh of who has one. ``mi`` is Mitsuba with its variant set.
+    People are ellipsoids, or their mesh if they have one. ``mi`` is Mitsuba with its variant set.
     """
 
     def __init__(self, mi: Any, scene: Scene, body: Body | None = None) -> None:
         self.mi, self._body = mi, body
+        # All furniture is one mesh, which stands still; each object has a scene of its own axes.
         pieces = [piece.triangles().corners for piece in scene.furniture]
         self._still = MeshTracer(mi, np.concatenate(pieces)) if pieces else None
         self._moving = [(own, MeshTracer(mi, own.shape.corners)) for own in scene.objects]
         people = () if body is None else body.people
         self._meshes = [(one, one.mesh) for one in people if one.mesh is not None]
+        # Ellipsoids of everybody without a mesh are one body.
         if body is not None:
             others = [n for n, person in enumerate(people) if person.mesh is None]
             self._parts = np.flatnonzero(np.isin(body.owner, others))
@@ -61,10 +63,12 @@ class Occluders:
         )
         shape = starts.shape[:-1]
         starts, ends = starts.reshape(-1, 3), ends.reshape(-1, 3)
+        # What stands still comes first, because it needs no poses.
         clear = np.ones(len(starts), dtype=bool)
         if clear.size and self._still is not None:
             clear = ~self._still.between(starts, ends)
         if clear.size and times is not None:
+            # Poses are computed once for each instant; only rays that are still free go on.
             moments, moment = np.unique(np.broadcast_to(times, shape), return_inverse=True)
             moment = moment.ravel()
             for moving, tracer in self._moving:
@@ -82,8 +86,9 @@ class Occluders:
     def _past_people(
         self, origins: Array, targets: Array, moments: Array, moment: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """Which ways (ray,) past all people are clear, each at one ``moment (ray,)`` of several."""
+        """Which lines (ray,) people leave clear, each at one ``moment (ray,)`` of several."""
         assert self._body is not None
+        # Outside of the recording people rest in their first or last pose.
         moments = np.clip(moments, 0.0, self._body.duration_s)
         clear = np.ones(len(origins), dtype=bool)
         if len(self._parts):
@@ -92,6 +97,7 @@ class Occluders:
             numbers = np.arange(len(moments))
             none = np.full_like(numbers, -1)
             clear = self._ellipsoids.clear(origins, targets, moment, none, numbers, own)
+        # Skins bend, so each instant has a mesh of its own.
         for number in np.unique(moment) if self._meshes else ():
             for skin in self._skins_at(float(moments[number])):
                 left = np.flatnonzero(clear & (moment == number))

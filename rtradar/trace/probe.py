@@ -1,7 +1,7 @@
 """Where a libLLVM may be, and whether a Mitsuba variant works with it.
 
-It is the one of the environment variable, of the wheel or of the system. Each is tried in another
-process, and the answer is kept on disk.
+It may be named by the environment variable, or come with the wheel or with the system. Each is
+tried in another process, and the answer is kept on disk.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Library(NamedTuple):
 
     @property
     def version(self) -> str | None:
-        """As far as the file's name tells; None where it tells nothing."""
+        """Version as far as the file's name tells it; None where it tells nothing."""
         name = _NAME.fullmatch(Path(self.path).name)
         return (name["dashed"] or name["dotted"]) if name else None
 
@@ -71,6 +71,7 @@ def candidates() -> list[Library]:
 
     The environment variable goes first, then the wheel, then what the system has, newest first.
     """
+    # By their real paths, so that links to one file count once.
     named = os.environ.get(ENVIRONMENT_VARIABLE)
     found = {os.path.realpath(named): Library(named, "environment")} if named else {}
     system = {path: Library(path, "system") for path in _libraries(_of_system())}
@@ -81,7 +82,7 @@ def candidates() -> list[Library]:
 
 
 def _newness(item: tuple[str, Library]) -> list[float]:
-    # A file without a number is what the package manager calls its current one.
+    # A file without a number is the current version of the package manager.
     return [float(number) for number in (item[1].version or "inf").split(".")]
 
 
@@ -98,7 +99,7 @@ def _of_wheel() -> list[Path]:
 
 
 def _of_system() -> Iterator[Path]:
-    # A Python of conda's has its libraries beside it.
+    # A Python from conda has its libraries beside it.
     own = (f"{prefix}/lib/libLLVM*" for prefix in (sys.prefix, sys.base_prefix))
     for pattern in (*own, *_SYSTEM_PATTERNS.get(sys.platform, ())):
         yield from Path("/").glob(pattern.lstrip("/"))
@@ -111,14 +112,14 @@ _PROBE = Path(__file__).with_name("probe_script.py")
 
 _SIGNALS = signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)
 _STOPPED = {None, *(-number for number in _SIGNALS)}
-"""Ends that say nothing about the library: none in time, and signals that somebody sent."""
+"""Exit statuses that say nothing about the library: none in time, and signals somebody sent."""
 
 _FINDINGS = {
     "is too old": "refused by Dr.Jit: too old",
     "Unable to load": "cannot be loaded",
     "the CUDA backend": "no CUDA driver or no GPU",
 }
-"""What it means that Dr.Jit says so."""
+"""What messages of Dr.Jit mean."""
 
 
 class ProbeResult(NamedTuple):
@@ -158,10 +159,10 @@ def probe_backend(variant: str, library: Library | None, *, fresh: bool = False)
 
 
 def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int | None]:
-    """What it found, and the status with which it ended; None where it did not."""
+    """Return what the probe found, and its exit status, None where it did not end."""
     version = library.version if library else None
     with temporary_folder() as kernels:
-        # An empty kernel cache: the result must not come from what another libLLVM compiled.
+        # An empty kernel cache, so that no kernel of another libLLVM gives the result.
         environment = {**os.environ, "DRJIT_CACHE_DIR": str(kernels)}
         if library is not None:
             environment[ENVIRONMENT_VARIABLE] = library.path
@@ -172,6 +173,7 @@ def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int | No
             done = subprocess.run(command, capture_output=True, timeout=TIMEOUT_S, **options)
         except subprocess.TimeoutExpired:
             return ProbeResult(f"hangs: no answer in {TIMEOUT_S:.0f} s", version), None
+    # The script prints JSON in two lines, the second only if the kernel did not abort.
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     said = {key: value for line in lines for key, value in line.items()}
     if (found := said.get("llvm_version", [-1]))[0] > 0:
@@ -208,6 +210,7 @@ def cache_dir() -> Path:
 
 def _kept_in(variant: str, library: Library | None) -> Path | None:
     """File of an answer, named by all that it depends on; None where that is unknown."""
+    # A new version, another file of the library or another script is another question.
     try:
         versions = [importlib.metadata.version(name) for name in ("mitsuba", "drjit")]
         about = () if library is None else (library.path, os.stat(library.path).st_mtime_ns)

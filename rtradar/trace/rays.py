@@ -1,7 +1,7 @@
 """Ask Mitsuba about rays, on every backend, and count what it was asked.
 
 Mitsuba works in float32. So scenes are centred, each ray starts where it enters the ball around its
-scene, and of the answer only what is met, and roughly how far, is used.
+scene, and only what is met, and roughly how far away, is used of the answer.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _LANES = 16
 """Numbers of float32 in the widest vectors."""
 
 _LEAST_RAYS = 4096
-"""Rays traced at once, with idle ones among them: else the memory that Dr.Jit keeps for itself
-would grow with the largest number that ever came."""
+"""Least number of rays traced at once, filled up with idle ones: else the memory that Dr.Jit keeps
+for itself would grow with the largest number that ever came."""
 
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -62,6 +62,7 @@ class Shapes:
         count = _count(rays.shape[1])
         if count == 0:
             return np.zeros(0, dtype=np.bool_)
+        # The scalar variant takes one ray at a time.
         if mi.variant().startswith("scalar"):
             found = []
             for x, y, z, *direction, length in rays.T.tolist():
@@ -69,9 +70,10 @@ class Shapes:
                 ray.maxt = length
                 found.append(bool(scene.ray_test(ray)))
             return np.array(found)
+        # The others take all rays at once, in arrays of a least width.
         padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
         padded[:, :count] = rays
-        padded[3, count:] = 1  # from the middle, no way at all
+        padded[3, count:] = 1  # idle rays start in the middle and have no length
         with _ONE_AT_A_TIME:
             met = scene.ray_test(rays_of(mi, padded), coherent=True)
             return np.asarray(met.numpy())[:count]
@@ -98,6 +100,7 @@ class Shapes:
         grow_for(mi, count)
         rays = rays_of(mi, np.concatenate([starts.T, directions.T]))
         found = scene.ray_intersect_preliminary(rays, coherent=False)
+        # Both are computed in one pass.
         dr.eval(found.t, found.prim_index)
         distance = found.t.numpy().astype(np.float64)
         number = found.prim_index.numpy().astype(np.int64)
@@ -116,7 +119,7 @@ def ball_chord(starts: Array, directions: Array, radius: float) -> tuple[Array, 
     The square is negative where a ray passes outside.
     """
     along = -np.einsum("ij,ij->i", starts, directions)
-    # From the nearest point, not from the start: squares of 1e6 m would swallow it.
+    # The square is taken at the nearest point, not at the start: squares of 1e6 m would swallow it.
     nearest = starts + along[:, None] * directions
     return along, radius**2 - np.einsum("ij,ij->i", nearest, nearest)
 
@@ -124,8 +127,8 @@ def ball_chord(starts: Array, directions: Array, radius: float) -> tuple[Array, 
 def rays_of(mi: Any, rows: ArrayLike) -> Any:
     """Make rays of Mitsuba from rows (6 or 7, ray): starts, directions, and lengths if they end.
 
-    Dr.Jit compiles anew for memory that does not begin where a vector may, and for rows cut from
-    one array of another width: so each row is handed over by itself, from where a vector may begin.
+    Dr.Jit compiles anew for memory that is not aligned to its vectors, and for rows cut from an
+    array of another width. So each row is handed over by itself, from aligned memory.
     """
     values = [mi.Float(row) for row in _aligned(np.asarray(rows))]
     ray = mi.Ray3f(mi.Point3f(*values[:3]), mi.Vector3f(*values[3:6]))

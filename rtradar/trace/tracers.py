@@ -1,15 +1,15 @@
 """Ask Mitsuba which part of a body, or which triangle of a mesh, a ray meets; float64 says where.
 
-What rays can meet, and bounce off, are `Surfaces`: a posed body or a mesh. They go by their
-numbers, parts or faces; -1 is none. Mitsuba, which works in float32, decides which of them a ray
-meets; where it meets it follows in float64 from the ray and that surface.
+What rays can meet, and bounce off, are `Surfaces`: a posed body or a mesh. Each surface, a part or
+a face, has a number; -1 is none. Mitsuba, which works in float32, decides which surface a ray
+meets; where the ray meets it follows in float64 from the ray and that surface.
 
 Every ellipsoid is the exact unit `sphere` of Mitsuba in axes of its own, so there is no scene to
 pose: each ray is taken into the axes of the part that it comes near. Instances of a sphere in one
-posed scene answer wrongly where Dr.Jit compiles, and instances of triangles cost more to pose than
-their rays (`validation/cost/occluders.py`). The answers are held against float64 in
-`validation/other_methods/occlusion.py`. A mesh has a scene of its own, centred on it, into which
-rays start where they enter the ball around it.
+posed scene give wrong answers where Dr.Jit compiles, and instances of triangles cost more to pose
+than their rays to trace (`validation/cost/occluders.py`). The answers are compared with float64 in
+`validation/other_methods/occlusion.py`. A mesh has a scene of its own, centred on it, in which rays
+start where they enter the ball around it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Indices = NDArray[np.int64]
 _Groups = tuple[Indices, Indices, Indices, Poses]
 
 _LINES_A_THREAD = 1 << 14
-"""For fewer, waking threads costs more than the work."""
+"""Lines that one thread takes: for fewer, waking threads costs more than the work."""
 
 
 CLEAR_M = 1e-3
@@ -44,7 +44,7 @@ _LIFT = 1e-5
 class BodyTracer:
     """A body of ellipsoids with ``semi_axes (part, 3)`` [m], posed again and again.
 
-    Of its `Surfaces` each is a part. Mitsuba, ``mi``, has its variant set.
+    Each of its `Surfaces` is a part. Mitsuba, ``mi``, has its variant set.
     """
 
     flat = False
@@ -78,9 +78,9 @@ class BodyTracer:
     ) -> NDArray[np.bool_]:
         """Whether no part is in the way of lines of sight (line,) past the body in several poses.
 
-        Lines go from ``origins`` to ``targets (line, 3)``, world [m]. Those of a ``group (line,)``
-        have their targets on the part ``own (group,)``, which cannot occlude them, -1 for none, in
-        the pose ``pose (group,)`` among ``poses``.
+        Lines go from ``origins`` to ``targets (line, 3)``, world [m]. Lines of one ``group
+        (line,)`` have their targets on the part ``own (group,)``, which cannot occlude them, or on
+        none where it is -1. The body is in the pose ``pose (group,)`` among ``poses``.
         """
         seen = np.ones(len(origins), dtype=bool)
         seen[self._met(origins, targets, (group, own, pose, poses))[0]] = False
@@ -89,17 +89,20 @@ class BodyTracer:
     def meets(
         self, points: Array, normals: Array, directions: Array, own: Indices
     ) -> tuple[Indices, Array]:
-        """Part (ray,) met first from points on parts ``own (ray,)``, and how far it is [m].
+        """Part (ray,) met first from points on parts ``own (ray,)``, and its distance [m].
 
         Rays leave on the side of the normals, along unit vectors ``directions (ray, 3)``. The
         distance is infinite where nothing is met; no part is met from itself, since all are convex.
         """
+        # Rays have to end behind the whole body.
         centre, ball = ball_around(self._posed[0], self._longest)
         reach = np.linalg.norm(points - centre, axis=1) + ball
         ends = points + reach[:, None] * directions
         line, part = self._met(points, ends, self._groups(own))
+        # Mitsuba says which parts a ray meets; where they are met is computed in float64.
         entry, exit_ = self._crossings(part, points[line], directions[line])
         far = np.where(entry > 0, entry, exit_)
+        # The nearest part of each ray comes first among its hits.
         nearest = np.lexsort((far, line))
         line, first = np.unique(line[nearest], return_index=True)
         found, distance = np.full(len(points), -1, dtype=np.int64), np.full(len(points), np.inf)
@@ -111,7 +114,8 @@ class BodyTracer:
         return self._crossings(surface, origins, directions, missed=np.nan)[0]
 
     def normal(self, surface: Indices, points: Array, directions: Array) -> Array:
-        """Unit normals at points on parts; outward, and so none for rays that come from inside."""
+        """Unit normals at points on parts, outward, also for rays that come from inside."""
+        # The gradient of the ellipsoid's equation in its axes, turned into the world.
         local = self._stretched(surface, points - self._posed[0][surface])
         local /= self._semi_axes[surface]
         normal = np.einsum("...ij,...j->...i", self._posed[1][surface], local)
@@ -130,11 +134,12 @@ class BodyTracer:
         """Part that occludes each vertex, as each antenna sees it, (antenna, vertex) int16.
 
         It is another part that is nearer to the antenna on the same line, else -1. ``centres`` and
-        ``frames`` are the pose of the body, ``antennas (antenna, 3)`` places, world [m]. Asked
-        about are the vertices of ``parts (n,)``, but not those that face away by more than the sine
-        ``margin``; ``vertices (3, vertex)`` are those of every part, from ``first (part + 1,)`` on,
-        on its ellipsoid, in its own axes [m].
+        ``frames`` are the pose of the body, ``antennas (antenna, 3)`` are places, world [m]. Only
+        vertices of ``parts (n,)`` are asked about that do not face away by more than the sine
+        ``margin``. ``vertices (3, vertex)`` are those of all parts, each from ``first (part + 1,)``
+        on, on its ellipsoid, in its own axes [m].
         """
+        # One ray for each vertex and part that may occlude it; the first part that is met counts.
         found = np.full((len(antennas), vertices.shape[1]), -1, dtype=np.int16)
         floats = (antennas, centres, frames, self._semi_axes, self._longest)
         places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
@@ -149,13 +154,14 @@ class BodyTracer:
         """Groups of lines by the part ``own (ray,)``, -1 for none, as `clear` takes them."""
         parts = len(self._semi_axes)
         centres, frames = self._posed
-        # The last group is that of none.
+        # The last group has no part of its own: -1 modulo the number of groups is its number.
         whose = np.append(np.arange(parts), -1), np.zeros(parts + 1, dtype=np.int64)
         return own % (parts + 1), *whose, Poses(centres[None], frames[None], self._semi_axes)
 
     def _met(self, origins: Array, targets: Array, groups: _Groups) -> Indices:
-        """Lines and the parts that they meet (2, hit), of lines and groups as of `clear`."""
+        """Lines and the parts that they meet (2, hit), for lines and groups as in `clear`."""
         group, own, pose, poses = groups
+        # The map to the axes in which each part is the unit sphere.
         maps = np.swapaxes(poses.frames, -1, -2) / self._semi_axes[:, :, None]
         floats = (origins, targets, poses.centres, maps, self._longest)
         starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
@@ -166,6 +172,7 @@ class BodyTracer:
             whose[0] += begin
             return rays, whose
 
+        # Threads choose the rays; Mitsuba is asked about all of them at once.
         found = thread_map(near, range(0, len(starts), _LINES_A_THREAD))
         if not found:
             return np.empty((2, 0), dtype=np.int64)
@@ -175,16 +182,20 @@ class BodyTracer:
     def _crossings(
         self, part: Indices, origins: Array, directions: Array, missed: float = 0.0
     ) -> tuple[Array, Array]:
-        """Where lines (..., 3) enter and leave parts [m]; half a chord is ``missed`` where none."""
+        """Where lines (..., 3) enter and leave parts [m].
+
+        Half the chord is taken as ``missed`` where a line meets none.
+        """
         o = self._stretched(part, origins - self._posed[0][part])
         d = self._stretched(part, directions)
+        # The line meets the unit sphere where square t^2 + 2 half t + rest = 0.
         square, half, rest = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
         root = half**2 - square * rest
         chord = np.where(root > 0, np.sqrt(np.maximum(root, 0.0)), missed)
         return (-half - chord) / square, (-half + chord) / square
 
     def _stretched(self, part: Indices, vectors: Array) -> Array:
-        """To the axes in which the part is the unit sphere."""
+        """Bring vectors to the axes in which the part is the unit sphere."""
         turned = np.einsum("...ji,...j->...i", self._posed[1][part], vectors)
         return np.asarray(turned / self._semi_axes[part])
 
@@ -193,11 +204,11 @@ class BodyTracer:
 
 
 class MeshTracer:
-    """A triangle mesh; of its `Surfaces` each is a face, and reflects on both sides.
+    """A triangle mesh; each of its `Surfaces` is a face, and reflects on both sides.
 
-    ``corners (face, 3, 3)`` are in the world [m]. A hit nearer to a point than the fraction
-    ``same`` of the mesh's size is the point; float32 knows distances to a millionth. ``mi`` is
-    Mitsuba with its variant set.
+    ``corners (face, 3, 3)`` are in the world [m]. A hit that is nearer to a point than the fraction
+    ``same`` of the mesh's size counts as the point; float32 knows distances to a millionth. ``mi``
+    is Mitsuba with its variant set.
     """
 
     flat = True
@@ -216,6 +227,7 @@ class MeshTracer:
         """Whether any face is between two points (ray, 3), both drawn in by `CLEAR_M`."""
         starts, ways = origins - self._centre, targets - origins
         size = np.linalg.norm(ways, axis=1)
+        # The part of each leg inside the ball around the mesh, drawn in at both ends.
         ways = ways / np.where(size > 0, size, 1.0)[:, None]
         along, square = ball_chord(starts, ways, self._ball)
         half = np.sqrt(np.maximum(square, 0.0))
@@ -230,6 +242,7 @@ class MeshTracer:
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether no face but ``own (ray,)`` is between origins and targets (ray, 3) on it."""
+        # A hit that is hardly nearer than the target is the target.
         face, met = self._first_hits(origins, targets - origins)
         nearer = met < np.linalg.norm(targets - origins, axis=1) - self._same * self._ball
         return ~((face != own) & nearer)
@@ -237,13 +250,13 @@ class MeshTracer:
     def meets(
         self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], Array]:
-        """As `BodyTracer.meets`; the distance is of float32 quality."""
+        """Do the same as `BodyTracer.meets`; the distance has the precision of float32."""
         face, distance = self._first_hits(points + _LIFT * self._ball * normals, directions)
         bounces = (face >= self._bouncing.start) & (face < self._bouncing.stop)
         return np.where(bounces, face, -1), np.where(bounces, distance, np.inf)
 
     def of_piece(self, first: int, last: int) -> MeshTracer:
-        """Return the mesh, of which rays bounce on these faces only: others absorb them."""
+        """Return the mesh such that rays bounce on these faces only: others absorb them."""
         piece = copy.copy(self)
         piece._bouncing = range(first, last)
         return piece
@@ -251,11 +264,12 @@ class MeshTracer:
     def way_out(
         self, points: Array, normals: Array, antenna: Array, own: NDArray[np.int64]
     ) -> tuple[Array, NDArray[np.int64]]:
-        """Places (ray, 3) [m] and faces where the ways to an antenna (3,) leave the mesh.
+        """Places (ray, 3) [m] and faces where the lines to an antenna (3,) leave the mesh.
 
-        The points (ray, 3) are on the faces ``own (ray,)``, the normals those into the mesh. What
-        meets nothing, by float32 at an edge, is outside at once.
+        The points (ray, 3) are on the faces ``own (ray,)``, and the normals point into the mesh. A
+        ray that meets nothing, as float32 may have it at an edge, is outside at once.
         """
+        # From just inside the mesh, the first face that is met is where the line leaves it.
         ways = antenna - points
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)
         face, distance = self.meets(points, normals, ways, own)
@@ -264,7 +278,7 @@ class MeshTracer:
         return points + distance[:, None] * ways, np.where(inside, face, own)
 
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
-        """As `BodyTracer.distance`: to the plane of the face, which has no border."""
+        """Distance along lines (..., 3) to the planes of faces, which have no border [m]."""
         normal = self._normals[surface]
         steepness = (directions * normal).sum(-1)
         height = ((self._places[surface] - origins) * normal).sum(-1)
