@@ -94,6 +94,7 @@ class Dipole:
         # distance - from_origin without the cancellation that far antennas would bring
         squares = (at**2).sum(axis=-1, keepdims=True) - 2 * (at @ self.position)[..., None]
         excess = squares / (distance + from_origin)
+        # The far field, then the terms of the near field in powers of 1 / kR.
         wave = np.exp(-1j * wavenumber * excess) * from_origin / distance
         unit, inverse = away / distance, 1 / (wavenumber * distance)
         along = (unit @ self.moment)[..., None]

@@ -2,12 +2,12 @@
 
 Rings of Huygens' sources stand on confocal spheroids inside each body. Their strengths make the
 tangential electric field on the surface vanish in the sense of least squares, at more rings than
-there are unknowns. Every azimuthal mode is a problem of its own, and small. The field is an exact
+there are unknowns. Every azimuthal mode is a small problem of its own. The field is an exact
 solution of Maxwell's equations outside; only the boundary condition is approximate, and its
-`residual` says how well it holds. For the exterior problem has one solution at every frequency, a
-resonance of the interior does no harm. Of a penetrable body, sources outside of it make the field
-inside, and the tangential electric and magnetic fields are matched. The fields of the sources are
-those of :eq:`huygens-source`.
+`residual` says how well it holds. Resonances of the interior do no harm, because the exterior
+problem has one solution at every frequency. For a penetrable body, sources outside of it make the
+field inside, and the tangential electric and magnetic fields are matched. The fields of the sources
+are those of :eq:`huygens-source`.
 
 References
 ----------
@@ -110,6 +110,7 @@ class BodiesOfRevolution:
     sampling: Sampling = field(default_factory=Sampling)
 
     def __post_init__(self) -> None:
+        # Bodies that are next to each other along the axis must not touch.
         spans = sorted(body.span for body in self.spheroids)
         for (_, below), (above, _) in pairwise(spans):
             if above <= below:
@@ -145,6 +146,7 @@ class BodiesOfRevolution:
     @cached_property
     def modes(self) -> int:
         """Number of azimuthal modes from 0 on; those below 0 follow by symmetry."""
+        # As many as Wiscombe's count for a sphere of that radius: higher modes fall off quickly.
         size = self._k * max(body.radius for body in self.spheroids)
         return int(np.ceil(size + 4.05 * size ** (1 / 3) + 6))
 
@@ -152,19 +154,21 @@ class BodiesOfRevolution:
         """Largest depth of sources in a body, in the elliptic coordinate.
 
         Sources stand around the line between the foci, and around the image of the neighbour's
-        tip in the tip of this body, for the scattered field has no sources outside of those.
+        tip in the tip of this body, because the scattered field has no sources outside of those.
         """
         gaps = [
             max(other.span[0] - body.span[1], body.span[0] - other.span[1])
             for other in self.spheroids
             if other is not body
         ]
-        # At the tip a change of the coordinate is that of the depth over the radius.
+        # At the tip the coordinate changes by the change of the depth over the radius.
         image = body.image_depth(min(gaps)) / body.radius if gaps else np.inf
         return min(_OF_THE_WAY * body.innermost, image)
 
     def _counts(self, wavenumber: float, per_wavelength: float) -> list[int]:
         """Rings of sources of each body, for waves of that wavenumber."""
+        # The curve from pole to pole is as long as half a circle of the longest semi-axis, or
+        # shorter.
         longest = [max(body.radius, body.half_length) for body in self.spheroids]
         wanted = [per_wavelength * wavenumber * size / 2 for size in longest]
         return [max(self.sampling.least, int(np.ceil(count))) for count in wanted]
@@ -184,6 +188,8 @@ class BodiesOfRevolution:
     def _outer(self) -> list[Rings]:
         """Sources inside of each body, whose fields are outside."""
         depth, found = self.sampling.depth, []
+        # The more rings there are, the nearer to the surface they stand. A body that is too slender
+        # for the depth of few rings takes more of them.
         counts = self._counts(self._k, self.sampling.per_wavelength)
         for body, count in zip(self.spheroids, counts, strict=True):
             deepest = self._deepest(body)
@@ -196,6 +202,7 @@ class BodiesOfRevolution:
         """Sources outside of each body, whose fields are inside; none where it conducts."""
         if self.permittivity is None:
             return []
+        # Waves inside are shorter, and their sources stand outside.
         counts = self._counts(self._inner_wavenumber.real, self.sampling.inner_per_wavelength)
         return [
             body.rings(count, self.sampling.depth / count)
@@ -205,6 +212,7 @@ class BodiesOfRevolution:
     @cached_property
     def _surfaces(self) -> list[Rings]:
         """Rings of each body at which the boundary conditions are asked for."""
+        # More rings than sources, so that the boundary condition is a problem of least squares.
         counts = [self.sampling.oversampling * len(rings) for rings in self._outer]
         if self._inner:
             within = [self.sampling.inner_oversampling * len(rings) for rings in self._inner]
@@ -234,11 +242,14 @@ class BodiesOfRevolution:
         Rows are (field, component, ring), unknowns (component, source).
         """
         surface, sources = Rings.joined(self._surfaces), Rings.joined(self._outer)
+        # Sources and rows are weighted by the roots of the areas that their rings stand for, so
+        # that sums of squares are integrals over the surfaces.
         outside = Medium(self._k, 1, self.modes, self._azimuths)
         electric = outside.electric(surface, sources) * np.sqrt(sources.area)
         fields = [electric] if self._fields == 1 else [electric, outside.magnetic(electric)]
         blocks = [np.stack(fields, axis=1), *self._inner_fields()]
         weight = np.sqrt(surface.area)[:, None, None]
+        # Each mode has a matrix of its own, with the fields of all sources side by side.
         for mode in range(self.modes):
             rows = 2 * self._fields * len(surface)
             columns = [(block[mode] * weight).reshape(rows, -1) for block in blocks]
@@ -247,8 +258,8 @@ class BodiesOfRevolution:
     def _inner_fields(self) -> Iterator[Field]:
         """Fields (mode, field, component, ring, component, source) inside of each body, negative.
 
-        They are matched on that body's own rings. Each source has the same strength on them, for
-        those farther away lose more in the body.
+        They are matched on that body's own rings. Each source is scaled to the same strength there,
+        because the fields of sources farther away lose more in the body.
         """
         whole, begin = sum(len(rings) for rings in self._surfaces), 0
         if not self._inner:
@@ -261,13 +272,16 @@ class BodiesOfRevolution:
             electric /= -size
             # H times the wave impedance of vacuum
             both = np.stack([electric, k / self._k * inside.magnetic(electric)], axis=1)
+            # The field inside a body is matched on its own rings alone.
             block = np.zeros((*both.shape[:3], whole, *both.shape[4:]), dtype=np.complex128)
             block[:, :, :, begin : begin + len(rings)] = both
             yield block
             begin += len(rings)
 
     def _fields_on(self, rings: Rings, antenna: Dipole) -> tuple[Field, Field]:
-        """Tangential E and H (mode, component, ring) of an antenna; modes 0, 1, ... -1."""
+        """Tangential E and H (mode, component, ring) of an antenna; modes are 0, 1, ... -1."""
+        # The field at evenly spaced points around each ring, in the axes of the bodies, and its
+        # Fourier coefficients.
         count = self._azimuths
         position, *tangents = rings.points(count)
         found = antenna.fields(self.centre + position @ self.frame.T, self._k)
@@ -281,9 +295,10 @@ class BodiesOfRevolution:
     def _strengths(self, antennas: list[Dipole]) -> tuple[Field, Array]:
         """Strengths (mode, component, source, antenna) and residuals (antenna,) of the sources.
 
-        Those inside of the bodies, whose fields reach the antennas.
+        The sources are those inside of the bodies, whose fields reach the antennas.
         """
         surface, sources = Rings.joined(self._surfaces), Rings.joined(self._outer)
+        # What arrives, with the same weights as the rows of the matrices.
         arriving = [
             np.stack(self._fields_on(surface, antenna)[: self._fields], axis=1)
             for antenna in antennas
@@ -293,8 +308,9 @@ class BodiesOfRevolution:
         out, left = np.zeros(shape, dtype=np.complex128), np.zeros(len(antennas))
         for number, factor in enumerate(self._factors):
             for mode in {number, -number}:
-                # Reflected at a plane through the axis, the mode is that below zero: currents and
-                # E around the axis have the other sign then, and H along the curve.
+                # Reflection at a plane through the axis turns a mode into that of the negative
+                # number: it changes the sign of currents and E around the axis, and of H along the
+                # curve.
                 sign = np.array([1, -1 if mode < 0 else 1])
                 rows = np.stack([sign, sign[::-1]])[: self._fields, :, None, None]
                 solved, squares = factor.solve(-(rows * given[mode]).reshape(-1, len(antennas)))
@@ -311,8 +327,8 @@ class BodiesOfRevolution:
         It follows from the antenna's own field at the sources, by reciprocity.
         """
         electric, magnetic = self._fields_on(Rings.joined(self._outer), antenna)
-        # The magnetic current of a source along the curve is around the axis, and of one around the
-        # axis against the curve.
+        # A source along the curve has its magnetic current around the axis, a source around the
+        # axis has it against the curve.
         both = np.stack([electric[:, 0] - magnetic[:, 1], electric[:, 1] + magnetic[:, 0]], axis=1)
         # The integral with exp(+j m phi) is the coefficient of the mode -m.
         return np.roll(both[::-1], 1, axis=0) * self._k / (4j * np.pi)
@@ -368,13 +384,15 @@ class BodiesOfRevolution:
         receivers, chosen = _distinct(
             np.atleast_2d(np.asarray(rx, np.float64)), received or polarization
         )
+        # Strengths of the sources are found once for each transmitter.
         strengths, residual = self._strengths(senders)
         length = np.empty(len(sent), dtype=np.complex128)
         for index, receiver in enumerate(receivers):
+            # All pairs with this receiver: the product of what it receives with the strengths.
             pairs = np.flatnonzero(chosen == index)
             at = self._received(receiver)
             fields = np.tensordot(at, strengths[..., sent[pairs]], axes=3)
-            # The field of a flat conductor is against that which arrives, and counts as positive.
+            # A flat conductor reverses the field, and its scattering length counts as positive.
             length[pairs] = -np.sqrt(4 * np.pi) * fields
         return length, residual[sent]
 
@@ -412,12 +430,15 @@ class _LeastSquares(NamedTuple):
     def of(cls, matrix: Field) -> _LeastSquares:
         """Factorise a matrix (row, unknown), and leave out what rounding has spoiled."""
         q, r, pivots = qr(matrix, mode="economic", pivoting=True, check_finite=False)
+        # Pivots come in descending order: those that are negligible belong to sources that add
+        # nothing.
         size = np.abs(np.diagonal(r))
         rank = int(np.count_nonzero(size > _NEGLIGIBLE * size[0]))
         return cls(q[:, :rank], r[:rank, :rank], pivots[:rank], matrix.shape[1])
 
     def solve(self, right: Field) -> tuple[Field, Array]:
         """Find solutions (unknown, case), and the squares of what they leave (case,)."""
+        # The part of the right side that the columns can make; the rest is the residual.
         seen = self.q.conj().T @ right
         out = np.zeros((self.unknowns, right.shape[1]), dtype=np.complex128)
         out[self.columns] = solve_triangular(self.r, seen, check_finite=False)

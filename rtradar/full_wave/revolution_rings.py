@@ -1,10 +1,10 @@
 """Rings on spheroids, rings of sources beside them, and the fields of these, mode by mode.
 
 A source is an electric current ``x`` (times the wave impedance) along a ring or along the
-generating curve, together with the magnetic current ``s n x x``, ``n`` the outward normal and ``s``
-plus or minus one: Huygens' source, which radiates to one side. Such a source of the other direction
-has the same field with E and H exchanged, so that H needs no integrals of its own. The fields are
-those of :eq:`huygens-source`.
+generating curve, together with the magnetic current ``s n x x``, with ``n`` the outward normal and
+``s`` plus or minus one: Huygens' source, which radiates to one side. The source of the other
+direction has the same field with E and H exchanged, so that H needs no integrals of its own. The
+fields are those of :eq:`huygens-source`.
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ class Spheroid:
         a, c = (total + difference) / 2, (total - difference) / 2
         angle = (np.arange(count) + 0.5) * np.pi / count
         sine, cosine = np.sin(angle), np.cos(angle)
+        # The length of the curve for each step of the eccentric angle.
         stretch = np.hypot(a * cosine, c * sine)
         return Rings(
             radius=a * sine,
@@ -198,6 +199,8 @@ class Medium:
 
     def transform(self) -> tuple[Array, Array]:
         """Weights (azimuth, mode) of the even and of the odd integrals over half a ring."""
+        # Both halves of a ring are alike up to a sign: the integral is over one half, by the
+        # trapezoidal rule, with the even or the odd part of exp(j m phi).
         half = self.azimuths // 2 + 1
         angle = 2 * np.pi * np.arange(half) / self.azimuths
         weight = np.full(half, 2.0 / self.azimuths)
@@ -222,6 +225,8 @@ class Medium:
         even, odd = self.transform()
         azimuth = 2 * np.pi * np.arange(len(even)) / self.azimuths
         out = np.empty((self.modes, 2, len(surface), 2, len(sources)), dtype=np.complex128)
+        # The current along the curve and the field along it are even in the azimuth, those around
+        # the axis odd.
         for ring in range(len(surface)):
             tt, tp, pt, pp = self._fields_of_ring(surface, ring, sources, azimuth)
             out[:, 0, ring, 0] = _integrated(tt, even).T
@@ -240,10 +245,14 @@ class Medium:
         """
         cosine, sine = np.cos(azimuth), np.sin(azimuth)
         across, along = sources.tangent[:, :1], sources.tangent[:, 1:]
+        # The vector from every point of a source's ring to the point at azimuth 0 of the surface's
+        # ring.
         x = surface.radius[ring] - sources.radius[:, None] * cosine
         y = -sources.radius[:, None] * sine
         z = surface.height[ring] - sources.height[:, None]
         own_across, own_along = surface.tangent[ring]
+        # The electric current's part along the current and along the vector, with the near field,
+        # and the curl of the magnetic current.
         distance = np.sqrt(x**2 + y**2 + z**2)
         k = self.wavenumber
         inverse = 1 / (k * distance)

@@ -1,8 +1,8 @@
 """Any closed conducting mesh, by the combined field integral equation over its surface.
 
-What is unknown are the currents over the edges of the triangles (S. M. Rao, D. R. Wilton, A. W.
+The unknowns are the currents over the edges of the triangles (S. M. Rao, D. R. Wilton, A. W.
 Glisson, IEEE Trans. Antennas Propag. 30, 1982). The tangential electric field on the surface is
-zero, and the tangential magnetic field is the current; the sum of both conditions, unlike each
+zero, and the tangential magnetic field is the current. The sum of both conditions, unlike each
 alone, has no resonances of the inside (J. R. Mautz, R. F. Harrington, A.E.U. 32, 1978).
 """
 
@@ -70,19 +70,20 @@ class ConductingSurface:
     Notes
     -----
     Equations :eq:`combined-field`, whose alpha is 0.8, and :eq:`received-current` of the theory
-    page. The error falls with the square of the lengths of the edges. That of a curved surface is
-    mostly that of the flat triangles if their corners lie on it: with the corners moved outward, so
-    that the triangles are on average on the surface, it is several times smaller.
+    page. The error falls with the square of the lengths of the edges. For a curved surface it comes
+    mostly from the flat triangles if their corners lie on the surface: with the corners moved
+    outward, so that the triangles are on average on the surface, it is several times smaller.
     """
 
     mesh: ClosedMesh
     frequency_hz: float
 
     def __post_init__(self) -> None:
+        # The size of the problem is known before any triangle is divided.
         mesh = self.mesh
         wavelength = 2 * np.pi / wavenumber(self.frequency_hz)
         edge = float(np.sqrt(np.mean(mesh.lengths**2))) / wavelength
-        # Each division halves the edges, and makes four of each.
+        # Each division halves the edges, and makes four times as many.
         divisions = max(0, math.ceil(math.log2(edge / LONGEST_EDGE)))
         _refuse_large(mesh, 4**divisions, self.frequency_hz)
         for _ in range(divisions):
@@ -102,6 +103,7 @@ class ConductingSurface:
     @cached_property
     def _factors(self) -> list[Any]:
         """Factors of the transposed matrix of each parity."""
+        # Currents of each parity at the mirror planes have a matrix of their own.
         orbits = self.mesh.orbits
         shape = len(orbits.parity), *2 * (1 + int(orbits.unknown.max()),)
         kind = np.complex128 if self.mesh.unknowns <= _DOUBLE_UP_TO else np.complex64
@@ -109,10 +111,10 @@ class ConductingSurface:
         fill_matrices(self.mesh.triangles, orbits, rules(_ORDER), self._equation, matrices)
         factors = []
         for matrix, sums in zip(matrices, self.mesh.sums_of_edges, strict=True):
-            # Some currents cannot have this parity, being their own mirror images.
+            # Some currents cannot have this parity, because they are their own mirror images.
             none = np.flatnonzero(abs(sums).sum(axis=1) == 0)
             matrix[none, none] = 1.0
-            # Transposed, rows are columns as LAPACK stores them, and nothing is copied.
+            # The transposed matrix is stored by columns, as LAPACK takes it, so nothing is copied.
             factors.append(lu_factor(matrix.T, overwrite_a=True, check_finite=False))
         return factors
 
@@ -141,8 +143,11 @@ class ConductingSurface:
         return 1j * wavenumber(self.frequency_hz) / math.sqrt(4 * math.pi) * out
 
     def _some(self, tx: Array, rx: Array, polarization: Polarization) -> Field:
+        # Each antenna once, whether it transmits or receives.
         antennas, index = np.unique(np.concatenate([tx, rx]), axis=0, return_inverse=True)
         received, sent = self._products(antennas, polarization)
+        # The currents that the transmitters drive, as the sum over parities, each of which is a
+        # smaller system.
         sources = np.unique(index[: len(tx)])
         currents = np.zeros_like(sent)
         for factors, sums in zip(self._factors, self.mesh.sums_of_edges, strict=True):
@@ -150,16 +155,18 @@ class ConductingSurface:
             right = (sums @ sent[sources].T) / len(self._factors)
             solved = lu_solve(factors, right, trans=1, check_finite=False)
             currents[sources] += (sums.T @ solved).T
+        # What Rx receives is the product of these currents and the field that Rx would send.
         ends = index[: len(tx)], index[len(tx) :]
         return np.asarray(np.sum(currents[ends[0]] * received[ends[1]], axis=1))
 
     def _products(self, antennas: Array, polarization: Polarization) -> Field:
         """Products (2, antenna, edge) of each current with the fields of antennas.
 
-        First is that with the electric field, then that with the field that the equation has on its
-        other side.
+        First comes the product with the electric field, then the right side of the equation.
         """
         triangles, rule = self.mesh.triangles, rules(_ORDER)
+        # Each of the three currents of a triangle at the points of the rule, with the weights of
+        # the integral.
         points = np.einsum("pc,tcx->tpx", rule.places, triangles.corners)
         currents = points[:, None] - triangles.corners[:, :, None]
         currents *= triangles.scales[..., None, None] * triangles.areas[:, None, None, None]
@@ -168,9 +175,11 @@ class ConductingSurface:
         moments = antenna_moments(antennas, polarization)
         for number, dipole in enumerate(map(Dipole, antennas, moments)):
             field, magnetic = dipole.fields(points, self._equation.wavenumber)
+            # The same combination of both conditions as in the matrix.
             jump = np.cross(triangles.normals[:, None], magnetic)
             for side, own in enumerate((field, _ELECTRIC * field + (1 - _ELECTRIC) * jump)):
                 products = np.einsum("tipx,tpx->ti", currents, own)
+                # An edge has its current on both of its triangles.
                 np.add.at(out[side, number], self.mesh.edge_of, products)
         return out
 
@@ -214,19 +223,22 @@ def rules(order: int) -> Rules:
     """Return the rules of matrix elements; pairs that touch take ``order`` points an axis.
 
     The coordinates are those of S. A. Sauter and C. Schwab, *Boundary Element Methods*, section
-    5.2: of the four-dimensional domain each part is a cube whose Jacobian cancels the singularity.
+    5.2: each part of the four-dimensional domain is a cube whose Jacobian cancels the singularity.
     """
+    # Points along the four axes of a cube.
     places, weights = triangle_rule()
     x, w = np.polynomial.legendre.leggauss(order)
     x, w = (x + 1) / 2, w / 2
     cube = [axis.ravel() for axis in np.meshgrid(x, x, x, x, indexing="ij")]
     weight = np.prod(np.meshgrid(w, w, w, w, indexing="ij"), axis=0).ravel()
+    # Weights are those of triangles whose areas count as 1; in these coordinates each has a half.
     touching = [
         np.concatenate(
             [_pairs(first, second, 4 * weight * jacobian) for first, second, jacobian in parts]
         )
         for parts in (_one_corner(*cube), _one_edge(*cube), _all_corners(*cube))
     ]
+    # Triangles that do not touch have every point of one with every point of the other.
     one, other = (index.ravel() for index in np.indices((len(weights), len(weights))))
     product = np.column_stack([places[one], places[other], weights[one] * weights[other]])
     return Rules(places, weights, (product, *touching))

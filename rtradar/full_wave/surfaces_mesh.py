@@ -24,9 +24,9 @@ _SAME_PLACE = 1e-6
 class ClosedMesh:
     """A closed surface of triangles, whose corners run anticlockwise as seen from outside.
 
-    Across edge i of a triangle, which is opposite to its corner i, flows the current l / (2 A) (r -
-    corner i), with the length l of the edge and the area A, out of one of the two triangles of the
-    edge, and with the other sign into the other.
+    The current l / (2 A) (r - corner i), with the length l of the edge and the area A, flows across
+    edge i of a triangle, which is opposite to its corner i. It flows out of one of the two
+    triangles of the edge, and with the other sign into the other.
 
     Parameters
     ----------
@@ -45,6 +45,7 @@ class ClosedMesh:
     faces: Indices
 
     def __post_init__(self) -> None:
+        # In a closed mesh each edge has two triangles, which go along it in opposite directions.
         _, edge_of, signs = self._edges
         balance = np.bincount(edge_of.ravel(), weights=signs.ravel())
         if (np.bincount(edge_of.ravel()) != 2).any() or balance.any():
@@ -52,6 +53,7 @@ class ClosedMesh:
                 "full-wave: the mesh is not closed; every edge must have two triangles, whose "
                 "corners run anticlockwise as seen from outside"
             )
+        # The volume inside is positive if all triangles face outward.
         corners = self.vertices[self.faces]
         if np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) <= 0:
             raise InputError(
@@ -62,6 +64,8 @@ class ClosedMesh:
     @cached_property
     def _edges(self) -> tuple[Indices, Indices, Array]:
         """Ends of each edge (edge, 2), edges of triangles (triangle, 3), and their signs."""
+        # Edge i goes from the corner after corner i to the one after that; its sign says whether
+        # that is up or down in the numbers of the corners.
         ends = np.stack([np.roll(self.faces, -1, axis=1), np.roll(self.faces, -2, axis=1)], axis=2)
         forward = ends[..., 0] < ends[..., 1]
         edges, index = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
@@ -91,6 +95,7 @@ class ClosedMesh:
         ClosedMesh
         """
         edges, edge_of, _ = self._edges
+        # A triangle at each corner, and one between the middles.
         middles = len(self.vertices) + edge_of
         corner = [
             np.stack([self.faces[:, i], middles[:, i - 1], middles[:, i - 2]], axis=1)
@@ -111,11 +116,12 @@ class ClosedMesh:
 
     @cached_property
     def mirror_axes(self) -> tuple[int, ...]:
-        """Axes across whose plane through the middle of the mesh it is its own mirror image."""
+        """Axes whose plane, across the axis through the mesh's middle, is a plane of symmetry."""
         return tuple(axis for axis in range(3) if self._reflected(axis) is not None)
 
     def _reflected(self, axis: int) -> tuple[Indices, Indices, Array] | None:
-        """Return triangles and edges (and their signs) that those of the mesh are reflected to."""
+        """Return the mirror images of triangles and edges, and the signs of edges, if all exist."""
+        # Every corner must have a corner at its mirror image, every triangle a triangle.
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         mirrored = self.vertices.copy()
         mirrored[:, axis] = low[axis] + high[axis] - mirrored[:, axis]
@@ -139,6 +145,8 @@ class ClosedMesh:
         """Currents of even and odd parity at the mirror planes, as the kernel takes them."""
         _, edge_of, _ = self._edges
         unknown, parity = self._parities
+        # One triangle of each set of mirror images is tested, weighted for reflections that keep
+        # it.
         images = self._images[0]
         tested = np.flatnonzero(images.min(axis=0) == np.arange(len(self.faces)))
         kept = (images[:, tested] == tested).sum(axis=0)
@@ -147,6 +155,8 @@ class ClosedMesh:
     @cached_property
     def _images(self) -> tuple[Indices, Indices, Array]:
         """Images of triangles and of edges, and signs of the latter, under all reflections."""
+        # Each mirror plane doubles the reflections: all so far, and all of them followed by its
+        # own.
         triangle, edge = np.arange(len(self.faces))[None], np.arange(self.unknowns)[None]
         sign = np.ones((1, self.unknowns))
         for axis in self.mirror_axes:
@@ -161,13 +171,17 @@ class ClosedMesh:
     def _parities(self) -> tuple[Indices, Array]:
         """Unknown of each edge (edge,), and its coefficient there (parity, edge)."""
         _, edge, sign = self._images
+        # Edges that are mirror images of each other are one unknown.
         count = len(edge)
         first = edge.min(axis=0)
         representatives, unknown = np.unique(first, return_inverse=True)
         group = np.arange(count)
+        # Each parity is a choice of even or odd at each plane; the sign of a reflection in it is
+        # the product over the planes that it uses.
         odd = np.array([[(a & b).bit_count() % 2 for b in range(count)] for a in range(count)])
         characters = np.where(odd, -1.0, 1.0)  # (parity, reflections)
         parity = np.zeros((count, self.unknowns))
+        # The sum over all reflections, which is 0 where the current cannot have that parity.
         for g in group:
             images = edge[g, representatives]
             parity[:, images] += characters[:, g, None] * sign[g, representatives]
@@ -185,6 +199,7 @@ class ClosedMesh:
 
 def _places_of(rows: Indices, among: Indices) -> Indices | None:
     """Index of each row among others, all of which are different; None if one is not there."""
+    # Rows that are among the others add no new row to the sorted list of both.
     found, index = np.unique(np.concatenate([among, rows]), axis=0, return_inverse=True)
     if len(found) != len(among):
         return None
