@@ -63,10 +63,11 @@ def ellipsoid(
     if np.isnan(theta).any() or np.isnan(phi).any():
         raise ValueError("rcs.ellipsoid: angles must be numbers [rad]")
     sine = np.sin(theta)
-    # Scaled by the largest axis: squares of squares of tiny or huge axes would leave the range of
-    # float64.
+    # The axes are scaled by the largest, because fourth powers of tiny or huge axes would leave the
+    # range of float64.
     largest = np.maximum(np.maximum(a, b), c)
     a, b, c = a / largest, b / largest, c / largest
+    # The square of the support function h, for pi R1 R2 = pi (abc)^2 / h^4.
     support_squared = (
         (a * sine * np.cos(phi)) ** 2 + (b * sine * np.sin(phi)) ** 2 + (c * np.cos(theta)) ** 2
     )
@@ -103,6 +104,7 @@ def ellipsoid_radii(
     normal = np.stack(
         [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
     )
+    # Mean and product of the two radii; their difference follows from both.
     h = np.sqrt((squares * normal**2).sum(-1))
     mean = (squares.sum(-1) - (squares**2 * normal**2).sum(-1) / h**2) / h / 2
     product = squares.prod(-1) / h**4
@@ -159,7 +161,7 @@ def sphere(
     if method == "go":
         return np.asarray(np.sqrt(np.pi) * radius * np.exp(2j * ka))
     if method == "po":
-        # 1/(4k^2) (exp(2jka) - 1) cancels for small ka: expm1 keeps its digits.
+        # exp(2jka) - 1 would cancel for small ka: expm1 keeps its digits.
         integral = (
             2 * np.pi * (np.exp(2j * ka) * radius / (2j * k) + np.expm1(2j * ka) / (4 * k**2))
         )
@@ -177,12 +179,14 @@ def _mie_backscatter(ka: float) -> complex:
     """
     # Wiscombe's count of terms that matter, with a margin.
     orders = np.arange(int(np.ceil(ka + 4.05 * ka ** (1 / 3) + 10)))
-    # Spherical Bessel functions but for a factor that a_n and b_n do not know. SciPy's own walk up
-    # to each order anew.
+    # Spherical Bessel functions without a factor that cancels in a_n and b_n. SciPy's own spherical
+    # functions would start anew for each order.
     j, y = jv(orders + 0.5, ka), yv(orders + 0.5, ka)
     orders = orders[1:]
+    # Derivatives by recurrence from the order below.
     dj, dy = j[:-1] - (orders + 1) / ka * j[1:], y[:-1] - (orders + 1) / ka * y[1:]
     j, y = j[1:], y[1:]
+    # Y overflows at orders so high that their terms are negligible.
     known = np.isfinite(y) & np.isfinite(dy)
     orders, j, y, dj, dy = orders[known], j[known], y[known], dj[known], dy[known]
     a = (j + ka * dj) / (j + ka * dj - 1j * (y + ka * dy))
