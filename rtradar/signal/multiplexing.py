@@ -58,6 +58,7 @@ def receive(
     """
     if radar.multiplexing != "ddm":
         return samples
+    # All Tx of a cycle, each turned by its code, arrive as one sum.
     cube = samples.reshape(-1, radar.n_tx, *samples.shape[1:])
     coded = np.einsum("ct,ctrs->crs", codes(radar, first_chirp, len(samples)), cube, optimize=False)
     return np.asarray(coded, dtype=samples.dtype)
@@ -85,6 +86,7 @@ def separate(
         return np.asarray(received / math.sqrt(radar.n_tx), dtype=received.dtype)
     if radar.multiplexing != "ddm":
         return received
+    # Turned back by the code of each Tx in turn: the same sum as often as there are Tx.
     back = codes(radar, first_chirp, len(received) * radar.n_tx).conj()
     rows = back[:, :, None, None] * received[:, None]
     return np.asarray(rows.reshape(-1, *received.shape[1:]), dtype=received.dtype)
