@@ -235,6 +235,7 @@ _LATER = {
 def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
     times, parts = arrays["times"], arrays["part_names"].tolist()
+    # Of what such a file has, the centre of the lower torso is nearest to the root.
     place = arrays["poses"][:, parts.index("lower torso"), 0].astype(np.float64)
     moved = np.gradient(place, times, axis=0) if len(times) > 1 else np.zeros_like(place)
     found = {
