@@ -59,6 +59,7 @@ def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
     NumPy, the FFT and compiled loops release the interpreter lock, so threads pay. The caller works
     too, because waking up takes as long as many an item.
     """
+    # All threads take from one iterator, so that a slow item keeps only one of them busy.
     results: list[Any] = [None] * len(items)
     failed: dict[int, BaseException] = {}
     left = iter(enumerate(items))
