@@ -111,6 +111,7 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     may have ``changed``.
     """
     given = read_toml(path, "data set", "give a TOML file")
+    # A file that a data set was made from also lists the digests of all files that it names.
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
     listed = check_files(f"data set file '{path}'", path.resolve().parent, given, changed=changed)
     with prefixed(f"data set file '{path}': "):
@@ -149,6 +150,7 @@ def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
 
     given = read_toml(spec_path, "data set", "give a TOML file")
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
+    # Paths start from the new place of the file, and every file gets its digest.
     folder = (spec_path.resolve().parent / given.get("root", ".")).resolve()
     files = sorted(_files(spec, table, folder))
     listed = [
@@ -171,6 +173,7 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
         base = value.get("base") if isinstance(value, Mapping) else value
         if isinstance(base, str) and base.endswith((".toml", ".cfg")):
             named.add(folder / base)
+    # Scenes name meshes and recordings of their people.
     for scene in {id(one.scene): one.scene for one in spec.combinations}.values():
         pieces = (*scene.furniture, *scene.objects)
         named |= {piece.path for piece in pieces if piece.metres_per_unit is not None}
@@ -180,6 +183,7 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
 
 
 def _spec(table: Table, folder: Path) -> Spec:
+    # Everything is read before an error is raised, so that the user sees all of them at once.
     wrong = Complaints()
     top = _values(_TOP, "", table, wrong)
     drawn_table, each = (wrong.of(table_at, key, table) or {} for key in ("drawn", "each"))
@@ -197,6 +201,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     windows = table.get("windows", {}) if intervals else {}
     beside = wrong.of(_folder, top.get("folder", "."), folder)
     recordings = _recordings(table, windows, beside, wrong)
+    # What does not go together, although each value is allowed.
     if not table.get("synthetic") and not table.get("recordings"):
         wrong.lines.append("there is neither [[synthetic]] nor [[recordings]]; give one of them")
     if table.get("synthetic") and intervals and intervals.needed_s is None:
@@ -223,6 +228,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
+    # How many samples it will be at least, and maps that can be batched.
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.most(intervals.needed_s)
     copies = 1 + (augmented.copies if augmented else 0)
