@@ -279,6 +279,8 @@ def _run_settings(top: Mapping[str, Any]) -> RunSettings:
 
 def _folder(named: str, beside: Path) -> Path:
     """Folder of the recordings, below the file's own or below that of an environment variable."""
+    # A specification may come from a stranger, so recordings must lie below its own folder, or
+    # below one that the user has named in the environment.
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
@@ -308,6 +310,7 @@ def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
         for key, value in given.items():
             if isinstance(value, tuple) and len(set(value)) < len(value):
                 wrong.lines.append(f"{where}{key} = {brief(list(value))}; {_DIFFERENT}")
+        # A number stands for that many, counted from 0.
         seeds, subjects = (
             range(own) if isinstance(own, int) else own
             for own in (given.get("seeds", given.get("count", 0)), given["subjects"])
@@ -335,6 +338,7 @@ def _recordings(
             wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
         if folder is None or "file" not in texts:
             continue
+        # What the pattern finds in a name takes precedence over what the table says.
         for name, fields in wrong.of(matching_files, where, texts["file"], folder) or ():
             values = {**_UNKNOWN, **texts, **fields}
             about = {
@@ -372,6 +376,8 @@ def matching_files(where: str, pattern: str, folder: Path) -> list[tuple[str, di
             f"{where}file = {brief(pattern)}: {_MOST_WILD} wildcards are allowed, "
             "one of them **; give fewer"
         )
+    # The pattern finds candidates once its fields have become stars; a regular expression then
+    # reads the fields from their names.
     *folders, last = pattern.split("/")
     parts = [part if part == "**" else _single(part) for part in folders] + [_single(last)]
     expression, found = _expression(parts), []
@@ -396,6 +402,7 @@ def _expression(parts: list[str]) -> re.Pattern[str]:
     def wild(piece: str) -> str:
         if piece in ("*", "?"):
             return "[^/]*?" if piece == "*" else "[^/]"
+        # A field that occurs twice must be the same text both times.
         name, again = piece.strip("{}"), piece in seen
         seen.add(piece)
         return f"(?P={name})" if again else f"(?P<{name}>[^/]+?)"
