@@ -101,6 +101,7 @@ def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
         )
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
+    # By default the evaluation goes into the folder of the first training.
     out = options.out or options.trained[0]
     with atomic_folder(out, EVALUATION_FILES, overwrite=options.overwrite) as folder:
         table, content = write_evaluation(studies, baselines, folder)
