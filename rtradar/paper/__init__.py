@@ -87,6 +87,8 @@ def make_paper(
         kept = _kept(folder, settings)
         # Before any picture, so that each is known as ours however this ends.
         content = _write(folder, settings, kept)
+        # Each part is written as soon as it is measured, so that a command that was stopped can go
+        # on.
         parts = _parts()
         with tqdm(total=len(parts), initial=len(kept), unit="part", disable=None) as bar:
             for name, measure in parts.items():
@@ -107,6 +109,7 @@ def make_paper(
 
 def _kept(folder: Path, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts that an earlier command with the same settings has finished."""
+    # Figures of other settings or of another version would not fit the rest.
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         there = read_json(folder / PAPER_FILES.listing)
         if there["settings"] == settings and there["version"] == version("rtradar"):
