@@ -372,7 +372,7 @@ def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int6
     Returns
     -------
     vertices : (vertex, 3) float64
-        Read-only, for they are kept.
+        Read-only, because they are kept.
     faces : (face, 3) int64
         Anticlockwise seen from outside; read-only.
 
@@ -400,7 +400,7 @@ def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int
     Returns
     -------
     vertices : (10 frequency^2 + 2, 3) float64
-        Read-only, for they are kept.
+        Read-only, because they are kept.
     faces : (20 frequency^2, 3) int64
         Anticlockwise seen from outside; read-only.
     """

@@ -345,7 +345,7 @@ def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
 def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca1000Layout | None]:
     """Return the radar, and the order of words by the options, else by the .cfg file.
 
-    Where a JSON file lies beside the samples it says the order, for rtradar wrote both.
+    Where a JSON file lies beside the samples it says the order, because rtradar wrote both.
     """
     from rtradar.exchange import Dca1000Layout
     from rtradar.radar import Radar

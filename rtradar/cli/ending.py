@@ -75,7 +75,7 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     # Where nothing has imported it, there is no unfinished file.
     getattr(sys.modules.get("rtradar.system.files"), "discard_unfinished", _nothing)()
     line = f"rtradar: {_SIGNALS.get(number.name, number.name)}; {' '.join(message().split())}\n"
-    # In a thread, for the main thread may be writing.
+    # In a thread, because the main thread may be writing.
     flushed = threading.Thread(target=sys.stdout.flush, daemon=True)
     flushed.start()
     flushed.join(0.2)
@@ -94,7 +94,7 @@ def _end_children() -> None:
     spared = {getattr(resource_tracker._resource_tracker, "_pid", None)}
     until = time.monotonic() + _PATIENCE_S
     killed: set[int] = set()
-    # Repeated, for threads may start others.
+    # Repeated, because threads may start others.
     while (children := _descendants() - spared) - killed and time.monotonic() < until:
         for child in children:
             with contextlib.suppress(OSError):

@@ -59,7 +59,7 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
             for first, block in recording.blocks("writing"):
                 whole = np.zeros(chunk, dtype=np.complex64)  # the last chunk is stored whole too
                 whole[..., : len(block)] = block.T
-                # Directly, for HDF5 would keep some of what it writes in memory.
+                # Directly, because HDF5 would keep some of what it writes in memory.
                 data.id.write_direct_chunk((0, 0, 0, first), whole.tobytes())
                 written.check()
             # Times and places, and the radar as a struct: numbers for MATLAB, and as text

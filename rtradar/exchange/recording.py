@@ -157,7 +157,7 @@ class IfRecording(SampleFile):
     def cube_shape(self) -> tuple[int, int, int, int]:
         """Length of the chirp, tx, rx and sample axes.
 
-        Under Doppler division the tx axis is 1, for all Tx are received as one sum.
+        Under Doppler division the tx axis is 1, because all Tx are received as one sum.
         """
         tx = rows_in_cycle(self.radar)
         return (self.shape[0] // tx, tx, *self.shape[1:])

@@ -49,7 +49,7 @@ def rows(motion: Motion) -> dict[str, str]:
 def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return times (pose,) [s] of ``most`` frames or fewer, and their joints (pose, joint, 3) [m].
 
-    They are spread evenly over the motion. Other frames are not computed, for there may be a
+    They are spread evenly over the motion. Other frames are not computed, because there may be a
     million of them.
     """
     times = motion.frame_times

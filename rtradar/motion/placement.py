@@ -21,9 +21,9 @@ middle."""
 
 WALK_DISTANCE_M, WALK_STRAIGHTNESS, WALK_ALONG_HEADING = 1.1, 0.5, 0.5
 """Least distance of a walk from its beginning [m], where a kick steps less; least ratio of the
-straight line to the path; and least median cosine between path and the hips' heading, for a fighter
-who steps sideways does not walk. Short intervals of straight walks fall below the distance, and
-then face by their hips, which look the same way."""
+straight line to the path; and least median cosine between path and the hips' heading, because a
+fighter who steps sideways does not walk. Short intervals of straight walks fall below the distance,
+and then face by their hips, which look the same way."""
 
 
 def place(

@@ -309,7 +309,7 @@ def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: f
     """Say the largest speed of a joint, and warn where no person is so fast."""
     fastest, joint, frame, first = 0.0, 0, 0, 0
     before = positions[:0]
-    # In blocks, each with the last frame of the one before, for a speed is between two frames.
+    # In blocks, each with the last frame of the one before, because a speed is between two frames.
     for (block,) in in_blocks(positions):
         rows = np.concatenate([before, block])
         speed = np.linalg.norm(np.diff(rows, axis=0), axis=2) * rate_hz

@@ -91,7 +91,7 @@ def _of_spatial_clouds(
     data: Path, out: Path, rdt: Study, precision: Precision, device: torch.device
 ) -> dict[str, Any]:
     """Train on spatial clouds as the paper tried it, beside RDT clouds of the same captures."""
-    # Each cloud is scaled by one number, for x, y and z are alike.
+    # Each cloud is scaled by one number, because x, y and z are alike.
     recipe = PAPER.changed(scaling="unit-sphere", precision=precision)
     clouds = SpatialClouds(data)
     study = train_study(clouds, out / "full-spatial", recipe, device=device)

@@ -352,7 +352,8 @@ def draw_maps_and_clouds(
     spectrogram.
     """
     drawn = {name: place / file for name, file in MAP_PICTURES.items()}
-    # The maps of all results are open at once, for the reference chooses the frame that all show.
+    # The maps of all results are open at once, because the reference chooses the frame that all of
+    # them show.
     with ExitStack() as stack:
         plots = {
             name: plots_of(one, stack.enter_context(open_run_maps(one)))

@@ -220,7 +220,7 @@ def _surveyed(
     settings: RunSettings,
 ) -> LinkBudget:
     """Return the link budget with the limits of the objects; of nobody visible, all warnings."""
-    # Warnings are held back, for those of a budget without any echo say why nobody is visible.
+    # Warnings are held back, because those of a budget without any echo say why nobody is visible.
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         alone, spreading = model.people_alone, settings.spreading

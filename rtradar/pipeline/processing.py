@@ -139,7 +139,7 @@ class Processing:
 def block_chirps(radar: Radar) -> int:
     """Return how many chirps are computed or processed together: a hop of the frames, or a frame.
 
-    Maps depend on it in their last bits, for steps of the range-time map end with a block.
+    Maps depend on it in their last bits, because steps of the range-time map end with a block.
     """
     return min(math.ceil(radar.hop_cycles), radar.cycles_per_frame) * radar.n_tx
 
@@ -290,7 +290,7 @@ def frame_angles(
     rows, columns = np.nonzero(mask)
     velocity = radar.velocity_mps(radar.cycles_per_frame)
     blocks = []
-    # Some cells at a time, for all channels of all cells of a busy frame would take much memory.
+    # Some cells at a time: all channels of all cells of a busy frame would take much memory.
     for first in range(0, max(len(rows), 1), _CELLS_AT_ONCE):
         row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
         values = cell_spectra(cube, radar, row, column, window_functions=window_functions)

@@ -153,7 +153,7 @@ class Samples:
         for piece in self._pieces:
             begin = 0
             while begin < len(piece):
-                # Copies, for the caller may fill the same array again.
+                # Copies, because the caller may fill the same array again.
                 with np.errstate(over="ignore"):
                     part = np.array(piece[begin : begin + most - count], dtype=np.complex64)
                 held.append(part)

@@ -208,7 +208,7 @@ def results_of(
                     draw_pictures(folder, plots, room)
             with stages.time("report"):
                 write_report(folder / "report.html", plots, room=room, run_view=run_view)
-        # The summary comes last, for it lists all files and has the time that everything took.
+        # The summary comes last, because it lists all files and has the time that everything took.
         return replace(result, summary=finished(summary | cost(source), folder), out=out.absolute())
 
 

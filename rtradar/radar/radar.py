@@ -397,7 +397,7 @@ def _refusing_other_words(made: Callable[..., None]) -> Callable[..., None]:
     @wraps(made)
     def checked(self: Radar, **fields: Any) -> None:
         known = Radar.__dataclass_fields__
-        if not fields.keys() <= known.keys():  # quick, for a radar that moves is made for each pose
+        if not fields.keys() <= known.keys():  # quick: a moving radar is made for each pose
             check_keys("Radar: ", fields, (), tuple(known))
         made(self, **fields)
 

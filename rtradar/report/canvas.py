@@ -145,8 +145,8 @@ def angle_view(
     """Return the limits of angle and range that show what is detected, and ghosts.
 
     ``power`` (range, angle) is zero in ranges without a detection. Angles are fitted to where each
-    range is strongest, for sidelobes of the array fill all angles. ``ghosts`` are their angles and
-    ranges.
+    range is strongest, because sidelobes of the array fill all angles. ``ghosts`` are their angles
+    and ranges.
     """
     detected: NDArray[np.bool_] = np.asarray(power.any(axis=1))
     # Within 6 dB of the strongest angle of each range with detections.

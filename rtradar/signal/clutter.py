@@ -118,10 +118,10 @@ class RoomIf:
     """IF samples of a room.
 
     The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes the IF
-    of what the body occludes is computed. Between them a cubic goes through the samples, for the
-    sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object for
-    one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes of them, a
-    `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly still.
+    of what the body occludes is computed. Between them a cubic goes through the samples, because
+    the sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object
+    for one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes of them,
+    a `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly still.
     """
 
     def __init__(self, radar: Radar, objects: Iterable[Echoes], shadow: Any = None) -> None:
@@ -306,7 +306,7 @@ class MovingRoomIf(RoomIf):
         found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         at_tx, at_rx = antennas_in_use(radar, times, tx)
-        # Some chirps at a time, for every channel has all echoes of the room.
+        # Some chirps at a time, because every channel has all echoes of the room.
         for own, rest in found:
             at_once = max(1, _MOST_TERMS // (radar.n_rx * own.n_echoes))
             for first in range(0, len(chirps), at_once):

@@ -1,7 +1,7 @@
 """What each receiver gets of several Tx that transmit at once, and how it is separated again.
 
 Samples have a row for each chirp of each Tx, ``(chirp, rx, sample)``, in all that makes and all
-that processes them. Under TDM and FDM these rows are what is received, for filters separate the
+that processes them. Under TDM and FDM these rows are what is received, because filters separate the
 bands of FDM. Under DDM (Doppler division; Sun, Petropulu and Poor, IEEE Signal Processing Magazine
 37(4), 2020) a receiver gets the sum of all Tx, each rotated by its code from chirp to chirp;
 `separate` rotates the sum back by the code of one Tx after the other. In the row of a Tx its own

@@ -223,7 +223,7 @@ class PhaseNoise:
     def level_m2(self, moving_m2: float, moving_s: float) -> float:
         """Power per sample of white noise as dense as the residual noise is where it is densest."""
         total = self._filter(moving_s) * moving_m2
-        # Still echoes are added up by their delay, for the filter depends on nothing else.
+        # Still echoes are added up by their delay, because the filter depends on nothing else.
         for echoes in self._still:
             power = (np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1))
             delay = echoes.length.mean(axis=(0, 1)) / SPEED_OF_LIGHT_MPS

@@ -329,7 +329,7 @@ class ReceiverStage:
     def _add_ramps(self, rows: NDArray[np.int64], samples: _Samples) -> None:
         radar, other = self._radar, self._receiver.interferer
         assert other is not None
-        # When and at which frequency the sampling of each row begins, for the other radar has a
+        # When and at which frequency the sampling of each row begins, because the other radar has a
         # clock of its own.
         chirps = rows * chirps_together(radar)
         starts = radar.centres_of(chirps) - radar.samples_per_chirp / radar.sample_rate_hz / 2

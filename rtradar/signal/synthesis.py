@@ -184,7 +184,7 @@ def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.floa
     same = np.flatnonzero(echoes.tx == echoes.tx[0]) if len(times) else np.zeros(0, dtype=np.int64)
     if len(same) < 2:
         return
-    # Neighbours, for what is fast soon leaves the band; the last two among them.
+    # Neighbours, because what is fast soon leaves the band; the last two among them.
     step = max(1, (len(same) - 1) // _INSTANTS)
     before, after = same[-2::-step], same[:0:-step]
     # The ends of the line of receivers: those in between see no other speed.

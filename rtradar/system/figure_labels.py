@@ -75,7 +75,7 @@ def place_labels(
 ) -> list[str]:
     """Write each label at the first of its places where it covers no other and is inside the axes.
 
-    The limits of the axes must be final, for places are compared on the screen.
+    The limits of the axes must be final, because places are compared on the screen.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The one style of all pictures: size, fonts, grid and colours, in a light and a dark variant.
 
-Nothing here changes Matplotlib's global settings, for pictures of a run may be drawn in several
+Nothing here changes Matplotlib's global settings, because pictures of a run may be drawn in several
 threads, and the user's own figures keep their style. A picture is drawn on axes in the colours of
 `theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
 

@@ -301,7 +301,8 @@ def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
     """Open a regular file for reading; OSError if it is a folder, pipe, socket or device.
 
     Links are followed. Opening a pipe would wait for somebody to write to it, and opening a device
-    may move it, so the kind is checked before; and after, for the name may have changed its file.
+    may move it, so the kind is checked before; and after, because the name may have changed its
+    file.
     """
     try:
         _check_regular(path, os.stat(path))

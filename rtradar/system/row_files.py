@@ -27,7 +27,7 @@ _MOST_IN_MEMORY = 1_000_000
 """Bytes: about 10 s of a recording at 120 Hz."""
 
 _MOST_FILES = 64
-"""At once, for a process may open only so many (256 on macOS); arrays beyond stay in memory."""
+"""At once, because a process may open only so many (256 on macOS); arrays beyond stay in memory."""
 
 _ROWS_AT_ONCE = 1024
 

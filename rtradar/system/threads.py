@@ -16,7 +16,7 @@ from rtradar.system.checks import brief
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, for workers that share cores."""
 
-_CORES = os.cpu_count() or 1  # once, for the system reads a file to tell
+_CORES = os.cpu_count() or 1  # once, because the system reads a file to tell
 
 _PARTS = 4
 """Parts of its work that each thread gets, so that a slower one has fewer."""

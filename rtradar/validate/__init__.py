@@ -142,7 +142,7 @@ def run_claim(
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        # Files, for a process that outlives the script would keep pipes open.
+        # Files, because a process that outlives the script would keep pipes open.
         errors = folder / "stderr"
         with errors.open("wb") as stderr:
             done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=stderr, check=False)

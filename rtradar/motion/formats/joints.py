@@ -60,7 +60,7 @@ LONGEST_GAP_S = 0.25
 """Longest gap that is bridged [s]: a quarter of a step of a walk."""
 
 RATE_HZ = 120.0
-"""Least rate of the motion that is made [Hz], for `Motion` interpolates its root by PCHIP, which
+"""Least rate of the motion that is made [Hz]. `Motion` interpolates its root by PCHIP, which
 flattens the crests of what is sampled more rarely."""
 
 _LEAST_KEPT = 1 / 3

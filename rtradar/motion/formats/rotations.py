@@ -214,7 +214,7 @@ def _warn_of_another_person(path: Path, skeleton: Path) -> None:
 
 def _amc_frames(text: TextFile, skeleton: Skeleton) -> Iterator[list[float]]:
     """Yield the values of the channels of all bones in each frame [m] [deg]."""
-    # The values of a frame are gathered by bone, for bones may come in any order, and are yielded
+    # Bones may come in any order, so the values of a frame are gathered by bone. They are yielded
     # in the order of the skeleton once the next frame begins.
     widths = {bone.name: len(bone.channels) for bone in skeleton.bones}
     degrees, count = skeleton.degrees, 0

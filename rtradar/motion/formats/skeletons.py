@@ -114,8 +114,8 @@ def posed(
     the bone whose rotation it has, and ``offsets`` (joint, 3) theirs.
     """
     roots, rotations = FileBackedRows(), FileBackedRows()
-    # Some frames at a time, for recordings may be larger than memory. The root's place is the sum
-    # of the chain above it.
+    # Recordings may be larger than memory, so some frames are posed at a time. The place of the
+    # root is the sum of the chain above it.
     for (frames,) in in_blocks(values):
         turned = _rotations(bones, frames)
         places = np.zeros((len(frames), 3))

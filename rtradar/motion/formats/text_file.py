@@ -29,8 +29,8 @@ _FIRST_BYTES, _LONG_BYTES, _CHARACTERS_A_STEP = 65_536, 20_000_000, 1_000_000
 class TextFile:
     """Lines of a text file, one after the other, with a progress bar where reading takes long.
 
-    The text is Latin-1, for every byte is a character there and only comments use more than ASCII.
-    Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
+    The text is Latin-1, because every byte is a character there and only comments use more than
+    ASCII. Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
     statement, so that it is closed before an error message is written.
     """
 

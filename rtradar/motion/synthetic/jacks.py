@@ -165,7 +165,7 @@ class _Jumper:
     def _knots(self, hops: list[_Flight], longest_s: float) -> tuple[list[_Knot], ...]:
         """Knots of root, ankles and heels over their heights in standing.
 
-        The root is thrown and caught; between knots it flies along a parabola, for the
+        The root is thrown and caught; between knots it flies along a parabola, because the
         accelerations at both ends are the same. Relative to the hips the ankles move slowly while
         the legs are stretched: in flight, at take-off and at landing, where they are higher by what
         the raised heel lifts them. So the knees bend on the floor only, where the heels come down

@@ -237,7 +237,7 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
     rows, columns = math.ceil(len(distance) / _MAX_ROWS), math.ceil(len(velocity) / _MAX_COLUMNS)
     shape = len(windows), math.ceil(len(distance) / rows), math.ceil(len(velocity) / columns)
     pooled, medians = np.empty(shape, np.float32), []
-    for number, window in enumerate(windows):  # read once, for that takes longest
+    for number, window in enumerate(windows):  # read once, because that takes longest
         found = power[window] * scale
         pooled[number] = strongest(found, rows, columns)
         if number % math.ceil(len(windows) / _SAMPLED) == 0:

@@ -140,7 +140,7 @@ class RunWriter(AbstractContextManager["RunWriter"]):
         A block that is cut after a multiple of ``max_chirps`` chirps gives the same as the whole.
         """
         stages, store = self._processing.stages, self._store
-        # Before clutter is removed, for that frame is wanted with its clutter.
+        # Before clutter is removed, because that frame is wanted with its clutter.
         if self._kept_cycle is not None:
             self._keep_received(spectra, first, self._kept_cycle)
         spectra = self._clouds.without_clutter(spectra, first)
@@ -186,7 +186,7 @@ class RunWriter(AbstractContextManager["RunWriter"]):
         end = begin + radar.chirps_per_frame
         if end <= 0 or begin >= len(spectra):
             return
-        # A copy, for the next block comes in the same array.
+        # A copy, because the next block comes in the same array.
         self._received.append(spectra[max(begin, 0) : end].copy())
         if end > len(spectra):
             return
@@ -321,7 +321,7 @@ class MapStore:
     def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
         """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it.
 
-        They wait until there are some megabytes, for HDF5 takes as long for one step as for many.
+        They wait for some megabytes, because HDF5 takes as long for one step as for many.
         """
         for name, added in ((axis, values), *maps.items()):
             steps: NDArray[Any] = np.array(added, dtype=self._dtypes[name])
