@@ -151,7 +151,7 @@ _Hertz = Annotated[tuple[float, ...], Limits(1, 1e12)]
 
 @dataclass(frozen=True, kw_only=True)
 class Interferer:
-    """Another FMCW radar, whose ramps cross those of ours.
+    """Another FMCW radar, whose ramps cross our own.
 
     Each of its ramps begins with the same phase, as ours do.
 

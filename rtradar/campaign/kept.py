@@ -127,8 +127,8 @@ class MapKeeper:
     def maps(self) -> dict[str, NDArray[np.floating]]:
         """Return the maps of all frames by name, with their axes; nothing if none is kept.
 
-        The axis of time is that of the frames, and so that of joints. To be called once: the frames
-        of a map go when it is joined, so that no two maps are held twice.
+        Maps and joints share the time axis of the frames. Call it once: the frames of a map are
+        freed when the map is joined, so that memory never holds all maps twice.
         """
         if not self._keep:
             return {}

@@ -54,7 +54,7 @@ _NUMBERS: Mapping[str, Any] = {
 }
 
 MOST_SAMPLES = 1_000_000
-"""Largest number of samples of a data set, all of whose plans are in memory."""
+"""Largest number of samples of a data set; the plans of all of them are held in memory."""
 
 RUN_KEYS = (
     "pfa", "clutter_removal", "detector", "body_material", "range_window", "doppler_window",

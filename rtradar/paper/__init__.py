@@ -159,6 +159,6 @@ def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> N
 
 
 def _link(title: str) -> str:
-    """Return a title for the contents: the number of what has one, the subject of what has none."""
+    """Return a title for the contents: the number if the item has one, else its subject."""
     number, _, subject = title.partition(": ")
     return f"{subject} ({number.split()[1]})" if number.startswith("Section") else number

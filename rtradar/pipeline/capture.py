@@ -58,7 +58,7 @@ class PreparedRoom(NamedTuple):
 class Capture:
     """Everything that `prepare` settles before the first echo is computed.
 
-    ``people`` are those of the scene and those who were given, ``body`` is all of them at their
+    ``people`` are the scene's own and those who were given, ``body`` is all of them at their
     places, and ``processing`` has the radar at its position in the scene.
     ``model`` includes the paths over walls if the scene has any; ``room`` is the room, or None.
     ``summed`` is the model of the echoes that are summed at every chirp: all but ghosts that the
@@ -156,9 +156,9 @@ class Capture:
                 synthesize(echoes, radar, times, dtype=np.complex64, out=samples)
                 if ghosts is not None:
                     ghosts.add(samples, chirps)
-            # The phase noise that is left in an echo depends on its delay. Moving echoes take that
-            # of their mean delay, so they are turned before the room is added, whose echoes have
-            # delays of their own.
+            # The phase noise that is left in an echo depends on its delay. Moving echoes share the
+            # phase noise of their mean delay, so they are turned before the room is added: its
+            # echoes have delays of their own.
             phases = None
             if self.receiver is not None:
                 with stages.time("receiver"):

@@ -368,7 +368,7 @@ def _power(
     ahead = 1 - (sines**2).sum(axis=2)
     direction = np.concatenate([np.sqrt(np.maximum(ahead, 0))[..., None], sines], axis=2)
     away = None if range_m is None else range_m[:, None, None]
-    # Phases of all Tx and of all receivers, whose product is that of a channel.
+    # The phasor of a channel is the product of one of its Tx and one of its receiver.
     there, back = (_excess_m(direction, places, away) for places in (radar.tx_m, rx))
     of_tx, of_rx = _phasors(there, carrier), _phasors(back, carrier_back)
     values = np.zeros((len(cells), radar.n_tx, len(rx)), np.complex64)

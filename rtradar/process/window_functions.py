@@ -87,8 +87,8 @@ def taylor(n: int, equal_lobes: int, side_lobe_db: float) -> NDArray[np.float64]
 
     It is the mean 1 plus cosines, so not of height 1; `scipy.signal` is slow to import.
     """
-    # Zeros of the pattern are those of an ideal one, dilated to join those of a uniform line; the
-    # coefficients of the cosines follow from them.
+    # The inner zeros are those of the ideal pattern, dilated so that they join the zeros of a
+    # uniform line; the coefficients of the cosines follow from them.
     a = np.arccosh(10 ** (side_lobe_db / 20)) / np.pi
     dilated = equal_lobes**2 / (a**2 + (equal_lobes - 0.5) ** 2)
     orders = np.arange(1, equal_lobes)

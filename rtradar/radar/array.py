@@ -271,8 +271,8 @@ class Array(Waveform):
     def patterns(self) -> tuple[LinePattern, LinePattern]:
         """Far field of all virtual elements over the sines of azimuth and of elevation.
 
-        Each line of a cross is taken for one without gaps, whose angles are those of
-        (:eq:`angle-axis`), and both for the longer one.
+        Each line of a cross is taken for a line without gaps, so that its angles follow
+        (:eq:`angle-axis`), and both get the beam width of the longer one.
         """
         if not self.is_cross:
             y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))

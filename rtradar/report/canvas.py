@@ -233,7 +233,7 @@ _MASKED = 0.1  # fraction of the strongest cells
 _FRACTION = 1e-3
 _FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
 _MARGIN, _LEAST_BINS = 0.15, 8
-_ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
+_ASTRAY = 5e-3  # fraction of spatial points whose angle noise has set
 _CENTRAL_PERCENT = 98
 
 

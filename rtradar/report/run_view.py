@@ -191,8 +191,8 @@ class RunView:
 def linked_views(run_view: RunView, colour: str | None = None, layout: str = "") -> dict[str, Any]:
     """Return the values of the template ``linked.html``, the linked views with their controls.
 
-    Colours show ``colour``, one of `COLOURS`, until the reader chooses another, by default that of
-    the view; ``layout`` is another class of the element for the page's style sheet.
+    Colours show ``colour``, one of `COLOURS`, until the reader chooses another; by default the view
+    has one. ``layout`` is another class of the element for the page's style sheet.
     """
     return {
         "view": run_view,

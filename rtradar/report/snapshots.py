@@ -200,7 +200,7 @@ def save_snapshots(path: str | Path, snapshots: Snapshots) -> None:
 def load_snapshots(path: str | Path) -> Snapshots:
     """Read snapshots; InputError if the file is missing, damaged or of another kind.
 
-    Files of version 0.1 have one person, whose place is then that of the lower torso.
+    Files of version 0.1 have one person, whose place is taken from the lower torso.
     """
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)

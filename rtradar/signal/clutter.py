@@ -49,7 +49,7 @@ _KEPT_ROOMS = 2
 
 
 class _Group(NamedTuple):
-    """Objects whose amplitudes are given at the same frequencies, for one sum over all of them.
+    """Objects whose amplitudes are given at the same frequencies, so that one sum takes them all.
 
     ``member (object,)`` says which belong to it, ``first (object,)`` where their echoes begin.
     """
@@ -117,11 +117,12 @@ def _synthesized(echoes: Echoes, radar: Radar) -> _Samples:
 class RoomIf:
     """IF samples of a room.
 
-    The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes the IF
-    of what the body occludes is computed. Between them a cubic goes through the samples, because
-    the sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object
-    for one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes of them,
-    a `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly still.
+    The room is computed for one TDM cycle, because its IF is the same in every cycle. At keyframes
+    the IF of what the body occludes is computed. Between them a cubic goes through the samples,
+    because the sum over echoes is linear in what each has lost. ``objects`` are the echoes of each
+    object for one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes
+    of them, a `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly
+    still.
     """
 
     def __init__(self, radar: Radar, objects: Iterable[Echoes], shadow: Any = None) -> None:

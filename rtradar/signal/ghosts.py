@@ -64,8 +64,8 @@ are not seen, and are the same ones at every chirp."""
 class GhostIf:
     """The IF samples of ghosts by anchors ``apart`` cycles from each other.
 
-    The capture has a number of cycles; ``order (ghost,)`` is that of the ghosts, of which the last
-    ``changing`` change over the sweep. ``cycles (anchor,)`` are the cycles of the anchors.
+    ``order (ghost,)`` sorts the ghosts so that the last ``changing`` of them change over the sweep.
+    ``cycles (anchor,)`` are the cycles of the anchors.
     """
 
     def __init__(

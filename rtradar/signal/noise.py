@@ -2,12 +2,12 @@
 
 Noise of the receiver is white, complex and Gaussian, of a power that follows from the asked SNR.
 
-Of the oscillator's phase noise the IF has what is left where both ways of it cancel in part. An
-echo of delay tau is mixed with the noise phi(t) - phi(t - tau), whose spectrum is that of the
-oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
-x + j (phi(t) - phi(t - tau)) x. Of what is still, (phi(t) - phi(t - tau)) / tau is interpolated
-between some delays, and echoes are summed once for each. Of what moves all echoes have the mean
-delay of their power, cycle by cycle.
+The phase noise of the oscillator is in the echo and in the signal with which it is mixed, so part
+of it cancels. In an echo of delay tau the IF keeps phi(t) - phi(t - tau), whose spectrum is that of
+the oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
+x + j (phi(t) - phi(t - tau)) x. For still echoes (phi(t) - phi(t - tau)) / tau is interpolated
+between some delays, and the echoes are summed once for each of them. All moving echoes share one
+delay, their mean weighted by power, cycle by cycle.
 """
 
 from __future__ import annotations
@@ -244,8 +244,8 @@ class PhaseNoise:
         radar, n = self._radar, self._radar.samples_per_chirp
         n_tx, n_nodes = radar.n_tx, len(self._nodes_s)
         out = np.empty((len(moving_s) // n_tx, n_tx, 1 + n_nodes, n), np.float32)
-        # The filter 1 - exp(-j 2 pi f tau) for moving echoes, whose delay is that of their cycle,
-        # and for each node.
+        # The filter 1 - exp(-j 2 pi f tau): once for the moving echoes, with the mean delay of each
+        # cycle, and once for each node.
         half_turn = (np.pi * self._frequency).astype(np.float32)
         at_nodes = _residue(half_turn * self._nodes_s[:, None].astype(np.float32))
         of_moving = moving_s.reshape(-1, n_tx).mean(axis=1).astype(np.float32)

@@ -105,7 +105,7 @@ class ReceiverStage:
         of_room = room.clutter_if(np.arange(radar.n_tx)) if room else np.zeros(shape, np.complex64)
         around = of_room + self._still
         profiles = _profiles(around)
-        # The strongest cell, of what is still or of what moves.
+        # The strongest cell may be still or may move.
         strongest = max(mover.power_m2 for mover in expected.movers)
         self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), strongest)
         if self._receiver.phase_noise_hz:

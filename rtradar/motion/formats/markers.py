@@ -307,7 +307,7 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     nodes (frame, node, 3); the rotations of pelvis and thorax (frame, 3, 3) have columns forward,
     left and up.
     """
-    # The offsets of the table grow with the person, whose size is that of the shanks.
+    # The offsets of the table grow with the person, whose size is measured by the shanks.
     frames = _segments(markers)
     knees, ankles = ([markers[side + end] for side in "LR"] for end in ("KNE", "ANK"))
     shanks = np.linalg.norm(np.subtract(knees, ankles), axis=2)

@@ -199,7 +199,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
 def _warn_of_another_person(path: Path, skeleton: Path) -> None:
     """Warn where a skeleton beside a recording has its name, and another is given.
 
-    Skeletons of one source fit each other's recordings: only names tell whose is whose.
+    Skeletons of one source fit each other's recordings, so only their names tell them apart.
     """
     found = path.parent.glob("*.asf")  # of a folder that was just read from
     own = [one.stem for one in found if path.stem.startswith(f"{one.stem}_")]

@@ -110,8 +110,8 @@ def posed(
 ) -> Motion:
     """Make the motion of a rigid skeleton, as if y were up in the file.
 
-    ``joints`` are the indices of the bones that become joints, the root first, each with that of
-    the bone whose rotation it has, and ``offsets`` (joint, 3) theirs.
+    ``joints`` has a pair of indices for each joint, the root first: the bone that becomes the
+    joint, and the bone whose rotation it takes. ``offsets`` (joint, 3) are the joints' offsets.
     """
     roots, rotations = FileBackedRows(), FileBackedRows()
     # Recordings may be larger than memory, so some frames are posed at a time. The place of the

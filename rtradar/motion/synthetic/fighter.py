@@ -288,7 +288,8 @@ class Fighter:
             gap = np.sum((root + hip - ankle)[:, :2] ** 2, axis=1)
             leg = ankle[:, 2] + np.sqrt(np.maximum((_LONGEST * _LEG) ** 2 - gap, 0.01))
             limits.append(leg - hip[:, 2] + foot.free.at(t)[0])
-        # A soft minimum of what is wanted and of what both legs allow, with no kink in time.
+        # The root rises as wanted, but no higher than both legs allow. The soft minimum of these
+        # heights has no kink in time.
         levels = -_SHARPNESS * np.stack([wanted, *limits])
         root[:, 2] = -np.logaddexp.reduce(levels) / _SHARPNESS
 

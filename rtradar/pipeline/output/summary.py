@@ -205,7 +205,7 @@ def room_findings(capture: Capture, plots: Plots) -> dict[str, Any]:
     """
     if capture.room is None:
         return {}
-    # The instant is that of the frame kept as received, or else that of most detections.
+    # The instant is that of the frame kept as received, or else of the frame with most detections.
     maps: Any = plots.maps
     times = np.asarray(maps["time"])
     if "range_doppler_received" in maps:

@@ -232,8 +232,8 @@ _RATE_CYCLES = 2
 """Cycles before and after such a time, over which range rates are taken."""
 
 MAX_SHOWN, SHOWN_HZ = 400, 40.0
-"""Largest number of frames whose middle is kept, those of 10 s, and of these in a second; of longer
-captures fewer frames are kept."""
+"""Largest number of frames whose middle is kept, which lasts for 10 s, and their largest rate [Hz].
+Longer captures keep fewer frames a second."""
 
 
 class Look(NamedTuple):

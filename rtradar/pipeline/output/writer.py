@@ -250,9 +250,9 @@ class MapStore:
     ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
-    becomes an attribute of their datasets, ``attributes`` those of the file. ``unit`` is that of
-    the samples, whose square is that of powers. For the ``parts`` there is a group ``truth``, and
-    without them no map ``source``.
+    becomes an attribute of their datasets, and ``attributes`` become attributes of the file.
+    Samples have the ``unit``, and powers have its square. With ``parts`` there is a group
+    ``truth``, and without them there is no map ``source``.
     """
 
     def __init__(
