@@ -61,6 +61,8 @@ def train(options: argparse.Namespace) -> None:
             f"give one of {', '.join(RECIPES)}"
         )
     device = pick_device(options.device)
+    # Options that are not given leave the recipe as it is. No learning rate is below 0, so that
+    # limit lets all epochs run.
     recipe = RECIPES[options.recipe].changed(
         points=options.points,
         epochs=options.epochs,

@@ -75,6 +75,8 @@ class Collection:
             raise InputError("no folder of clouds; give at least one of rtradar dataset build")
         self.folders = tuple(Path(folder) for folder in folders)
         self._name = ", ".join(f"'{folder}'" for folder in self.folders)
+        # A folder that is named twice counts once; samples that two folders share are refused
+        # below.
         paths: list[Path] = []
         for folder in dict.fromkeys(self.folders):
             own = [sample_path(folder, identity) for identity in read_index(folder)]

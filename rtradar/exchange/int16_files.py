@@ -109,6 +109,8 @@ def _about(path: Path, recording: IfRecording, layout: Dca1000Layout | None) -> 
         **recording.waveform(),
         "radar": json.loads(recording.radar_text),
     }
+    # A raw capture has no axes of antennas: its words come in the order in which the board sends
+    # them.
     if layout is not None:
         shape = [recording.shape[0], words_of(layout, radar)]
         return about | {

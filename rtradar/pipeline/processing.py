@@ -295,6 +295,7 @@ def frame_angles(
         row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
         values = cell_spectra(cube, radar, row, column, window_functions=window_functions)
         blocks.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
+    # The blocks are joined as if all cells had been measured at once.
     if len(blocks) == 1:
         return blocks[0]
     joined: dict[str, Any] = {}

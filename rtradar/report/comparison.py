@@ -33,6 +33,7 @@ def draw_power_over_time(
     """Draw the echo power [m^2] of each model over time [s], and differences to the reference."""
     figure = new_figure(5.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    # Both axes begin the cycle of colours anew, so that a model has one colour in both.
     for axes in (above, below):
         axes.set_prop_cycle(color=LIGHT.cycle)
     for name, values in power.items():

@@ -182,6 +182,7 @@ def range_doppler_map(
     places = np.column_stack([velocity[columns], distance[rows]])
     found = mask if counts is None else counts
     across, ahead = np.concatenate([np.empty((0, 2)), *(one.xy for one in ghosts)]).T
+    # The power is a sum over the channels, and the map shows their mean.
     fields: dict[str, Any] = {
         "labels": (VELOCITY_LABEL, "Range [m]"),
         "level_db": unit.level(power / radar.n_channels),

@@ -166,6 +166,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
 
 def _checked(asked: str, traits: Traits) -> tuple[str, _Chosen]:
     """The activity, and all its traits."""
+    # Traits follow the activity in its name, as in "walk,tempo=1.1", or are given as keywords,
+    # which overrule those in the name.
     check_activity(asked)
     activity, *texts = asked.split(",")
     names = [key for key in rules_of(_Chosen) if key not in ("duration_s", "rate_hz")]

@@ -115,6 +115,8 @@ def load_run_view(folder: Path) -> RunView:
 
 def run_view_of(result: Result, maps: Mapping[str, Any], snapshots: Snapshots) -> RunView:
     """Return the view of a run from what it found, its maps with their axes, and snapshots."""
+    # The summary may be anybody's: what it lacks has a default, and its texts are made fit to
+    # print.
     summary, radar, points = result.summary, result.radar, result.points
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
