@@ -48,6 +48,8 @@ def html_card(
     str
         One element ``div``; all given texts are escaped.
     """
+    # Each heading gets a table, and the picture follows. The texts may come from anybody, so all of
+    # them are escaped.
     parts = []
     for heading, rows in tables.items():
         caption = f"<caption>{escape(printable(heading))}</caption>" if heading else ""
@@ -115,6 +117,8 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         The digits, and the unit.
     """
     value = float(f"{value:.{digits}g}")  # 999.99 µs are 1 ms
+    # The prefix is that of the largest power of a thousand below the value, as far as there are
+    # prefixes.
     power = 3 * math.floor(math.log10(abs(value)) / 3) if value and math.isfinite(value) else 0
     power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
     return f"{value / 10.0**power:.{digits}g} {_PREFIXES[power]}{unit}"

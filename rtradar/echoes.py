@@ -58,6 +58,7 @@ class Echoes:
         if not self.path.any():
             # Whoever takes some of the echoes need not say again that all are direct.
             object.__setattr__(self, "path", np.zeros(echoes, dtype=np.int64))
+        # All arrays must agree in the numbers of chirps, receivers and echoes.
         expected = {
             "amplitude": (*self.frequency.shape, *self.length.shape),
             "frequency": (max(1, self.frequency.size),),

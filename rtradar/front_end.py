@@ -55,6 +55,7 @@ class Antenna:
 
     def __post_init__(self) -> None:
         check_fields(self, "antenna: ")
+        # A cut is a list of angles with as many levels, and only a table has cuts.
         cuts = {
             name: (getattr(self, f"{name}_deg"), getattr(self, f"{name}_db"))
             for name in ("azimuth", "elevation")
@@ -122,11 +123,14 @@ class Antenna:
         if self.exponent is not None:
             ahead = unit[..., 0]
             return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)
+        # The power of a half-wave dipole is (cos(pi/2 cos(a)) / sin(a))^2 at an angle a to its
+        # axis.
         if self.pattern == "dipole":
             along = unit[..., 2] if polarization == "v" else unit[..., 1]
             # On the axis itself the ratio is 0 / 0, and its limit is 0.
             across = np.maximum(1 - along**2, 1e-12)
             return np.asarray(np.cos(np.pi / 2 * along) ** 2 / across)
+        # The decibels of both cuts add up. Beyond its ends a cut keeps its last value.
         level = np.zeros(unit.shape[:-1])
         if self.azimuth_deg:
             azimuth_deg = np.degrees(np.arctan2(unit[..., 1], unit[..., 0]))
@@ -147,7 +151,7 @@ _Hertz = Annotated[tuple[float, ...], Limits(1, 1e12)]
 
 @dataclass(frozen=True, kw_only=True)
 class Interferer:
-    """Another FMCW radar, whose ramps cross those of ours.
+    """Another FMCW radar, whose ramps cross our own.
 
     Each of its ramps begins with the same phase, as ours do.
 

@@ -73,6 +73,7 @@ def check_unit(where: str, value: object) -> float | None:
     """Return the length unit [m], given by its name or its metres; None where it is to be found."""
     if value is None or value == "auto":
         return None
+    # A text is the name of a unit, or its metres as the command line gives them.
     if isinstance(value, str):
         if value in UNITS_M:
             return UNITS_M[value]

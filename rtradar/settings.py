@@ -188,6 +188,7 @@ class RunSettings:
     noise_power_m2: Annotated[float | None, _POWER] = None
 
     def __post_init__(self) -> None:
+        # A tolerance of -inf dB stands for none at all, because TOML has no word for None.
         if is_real(self.path_tolerance_db) and self.path_tolerance_db == -math.inf:
             object.__setattr__(self, "path_tolerance_db", None)
         for name in ("model_options", "detector_options"):
@@ -235,12 +236,14 @@ def takes_settings(function: _Function) -> _Function:
     Those are the options that the annotation ``Unpack[...]`` names, with the defaults and the texts
     of `RunSettings`.
     """
+    # The module postpones the evaluation of annotations, so they are text here.
     written = inspect.signature(function)
     *others, options = written.parameters.values()
     name = str(options.annotation).removeprefix("Unpack[").removesuffix("]")
     taken = function.__globals__[name]
     kinds = get_type_hints(RunSettings)
     usual = {one.name: one.default for one in dataclasses.fields(RunSettings)}
+    # Each setting that the options have becomes a parameter.
     named = [
         inspect.Parameter(
             name,

@@ -178,6 +178,7 @@ def measure(plan: Plan) -> dict[str, Any]:
         "paper": {"trouble": "", "radars": {}},
         "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": []},
     }
+    # The caches begin empty, so that the first use of each model is that of a new user.
     with temporary_folder("rtradar-bench-") as folder:
         runner = Runner(folder)
         if "models" in plan.parts:
@@ -192,7 +193,9 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     baselines = {
         name: measure_baseline(name, plan.repeats, quick=plan.quick) for name in plan.radars
     }
+    # The cases are run in turn, so that a slow minute of the machine affects all of them alike.
     runs = runner.measure(model_cases(plan), plan.repeats, "models")
+    # Each model is compared with the cheapest one run by run, and with the method of the paper.
     cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST}
     for case, own in runs.items():
         row = _row(case, own, radars[case.radar])
@@ -249,6 +252,8 @@ def _paper_over(baseline: Row | None, radar: Radar, row: Row) -> dict[str, float
     """
     if baseline is None:
         return None
+    # The paper's method is timed per frame; this is how many frames the chirps would fill without
+    # overlap.
     frames = row["chirps"] / radar.chirps_per_frame
     ours_if = sum(row["stages"][name]["median"] for name in ("scatter", "signal"))
     return {
@@ -342,6 +347,7 @@ def _growing(axes: Any, rows: list[Row], fidelity: str) -> None:
     axes.set(xlabel="recording [s]", ylabel="time [s]", xlim=(0, None), ylim=(0, None))
     axes.legend(loc="upper left")
     dress(axes, title=f"`{fidelity}`")
+    # Memory has another unit, so it gets an axis of its own.
     memory, beside = [row["peak_memory_mb"] for row in rows], axes.twinx()
     beside.plot(x, memory, "s--", color="0.5", markersize=4)
     beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))

@@ -104,6 +104,7 @@ class Runner:
 
     def measure(self, cases: Sequence[Case], repeats: int, what: str) -> dict[Case, list[Run]]:
         """Run every case some times, all cases in turn, each model once before that."""
+        # The first run of a model also compiles, and is kept apart.
         fresh = {case.fidelity: case for case in reversed(cases) if case.fidelity not in self.first}
         runs: dict[Case, list[Run]] = {case: [] for case in cases}
         count = len(fresh) + repeats * len(cases)
@@ -119,6 +120,7 @@ class Runner:
     def run(self, case: Case) -> Run:
         """One run of a case."""
         with temporary_folder(inside=self._folder) as out:
+            # Runs go through the command line, as those of a user do.
             words = f"-m rtradar run {MOTION} --duration {case.duration_s}".split()
             words += ["--radar", case.radar, "--fidelity", case.fidelity, "--variant", "cpu"]
             words += ["--out", str(out / "run")]

@@ -85,6 +85,7 @@ class Ellipsoids:
         given = {"centres": centres, "frames": frames, "semi_axes": semi_axes}
         arrays = {name: np.asarray(value, np.float64) for name, value in given.items()}
         parts = arrays["centres"].shape[:1]
+        # All three agree on the number of parts, and none is empty.
         for name, array in arrays.items():
             axes = (3, 3) if name == "frames" else (3,)
             if array.shape != (*parts, *axes) or not array.size:
@@ -98,6 +99,7 @@ class Ellipsoids:
         least, turned = arrays["semi_axes"].min(), arrays["frames"]
         if not least > 0:
             raise InputError(f"Ellipsoids.semi_axes: the least is {least} m; it must be positive")
+        # A rotation: columns of length 1 at right angles, and no mirror image.
         error = np.abs(np.swapaxes(turned, 1, 2) @ turned - np.eye(3)).max()
         if error > 1e-6 or (np.linalg.det(turned) < 0).any():
             raise InputError(
@@ -209,6 +211,8 @@ class Body:
         InputError
             Where the skeleton is not understood, or a part comes out without an extent.
         """
+        # The length of a part is that of its bone; across it everyone has the radii of the table,
+        # times the girth.
         nodes = to_nodes(motion)
         radii = np.array(PART_RADII_M) * nodes.girth
         lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
@@ -298,6 +302,8 @@ class Body:
         """
         if self.mesh is None:
             raise InputError(f"body of {self.motion.name}: it has no mesh; give one as mesh=")
+        # The pose rests past the end, and breath goes on: each vertex moves as far as it belongs to
+        # the chest.
         instants = np.asarray(times, np.float64)
         moving = np.minimum(instants, self.duration_s)
         vertices = self.mesh.vertices(moving, divisions)
@@ -328,8 +334,8 @@ class Body:
         """Frames (part, 3, 3) of the ellipsoids in the axes of their bones."""
         along = self.motion.offsets[1:] / (2 * self.semi_axes[:, 2:])
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        # Any direction across will do, for a = b, but it must be the same at all times: the axis
-        # most across the bone.
+        # Any direction across will do, because a = b, but it must be the same at all times: the
+        # axis most across the bone.
         across = np.cross(np.eye(3)[np.argmin(np.abs(along), axis=1)], along)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         return np.stack([across, np.cross(along, across), along], axis=2)
@@ -337,6 +343,7 @@ class Body:
 
 def _breath(breathing: Breathing, positions: _Array, frames: _Array, times: ArrayLike) -> _Array:
     """Displacement (time, 2, 3) of the `_CHEST` by breath [m]."""
+    # Forward is across the shoulders and across the bone of the torso.
     left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
     ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
     ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
@@ -365,7 +372,7 @@ def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int6
     Returns
     -------
     vertices : (vertex, 3) float64
-        Read-only, for they are kept.
+        Read-only, because they are kept.
     faces : (face, 3) int64
         Anticlockwise seen from outside; read-only.
 
@@ -393,12 +400,13 @@ def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int
     Returns
     -------
     vertices : (10 frequency^2 + 2, 3) float64
-        Read-only, for they are kept.
+        Read-only, because they are kept.
     faces : (20 frequency^2, 3) int64
         Anticlockwise seen from outside; read-only.
     """
     import trimesh  # slow to import
 
+    # Points of an even grid on each of the 20 faces, row by row.
     solid = trimesh.creation.icosahedron()
     rows, places = np.tril_indices(frequency + 1)
     weights = np.stack([frequency - rows, rows - places, places], axis=1) / frequency
@@ -415,6 +423,7 @@ def geodesic_sphere(frequency: int) -> tuple[NDArray[np.float64], NDArray[np.int
     unique_rows: Any = trimesh.grouping.unique_rows
     chosen, number = unique_rows(points, digits=9)
     vertices, faces = points[chosen], number[faces.reshape(-1, 3)].astype(np.int64)
+    # Out to the sphere, and then so far that facets stand for it in the mean.
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -445,6 +454,7 @@ def ellipsoid_meshes(
     faces : (face, 3) int64
         Anticlockwise seen from outside, the same for every part.
     """
+    # The sphere, stretched along the semi-axes, turned, and moved.
     sphere, faces = unit_sphere(subdivisions)
     local = sphere * ellipsoids.semi_axes[:, None, :]
     return ellipsoids.centres[:, None, :] + local @ np.swapaxes(ellipsoids.frames, 1, 2), faces

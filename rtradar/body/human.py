@@ -107,6 +107,7 @@ class HumanMesh:
         InputError
             Where a time lies outside the motion, or ``divisions`` is not from 0 to 4.
         """
+        # Linear in the bones: one product of a sparse matrix with the bones at all times.
         features, _ = self._divided(divisions)
         rows = self.bones(times)
         count = len(rows)
@@ -131,10 +132,13 @@ class HumanMesh:
         from scipy.spatial.transform import Rotation  # slow to import
 
         count = len(positions)
+        # Axes of the mesh's parts in the world, and where their bones begin.
         turns: Any = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix()
         bones = turns.reshape(count, -1, 3, 3)[:, self.fit.turned_by] @ self.fit.mounting
         starts = positions[:, list(NODE_PARENTS[1:]), None]
         rows = np.concatenate([np.swapaxes(bones, 2, 3), starts], axis=2).reshape(count, -1, 3)
+        # Skinning alone leaves the joints beside those of the recording; the skin around each moves
+        # by what is lacking.
         moves = self.fit.keypoint_moves(rows, positions[:, KEYPOINT_NODES])
         return np.concatenate([rows, moves], axis=1)
 
@@ -178,6 +182,8 @@ class HumanMesh:
         """
         if not 0 < frequency_hz < math.inf:
             raise InputError(f"HumanMesh: frequency_hz = {frequency_hz}; it must be positive")
+        # The sag of a chord is edge^2 / 8 R, to and fro twice that in path; each division halves
+        # the edge, and so quarters the sag.
         corners = self.fit.vertices[self.fit.faces]
         edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
         sag = 4 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS * edge**2 / (8 * _RADIUS_M)
@@ -251,23 +257,28 @@ def loop_subdivision(faces: NDArray[np.int64], vertices: int) -> tuple[Any, NDAr
     """
     from scipy.sparse import coo_matrix, diags, eye, vstack  # slow to import
 
+    # The three edges of each face, and each edge of the mesh once.
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     # One number an edge sorts far faster than two.
     edge = ends.min(axis=1).astype(np.int64) * vertices + ends.max(axis=1)
     edge, own = np.unique(edge, return_inverse=True)
     edges = np.stack(np.divmod(edge, vertices), axis=1)
     own, count = own.reshape(-1, 3), len(edges)
+    # A new vertex on each edge: 3/8 of both its ends, and 1/8 of the corner across in each of its
+    # two faces.
     opposite = np.roll(faces, 1, axis=1)
     number = np.arange(count)
     shares = np.concatenate([np.full(2 * count, 3 / 8), np.full(own.size, 1 / 8)])
     rows = np.concatenate([number, number, own.ravel()])
     columns = np.concatenate([edges[:, 0], edges[:, 1], opposite.ravel()])
     middles = coo_matrix((shares, (rows, columns)), shape=(count, vertices)).tocsr()
+    # An old vertex moves toward its neighbours, by a share that depends on their number.
     neighbours = coo_matrix((np.ones(count), edges.T), shape=(vertices, vertices)).tocsr()
     neighbours = neighbours + neighbours.T
     valence = np.asarray(neighbours.sum(axis=1)).ravel()
     share = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / valence) / 4) ** 2) / valence
     kept = diags(1 - share * valence) @ eye(vertices) + diags(share) @ neighbours
+    # Four triangles of each: one at each corner, and one in the middle.
     (a, b, c), (ab, bc, ca) = faces.T, own.T + vertices
     children = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     finer = np.stack([np.stack(child, axis=1) for child in children], axis=1)

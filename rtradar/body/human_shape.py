@@ -105,9 +105,11 @@ def _read(folder: Path) -> RestShapes:
     standard = folder / "rigs" / "standard"
     with open(standard / "rig.default.json", encoding="utf-8") as file:
         rig = json.load(file)
+    # Bones by their names, and how much each vertex hangs on each.
     rig = rig.get("bones", rig)
     with open(standard / "weights.default.json", encoding="utf-8") as file:
         given: dict[str, list[tuple[int, float]]] = json.load(file)["weights"]
+    # The body alone; other groups are helpers, such as the cubes whose means are joints.
     quads = groups["body"]
     used, renumbered = np.unique(quads, return_inverse=True)
     quads = renumbered.reshape(-1, 4)
@@ -116,6 +118,7 @@ def _read(folder: Path) -> RestShapes:
     for number, bone in enumerate(bones):
         for vertex, weight in given.get(bone, ()):
             weights[vertex, number] = weight
+    # The shape of each age, as what it moves the base by.
     moved = np.stack([base + _of_age(folder, age, len(base)) for age in AGES])
     # Decimetres with y up become metres with z up.
     moved = 0.1 * moved[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
@@ -171,6 +174,7 @@ def _of_age(folder: Path, age: str, count: int) -> Array:
             path = folder / "targets" / "macrodetails" / name
             with gzip.open(path, "rt", encoding="utf-8") as file:
                 rows = np.array(file.read().split(), dtype=np.float64).reshape(-1, 4)
+            # The mean person is the mean over both genders and all choices.
             share = 1 / (len(_GENDERS) * len(choices))
             moved[rows[:, 0].astype(np.int64)] += share * rows[:, 1:]
     return moved
@@ -231,9 +235,12 @@ class Fit:
         """
         from scipy.sparse import csr_matrix  # slow to import
 
+        # A vertex as each part carries it, by weight: its place from the joint, stretched, and a
+        # one for the joint itself.
         own = np.einsum("pij,vpj->vpi", self.stretch, self.vertices[:, None] - self.starts)
         rows = np.concatenate([own, np.ones((*own.shape[:2], 1))], axis=2)
         skin = (rows * self.weights[..., None]).reshape(len(rows), -1)
+        # A smooth bump around each keypoint, by which the skin goes with it.
         away = np.linalg.norm(self.vertices[:, None] - self.keypoints @ self.vertices, axis=2)
         reach = _REACH * float(np.ptp(self.vertices[:, 2]))
         near = np.maximum(0, 1 - (away / reach) ** 2) ** 2
@@ -249,16 +256,20 @@ class Fit:
 
         ``rows`` (time, 4 rows a part, 3) pose the parts.
         """
+        # Bumps of neighbouring keypoints overlap: a small linear system gives the moves that take
+        # all of them to their places at once.
         own, together = np.split(self._of_keypoints, [rows.shape[1]], axis=1)
         return np.asarray(np.linalg.inv(together) @ (places - own @ rows))
 
 
 def fit_to(motion: Motion) -> Fit:
     """Fit the mesh to a motion on the 22 nodes."""
+    # The pose of the recording that is most like the rest of the mesh, in which both are compared.
     shapes = rest_shapes()
     lengths = np.linalg.norm(motion.offsets, axis=1)
     pose, turns = _reference_pose(motion, _joints(shapes, 2, _trunk_heights(motion, None)))
     heights = _trunk_heights(motion, pose)
+    # The age whose mesh is as large as the person, by limbs and trunk, and the mesh of that age.
     own = [_size(_joints(shapes, age, heights)) for age in range(3)]
     wanted = _size(pose)
     age = float(np.interp(wanted, own, [0, 1, 2]))
@@ -270,10 +281,13 @@ def fit_to(motion: Motion) -> Fit:
 
     vertices = between(shapes.vertices)
     joints = between(np.stack([_joints(shapes, k, heights) for k in range(3)]))
+    # What the size still lacks is a scale; beyond it parts are stretched to the bones of the
+    # recording.
     scale = wanted / _size(joints)
     height = scale * float(np.ptp(vertices[:, 2]))
     # What is read from files has girth 1, which says nothing about the build.
     build = 1.0 if motion.girth == 1 else motion.girth * NOMINAL_STATURE_M / height
+    # How each part of the mesh lies in that pose, and by how much it is stretched.
     frames = _carried(joints, pose)
     stretch = _stretches(joints, lengths, pose, frames, scale, build)
     starts, turned_by = joints[list(NODE_PARENTS[1:])], np.arange(1, len(NODES))
@@ -284,6 +298,7 @@ def fit_to(motion: Motion) -> Fit:
         turned_by[part] = 0
         below = np.linalg.solve(frames[part + 1] @ stretch[part], hips)
         starts[part] = middle(joints, "hip") - below
+    # From then on each part turns with its bone.
     mounting = np.swapaxes(turns[turned_by], 1, 2) @ frames[1:]
     weights = _part_weights(shapes, vertices)
     hung = starts, stretch, mounting, turned_by
@@ -294,9 +309,11 @@ def _joints(shapes: RestShapes, age: int, heights: dict[str, float]) -> Array:
     """Places (node, 3) of the nodes in the mesh of one age."""
     joints = np.zeros((len(NODES), 3))
     joints[KEYPOINT_NODES] = shapes.keypoints @ shapes.vertices[age]
+    # Ends of limbs are those of bones of the data.
     for side, (node, end) in itertools.product("LR", _TABLE["limb_ends"].items()):
         own = shapes.joints[end.replace("@", side)]
         joints[NODES.index(f"{side.lower()}_{node}")] = own[age]
+    # Nodes of the trunk lie on the spine of the data, at the heights that the recording has them.
     hips, shoulders = (middle(joints, node)[2] for node in ("hip", "shoulder"))
     spine = np.array([shapes.joints[f"{bone}.head"][age] for bone in _TABLE["spine"]])
     for node in _TRUNK:
@@ -310,6 +327,8 @@ def _trunk_heights(motion: Motion, pose: Array | None) -> dict[str, float]:
 
     In a pose, or roughly by lengths of bones.
     """
+    # Before a pose is known, by lengths of bones, with the root above the hips by a part of the hip
+    # bone.
     if pose is None:
         lengths = np.linalg.norm(motion.offsets, axis=1)
         bones = [lengths[NODES.index(node)] for node in _TRUNK[1:]]
@@ -334,6 +353,7 @@ def _reference_pose(motion: Motion, joints: Array) -> tuple[Array, Array]:
     Among frames of the recording, and the pose without rotations, from which skeletons of files
     start. From there the mesh turns about its bones as the recording does.
     """
+    # Some frames over the recording, and the pose of the skeleton itself.
     count = len(motion.root_positions)
     frames = np.unique(np.linspace(0, count - 1, min(count, _CANDIDATES)).astype(np.int64))
     still = np.tile([0.0, 0.0, 0.0, 1.0], (1, len(NODES), 1))
@@ -384,6 +404,8 @@ def _carried(joints: Array, pose: Array) -> Array:
     frames = np.empty((len(NODES), 3, 3))
     frames[0] = _frame(pose, "hip") @ _frame(joints, "hip").T
     ways = zip(NODES[1:], _directions(joints), _directions(pose), strict=True)
+    # Down the tree: a bone turns by the smallest rotation from where its parent takes it to where
+    # it points in the pose.
     for number, (node, way, wanted) in enumerate(ways, start=1):
         parent = frames[NODE_PARENTS[number]]
         if node == "thorax":
@@ -403,9 +425,12 @@ def _stretches(
     ways = _directions(joints)
     own = np.linalg.norm(joints[1:] - joints[list(NODE_PARENTS[1:])], axis=1)
     stretch = np.empty((len(ways), 3, 3))
+    # Along its bone a part gets the length of the recording's, across it the build.
     for part, (node, way) in enumerate(zip(NODES[1:], ways, strict=True)):
         along = lengths[part + 1] / own[part]
         across = scale * build
+        # These parts end in no joint, but elsewhere in each skeleton: the shape of the mesh
+        # decides, and they are stretched little.
         if node in _TABLE["ends"]:
             along = scale * np.clip(along / scale, *_END_STRETCH)
             across = scale
@@ -433,11 +458,13 @@ def _part_weights(shapes: RestShapes, vertices: Array) -> Array:
     """Weights (vertex, part), by the part to which each bone of the mesh belongs."""
     weights = np.zeros((len(vertices), len(NODES) - 1))
     node_of = _TABLE["node_of_bone"]
+    # A bone that no part has belongs to the part of the next bone above it.
     for number in range(len(shapes.bones)):
         bone = number
         while shapes.bones[bone] not in node_of:
             bone = shapes.parents[bone]
         weights[:, NODES.index(node_of[shapes.bones[bone]]) - 1] += shapes.weights[:, number]
+    # Both hips are one pelvis, whose halves are told apart by their side.
     left, right = (NODES.index(f"{side}_hip") - 1 for side in "lr")
     pelvis = weights[:, left] + weights[:, right]
     weights[:, left] = np.where(vertices[:, 0] > 0, pelvis, 0)

@@ -142,6 +142,7 @@ class Person:
         InputError
             Where the interval is not inside the recording.
         """
+        # Cut out and turned first, then moved to their position.
         put = place if self.placement == "standard" else keep_place
         turn = heading_deg + self.heading_deg
         placed = put(self.motion, start_s + self.start_s, duration_s, turn)
@@ -175,6 +176,7 @@ class Bodies(Body):
                 f"Bodies: people = {brief(given)}; it must be a list of one Body or more, such as "
                 "Body.from_motion gives, or of nobody, for a given duration_s"
             )
+        # The fields of a Body, without its constructor: these people have no common motion.
         names = distinct_names([person.motion.name for person in people])
         sizes = [len(person.part_names) for person in people]
         shortest = min((person.duration_s for person in people), default=0.0)
@@ -219,6 +221,7 @@ class Bodies(Body):
         instants = np.asarray(times, dtype=np.float64)
         shape = len(instants), len(self.semi_axes), 3
         centres, frames = np.empty(shape), np.empty((*shape, 3))
+        # Who has come to the end of their motion rests, and goes on breathing.
         for number, person in enumerate(self.people):
             own = self.owner == number
             moving = np.minimum(instants, person.duration_s)
@@ -303,6 +306,7 @@ def body_of_people(people: Sequence[Person], settings: RunSettings) -> Body:
     InputError
         Where an interval is not inside a recording, or a body is not known.
     """
+    # What is left of each recording after its start.
     left = [person.motion.duration_s - person.start_s - settings.start_s for person in people]
     duration_s = settings.duration_s
     if not people and duration_s is None:

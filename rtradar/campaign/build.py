@@ -69,6 +69,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
     for name in logging.root.manager.loggerDict:
         if name.split(".")[0] in ("asyncio", "distributed", "tornado"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
+    # A cluster that is there already, whose workers may join in a moment.
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
@@ -86,6 +87,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
                 ) from None
             yield client
         return
+    # A cluster of processes on this machine, each with its share of the cores.
     check_cache()
     count = workers or CPU_COUNT
     environment = thread_environment(thread_limit() or max(1, CPU_COUNT // count))
@@ -241,10 +243,14 @@ def build_dataset(
     read = read_spec(spec, changed=changed)
     if shard is not None:
         read = read._replace(shard=check_shard(shard))
+    # The plan follows from the specification alone, so that a build that was killed goes on with
+    # what is missing.
     plans = plan_samples(read)
     folder = out.resolve()
     with exclusive_lock(folder):
         sweep(folder)
+        # Index and origin come first: they say what belongs to the data set, also while samples are
+        # missing.
         missing, damaged = missing_of(plans, folder)
         write_index(folder, [plan.identity for plan in plans])
         write_made(spec, read, folder)
@@ -252,6 +258,7 @@ def build_dataset(
         done, n_workers = _make_missing(missing, folder, plan_only, workers, scheduler)
         wall_s = time.perf_counter() - began
         sweep(folder)
+    # What can be made is made before an error is told.
     good = [outcome for outcome in done if not outcome.trouble]
     whole = len(plans) - len(missing)
     _tell_troubles(done, plans, whole)
@@ -329,6 +336,8 @@ def work(
     from distributed import CancelledError, KilledWorker, as_completed
     from distributed.comm.core import CommClosedError
 
+    # Samples are handed out a few at a time: a scheduler with a million of them would hold all
+    # their motions.
     waiting = iter(missing)
 
     def submit(number: int) -> list[Any]:
@@ -340,6 +349,7 @@ def work(
     done: list[Outcome] = []
     with tqdm(total=len(missing), desc="samples", unit="sample", disable=None) as bar:
         try:
+            # As one sample is done, the next is handed out.
             at_once = max(_AT_LEAST, _QUEUED * len(client.scheduler_info(n_workers=-1)["workers"]))
             futures = as_completed(submit(at_once), loop=client.loop)
             for future in futures:
@@ -395,6 +405,7 @@ def _estimate(
     """Estimate time and bytes of the missing samples from the fastest sample of each kind."""
     measured = {outcome.identity: outcome.work_s for outcome in good}
     seconds, count = 0.0, len(missing) - len(good)
+    # Seconds for a second of radar, by the fastest of each kind: slower ones had to warm up.
     for plans in _by_kind(missing).values():
         made = [plan for plan in plans if plan.identity in measured]
         fastest = min(measured[plan.identity] / plan.interval_s for plan in made)

@@ -63,6 +63,8 @@ def export_dataset(folders: Sequence[Path], out: Path) -> int:
         raise InputError(f"'{folders[0]}' holds no sample; build a data set that has some")
     import zarr
 
+    # Arrays, attributes, and a text for people; metadata of all arrays together, so that opening
+    # reads one file.
     with new_folder(out) as work, warnings.catch_warnings():
         # Both are in use everywhere, though no part of the specification of Zarr 3 yet.
         warnings.filterwarnings("ignore", message=".*(specification|Consolidated metadata).*")
@@ -94,6 +96,7 @@ def _put(group: Any, name: str, values: Any, dims: Sequence[str], **attrs: Any) 
 
 def _write_columns(group: Any, collection: Collection) -> None:
     """Write the ids, the labels and every entry of the provenance, one value for each sample."""
+    # One array for each entry of the provenance.
     table = collection.to_pandas().drop(columns="folder")  # a place on this machine alone
     _put(group, "sample", table.index.to_numpy(), ["sample"], long_name="id of the sample")
     for name in table.columns:
@@ -126,6 +129,7 @@ def _write_arrays(group: Any, collection: Collection) -> None:
     """Write clouds, maps, joints and their axes; only one chunk at a time is in memory."""
     names = [KINDS[kind] for kind in collection.kinds]
     axes = sorted({axis for name in names for axis in ARRAYS[name].dims if axis in ARRAYS})
+    # As large as the largest sample; of clouds the number of points says where the rest begins.
     for name in names:
         shapes = np.array([read_shape(path, name) for path in collection.paths])
         shape = tuple(shapes.max(axis=0).tolist())
@@ -137,6 +141,7 @@ def _write_arrays(group: Any, collection: Collection) -> None:
         if name == "spatial" and any("source_names" in row for row in collection.provenance):
             own = "spatial_source"
             _stream(group, own, shape[:1], ("sample", *ARRAYS[own].dims), collection)
+    # An axis that is the same for all samples is stored once.
     for name in axes:
         first = read_sample(collection.paths[0], name)
         if all(np.array_equal(read_sample(path, name), first) for path in collection.paths):
@@ -144,6 +149,7 @@ def _write_arrays(group: Any, collection: Collection) -> None:
         else:
             size = max(read_shape(path, name)[0] for path in collection.paths)
             _stream(group, name, (size,), ("sample", name), collection, f"{name}_of_sample")
+    # Names along axes that are no numbers.
     dims = {dim for name in names for dim in ARRAYS[name].dims}
     known = _COORDINATES | (
         {"joint": collection.maps(0)["joint"].values} if "joint" in dims else {}
@@ -161,6 +167,7 @@ def _stream(
     own_name: str | None = None,
 ) -> None:
     kind = np.dtype(ARRAYS[name].dtype)
+    # Chunks of some megabytes hold whole samples.
     each_bytes = max(1, int(np.prod(shape)) * kind.itemsize)
     step = min(max(1, _CHUNK_BYTES // each_bytes), _MOST_A_CHUNK, len(collection))
     fill = np.nan if kind.kind == "f" else _NOT_KNOWN
@@ -218,6 +225,7 @@ def data_card(collection: Collection, arrays: Mapping[str, Any]) -> str:
         given = (row.get(key, usual) for row in rows)
         return Counter(printable(str(value)) for value in given if value is not None)
 
+    # What warnings the samples came with, and how many came with each.
     limits = Counter(
         printable(str(line))
         for row in rows

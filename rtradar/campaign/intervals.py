@@ -48,6 +48,7 @@ class Intervals:
 
     def __post_init__(self) -> None:
         check_fields(self)
+        # Keys that have no effect together are refused.
         regular = self.place == "regular"
         if self.count > 1 if regular else self.hop_s is not None:
             key = "count" if regular else "hop_s"
@@ -102,6 +103,7 @@ class Intervals:
         """
         if (text := self.lacks(name, length_s)) is not None:
             raise InputError(text)
+        # One interval to the end, intervals at equal steps, or intervals drawn at random.
         end = length_s if self.end_s is None else self.end_s
         if self.duration_s is None:
             return [(self.start_s, round(end - self.start_s, 6))]
@@ -126,6 +128,8 @@ class Intervals:
             free = (last + self.duration_s - self.start_s) / count - self.duration_s
             slots = self.start_s + np.arange(count) * (free + self.duration_s)
             return sorted(np.minimum(slots + max(free, 0.0) * random.random(count), last).tolist())
+        # Each strike, in random order, at a random place in the middle half of an interval, as long
+        # as intervals do not overlap. Without any strike, anywhere.
         inside = strikes[(strikes >= self.start_s) & (strikes <= end)]
         wanted = random.permutation(inside) - self.duration_s * random.uniform(
             *_MIDDLE, size=len(inside)
@@ -149,6 +153,8 @@ def strike_times(motion: Motion) -> NDArray[np.float64]:
     from scipy.ndimage import gaussian_filter1d
     from scipy.signal import find_peaks
 
+    # Speeds of wrists and ankles relative to the root, smoothed; the largest of the four at each
+    # time.
     nodes = to_nodes(motion)
     times = np.arange(0.0, nodes.duration_s, _STEP_S)
     positions = nodes.at(times)[0]
@@ -190,10 +196,13 @@ class Augmented:
         """
         random = np.random.default_rng(stream(seed, _STREAM))
         ranges = {key: value for key, value in vars(self).items() if key != "copies"}
+        # A number for each range, in a fixed order.
         drawn = {
             key: round(low + (high - low) * float(random.random()), 4)
             for key, (low, high) in ranges.items()
         }
+        # A copy at a higher tempo needs more of the recording; rounded down, it never needs more
+        # than there is.
         most = math.floor(1e4 * length_s / duration_s) / 1e4
         tempo = min(drawn["tempo"], max(most, 1.0))
         last = max(0.0, length_s - duration_s * tempo)
@@ -212,6 +221,7 @@ class Augmented:
 
 def vary(motion: Motion, how: Mapping[str, Any]) -> Motion:
     """Return the motion as a copy of `Augmented.draw` has it."""
+    # Mirror, size, drift over the floor, and tempo, which is another rate of frames.
     nodes = to_nodes(motion)
     if how["mirror"]:
         nodes = mirrored(nodes)

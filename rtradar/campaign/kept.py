@@ -53,11 +53,13 @@ def capture_of(
     """
     angles = angles and (clouds or "range_azimuth" in keep)
     capture = prepare(people, radar, scene, RunSettings(**options))
+    # Who returned a point is asked only where there are several to ask for.
     sources = (*capture.body.names, *(one.name for one in capture.scene.objects))
     several = angles and clouds and len(sources) > 1
     source_of = Sources(EchoTable(capture, middles=False)).of_cells if several else None
     keeper = MapKeeper(capture.processing, keep, source_of, angles, clouds)
     capture.stream(keeper, progress=False)
+    # Joints are labels at the times of the frames.
     maps = keeper.maps()
     if "joints" in keep:
         maps.setdefault("time", capture.radar.window_times(capture.frame_starts))
@@ -108,6 +110,7 @@ class MapKeeper:
         if "spectrograms" in self._keep:
             columns = self._spectrogram.push(spectra)
             self._add(spectrogram_time=columns.time, spectrogram=columns.power)
+        # Without clouds or maps of frames the spectrogram is all there is to compute.
         if not (self._makes_clouds or {"range_doppler", "range_azimuth"} & {*self._keep}):
             return
         for frame in self._clouds.frames(spectra):
@@ -124,8 +127,8 @@ class MapKeeper:
     def maps(self) -> dict[str, NDArray[np.floating]]:
         """Return the maps of all frames by name, with their axes; nothing if none is kept.
 
-        The axis of time is that of the frames, and so that of joints. To be called once: the frames
-        of a map go when it is joined, so that no two maps are held twice.
+        Maps and joints share the time axis of the frames. Call it once: the frames of a map are
+        freed when the map is joined, so that memory never holds all maps twice.
         """
         if not self._keep:
             return {}

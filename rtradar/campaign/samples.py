@@ -101,6 +101,7 @@ class SamplePlan:
         """Return a copy whose motion is cut to the interval, small enough to send to a worker."""
         if self.motion is None:
             return self
+        # A faster copy takes a longer part of the recording.
         start_s, varied = self.parameters["start_s"], self.parameters.get("varied")
         length_s = self.interval_s * (varied["tempo"] if varied else 1.0)
         # An interval to the end is rounded, and may be a little longer than what is there.
@@ -131,6 +132,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     InputError if a recording cannot be read or is too short, two samples are equal, or there are
     too many.
     """
+    # Intervals of actors and of recordings; those of recordings that are too short are told all at
+    # once.
     intervals = [interval for actor in spec.actors for interval in _takes(spec, actor)]
     read = cache(load_motion)  # a recording of two activities is given twice
     hide, short = None if spec.recordings else True, list[str]()
@@ -147,16 +150,20 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
         raise InputErrors([f"{text}, or leave it out (skip_short = true)" for text in short])
     for text in short:
         warnings.warn(f"{text.partition(';')[0]}: left out", ValidityWarning, stacklevel=2)
+    # Settings at their defaults are not part of a sample's identity, so that new settings leave
+    # older ids as they are.
     run, usual = asdict(spec.run), asdict(RunSettings())
     common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
     later = {"keep": list(spec.keep), "angles": spec.angles, "clouds": spec.clouds}
     common |= {key: value for key, value in later.items() if value not in ([], True)}
+    # Every interval under every combination.
     planned = [
         _plan(interval, combination, spec, common)
         for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
         for combination in spec.combinations
     ]
+    # The order of ids is as good as random: every shard has samples of all kinds.
     planned.sort(key=lambda plan: plan.identity)
     for plan, other in itertools.pairwise(planned):
         if plan.identity == other.identity:
@@ -179,6 +186,8 @@ def counts(planned: Sequence[SamplePlan]) -> dict[str, dict[str, int]]:
 
 
 def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
+    # A take is made long enough for all its intervals. Its seed follows from label and number, its
+    # body from the subject.
     take_s = spec.intervals.needed_s
     assert take_s is not None  # the specification was checked
     for take in actor.seeds:
@@ -212,6 +221,7 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
     for start_s, duration_s in recorded.intervals.of(
         recorded.name, motion.duration_s, places_seed, lambda: motion
     ):
+        # The seed follows from the content of the files, so that it stays when they are moved.
         seed = _seed(spec.run.seed, content, start_s)
         parameters = {
             "recording": recorded.name,
@@ -239,11 +249,13 @@ def _plan(
 ) -> SamplePlan:
     drawn, seed, scene = interval.drawn, interval.parameters["seed"], each.scene
     x, y = scene.person_position_m
+    # The room, the radar as it is turned there, and the person's place with its offset.
     if spec.random_rooms:
         scene = replace(Scene.random(_seed("room", seed)), name="random")
     radar = scene.turn(each.radar)
     place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
     scene = replace(scene, person_position_m=place)
+    # All that decides the sample, as plain values: its id is their hash.
     parameters = {
         **interval.parameters,
         **common,
@@ -268,6 +280,7 @@ def _drawn_others(others: Others, seed: int, place: tuple[float, float]) -> list
     low, high = np.transpose([others.x_m, others.y_m])
     places, found = [np.asarray(place)], []
     for _ in range(others.count):
+        # Places are drawn until one is far enough from everyone.
         for _ in range(_TRIES):
             drawn = np.round(low + (high - low) * random.random(2), 4)
             if min(float(np.linalg.norm(drawn - other)) for other in places) >= APART_M:
@@ -331,12 +344,14 @@ def make_sample(plan: SamplePlan) -> Made:
     """Make the sample of a `packed` plan; InputError if the person cannot be where it says."""
     began = Moment.now().work_s
     motion, values = plan.motion, plan.parameters
+    # The motion: an actor, a varied copy of a recording, or the recording.
     if motion is None:
         motion = _actor_motion(plan.label, values)
     elif "varied" in values:
         motion = vary(motion, values["varied"])
     settings: Any = vars(plan.run_settings())
     people: list[Motion | Person | Object] = [motion, *_others(values.get("others", ()), settings)]
+    # Warnings go with the sample, because nobody reads those of a worker.
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         clouds, maps, sources = capture_of(
@@ -357,6 +372,7 @@ def make_sample(plan: SamplePlan) -> Made:
     }
     if "joints" in maps:
         found["joint_names"] = list(NODES)  # of the body, whatever skeleton the recording has
+    # A uniform sample of the spatial cloud, in the order of time, with who returned each point.
     places = clouds.spatial.points
     kept = np.arange(len(places))
     if len(places) > SPATIAL_POINTS:

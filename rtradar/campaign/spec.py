@@ -54,7 +54,7 @@ _NUMBERS: Mapping[str, Any] = {
 }
 
 MOST_SAMPLES = 1_000_000
-"""Largest number of samples of a data set, all of whose plans are in memory."""
+"""Largest number of samples of a data set; the plans of all of them are held in memory."""
 
 RUN_KEYS = (
     "pfa", "clutter_removal", "detector", "body_material", "range_window", "doppler_window",
@@ -175,6 +175,7 @@ def check_equal_sizes(
             f"keep = {list(keep)}: intervals differ in length; give all the same duration_s, "
             "so that their maps have one size"
         )
+    # Radars with the same axes may be mixed.
     radars = list({each.radar.name: each.radar for each in combinations}.values())
     if len({sizes(radar, window_s) for radar in radars}) > 1:
         raise InputError(
@@ -217,10 +218,12 @@ def _fidelity(value: object) -> str:
 
 def combinations_of(lists: Mapping[str, list[Any]]) -> tuple[Combination, ...]:
     """Return every combination of the values under ``[each]``."""
+    # A place that is None leaves that of the scene.
     places = [
         [{} if value is None else {key: value} for value in lists[key]]
         for key in ("person_position_m", "radar_position_m")
     ]
+    # Scenes with every combination of places, and then everything else.
     placed = [
         dataclasses.replace(scene, **person, **radar)
         for scene, person, radar in itertools.product(lists["scene"], *places)
@@ -247,6 +250,8 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
 
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
+    # A radar may be a table with a base; only files below the folder of the specification may be
+    # named.
     table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
     source = read_value(str, "[each] ", key, table.get("base", table.get("board")))
     if source.endswith((".toml", ".cfg")):

@@ -111,6 +111,7 @@ def read_spec(path: Path, *, changed: bool = False) -> Spec:
     may have ``changed``.
     """
     given = read_toml(path, "data set", "give a TOML file")
+    # A file that a data set was made from also lists the digests of all files that it names.
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
     listed = check_files(f"data set file '{path}'", path.resolve().parent, given, changed=changed)
     with prefixed(f"data set file '{path}': "):
@@ -149,6 +150,7 @@ def write_made(spec_path: Path, spec: Spec, out: Path) -> None:
 
     given = read_toml(spec_path, "data set", "give a TOML file")
     table = {key: value for key, value in given.items() if key not in _MADE_KEYS}
+    # Paths start from the new place of the file, and every file gets its digest.
     folder = (spec_path.resolve().parent / given.get("root", ".")).resolve()
     files = sorted(_files(spec, table, folder))
     listed = [
@@ -171,6 +173,7 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
         base = value.get("base") if isinstance(value, Mapping) else value
         if isinstance(base, str) and base.endswith((".toml", ".cfg")):
             named.add(folder / base)
+    # Scenes name meshes and recordings of their people.
     for scene in {id(one.scene): one.scene for one in spec.combinations}.values():
         pieces = (*scene.furniture, *scene.objects)
         named |= {piece.path for piece in pieces if piece.metres_per_unit is not None}
@@ -180,6 +183,7 @@ def _files(spec: Spec, table: Table, folder: Path) -> set[Path]:
 
 
 def _spec(table: Table, folder: Path) -> Spec:
+    # Everything is read before an error is raised, so that the user sees all of them at once.
     wrong = Complaints()
     top = _values(_TOP, "", table, wrong)
     drawn_table, each = (wrong.of(table_at, key, table) or {} for key in ("drawn", "each"))
@@ -197,6 +201,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     windows = table.get("windows", {}) if intervals else {}
     beside = wrong.of(_folder, top.get("folder", "."), folder)
     recordings = _recordings(table, windows, beside, wrong)
+    # What does not go together, although each value is allowed.
     if not table.get("synthetic") and not table.get("recordings"):
         wrong.lines.append("there is neither [[synthetic]] nor [[recordings]]; give one of them")
     if table.get("synthetic") and intervals and intervals.needed_s is None:
@@ -223,6 +228,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     wrong.check()
     assert intervals is not None  # for else there are complaints
     assert run is not None
+    # How many samples it will be at least, and maps that can be batched.
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.most(intervals.needed_s)
     copies = 1 + (augmented.copies if augmented else 0)
@@ -273,6 +279,8 @@ def _run_settings(top: Mapping[str, Any]) -> RunSettings:
 
 def _folder(named: str, beside: Path) -> Path:
     """Folder of the recordings, below the file's own or below that of an environment variable."""
+    # A specification may come from a stranger, so recordings must lie below its own folder, or
+    # below one that the user has named in the environment.
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
@@ -302,6 +310,7 @@ def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
         for key, value in given.items():
             if isinstance(value, tuple) and len(set(value)) < len(value):
                 wrong.lines.append(f"{where}{key} = {brief(list(value))}; {_DIFFERENT}")
+        # A number stands for that many, counted from 0.
         seeds, subjects = (
             range(own) if isinstance(own, int) else own
             for own in (given.get("seeds", given.get("count", 0)), given["subjects"])
@@ -329,6 +338,7 @@ def _recordings(
             wrong.lines.append(f"{where}label is missing; give it, or have {{label}} in file")
         if folder is None or "file" not in texts:
             continue
+        # What the pattern finds in a name takes precedence over what the table says.
         for name, fields in wrong.of(matching_files, where, texts["file"], folder) or ():
             values = {**_UNKNOWN, **texts, **fields}
             about = {
@@ -366,6 +376,8 @@ def matching_files(where: str, pattern: str, folder: Path) -> list[tuple[str, di
             f"{where}file = {brief(pattern)}: {_MOST_WILD} wildcards are allowed, "
             "one of them **; give fewer"
         )
+    # The pattern finds candidates once its fields have become stars; a regular expression then
+    # reads the fields from their names.
     *folders, last = pattern.split("/")
     parts = [part if part == "**" else _single(part) for part in folders] + [_single(last)]
     expression, found = _expression(parts), []
@@ -390,6 +402,7 @@ def _expression(parts: list[str]) -> re.Pattern[str]:
     def wild(piece: str) -> str:
         if piece in ("*", "?"):
             return "[^/]*?" if piece == "*" else "[^/]"
+        # A field that occurs twice must be the same text both times.
         name, again = piece.strip("{}"), piece in seen
         seen.add(piece)
         return f"(?P={name})" if again else f"(?P<{name}>[^/]+?)"

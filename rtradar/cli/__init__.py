@@ -36,6 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
     """
     from rtradar.cli.ending import end_well, stay_if_ending
 
+    # This is what the user is told if a signal ends the process; a command may have a text of its
+    # own.
     options = argparse.Namespace(stopped=_WHOLE)
     if arguments is None:
         if isinstance(sys.stdout, io.TextIOWrapper):
@@ -72,6 +74,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     from rtradar.cli.values import fail
     from rtradar.system.files import DISK_ERRORS
 
+    # Each warning is one line, without the line of source that Python would show.
     warnings.showwarning = _show_warning
     # Without a folder of its own it makes a temporary one, and would log two lines each time.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)

@@ -43,6 +43,7 @@ def _choose_as_paper(options: argparse.Namespace) -> None:
     from rtradar.paper.items import AS_PAPER, paper_warnings
     from rtradar.settings import RunSettings
 
+    # An option that has its default does not contradict the paper.
     defaults = RunSettings()
     for name, value in AS_PAPER.items():
         key, default = f"settings.{name}", getattr(defaults, name)
@@ -86,6 +87,8 @@ def _show(options: argparse.Namespace, page: str) -> None:
 
 def compare(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar compare``."""
+    # The names are folders of results, or several recordings to compare at one level, or one
+    # recording to compare across levels.
     folders = any(map(os.path.isdir, options.motion))
     several = len(options.motion) > 1 and not options.at
     planned = options.plan or options.advise is not None
@@ -192,6 +195,8 @@ def _tables(options: argparse.Namespace, alone: bool = False) -> tuple[Mapping[s
     skeletons = {} if run_file else _checked_people(options, alone)
     from rtradar.description import read_run_file, settings_of_table, with_value
 
+    # Options overrule the run file, and --set overrules both. What is set of people is left for
+    # later, when the people are known.
     table = read_run_file(run_file, changed=options.changed) if run_file else {}
     for key, value in _described(options):
         table = with_value(table, key, value)
@@ -294,6 +299,8 @@ def _skeletons(names: Sequence[str], skeletons: Sequence[Path]) -> dict[str, Pat
     """Return the skeleton of each recording: the only one, or one for each in order."""
     if not skeletons:
         return {}
+    # Only .amc files need a skeleton. If there are none, a skeleton that is given goes to every
+    # recording, whose reader can refuse it.
     recorded = [name for name in names if not name.startswith(SYNTHETIC)]
     needing = [name for name in recorded if name.lower().endswith(".amc")] or recorded
     if not needing:
@@ -315,6 +322,7 @@ def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
     """Return the order of words that the options ask for, None if they say nothing of it."""
     from rtradar.exchange import Dca1000Layout
 
+    # The options are named like the fields of the layout.
     names = [field.name for field in dataclasses.fields(Dca1000Layout)]
     said = {name: getattr(options, name) for name in names}
     given = {
@@ -337,7 +345,7 @@ def _layout(options: argparse.Namespace) -> Dca1000Layout | None:
 def _radar_and_layout(options: argparse.Namespace) -> tuple[Radar | None, Dca1000Layout | None]:
     """Return the radar, and the order of words by the options, else by the .cfg file.
 
-    Where a JSON file lies beside the samples it says the order, for rtradar wrote both.
+    Where a JSON file lies beside the samples it says the order, because rtradar wrote both.
     """
     from rtradar.exchange import Dca1000Layout
     from rtradar.radar import Radar

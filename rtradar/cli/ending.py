@@ -39,6 +39,8 @@ def end_well(message: Callable[[], str]) -> None:
     message : callable
         Function that returns what the user should know then, in a few words.
     """
+    # Python's handler of signals writes to this pipe at once, whatever the main thread is doing. A
+    # thread waits at the other end.
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
@@ -73,7 +75,7 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     # Where nothing has imported it, there is no unfinished file.
     getattr(sys.modules.get("rtradar.system.files"), "discard_unfinished", _nothing)()
     line = f"rtradar: {_SIGNALS.get(number.name, number.name)}; {' '.join(message().split())}\n"
-    # In a thread, for the main thread may be writing.
+    # In a thread, because the main thread may be writing.
     flushed = threading.Thread(target=sys.stdout.flush, daemon=True)
     flushed.start()
     flushed.join(0.2)
@@ -92,7 +94,7 @@ def _end_children() -> None:
     spared = {getattr(resource_tracker._resource_tracker, "_pid", None)}
     until = time.monotonic() + _PATIENCE_S
     killed: set[int] = set()
-    # Repeated, for threads may start others.
+    # Repeated, because threads may start others.
     while (children := _descendants() - spared) - killed and time.monotonic() < until:
         for child in children:
             with contextlib.suppress(OSError):
@@ -106,6 +108,7 @@ def _end_children() -> None:
 def _descendants() -> set[int]:
     """Return the running processes that descend from this one."""
     parents = {}
+    # Fields follow the last closing parenthesis, because the name in parentheses may hold anything.
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError, ValueError, IndexError):
             fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
@@ -114,6 +117,7 @@ def _descendants() -> set[int]:
                 parents[int(stat.parent.name)] = int(fields[1])
     if not parents:  # a system without /proc
         return {child.pid for child in multiprocessing.active_children() if child.pid}
+    # Each round adds the children of those that the last one found.
     found: set[int] = set()
     newly = {os.getpid()}
     while newly:

@@ -61,6 +61,8 @@ def train(options: argparse.Namespace) -> None:
             f"give one of {', '.join(RECIPES)}"
         )
     device = pick_device(options.device)
+    # Options that are not given leave the recipe as it is. No learning rate is below 0, so that
+    # limit lets all epochs run.
     recipe = RECIPES[options.recipe].changed(
         points=options.points,
         epochs=options.epochs,
@@ -101,6 +103,7 @@ def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
         )
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
+    # By default the evaluation goes into the folder of the first training.
     out = options.out or options.trained[0]
     with atomic_folder(out, EVALUATION_FILES, overwrite=options.overwrite) as folder:
         table, content = write_evaluation(studies, baselines, folder)

@@ -79,6 +79,7 @@ class OneLineParser(argparse.ArgumentParser):
             commands.add_parser(name, table=own, **more)
 
     def _filled(self) -> None:
+        # The table is emptied first, so that a second call adds nothing twice.
         table, self._table = self._table, {}
         for group in table.get("uses", ()):
             self._add(_definitions()["shared"][group])
@@ -97,6 +98,8 @@ class OneLineParser(argparse.ArgumentParser):
         """Add options of a table; one that has nothing but a help is a flag."""
         groups: dict[str, Any] = {}
         for name, own in options.items():
+            # Two keys are ours and unknown to argparse: groups of options that exclude each other,
+            # and options that leave no trace if they are not given.
             how = dict(own)
             either, unset = how.pop("either", None), how.pop("unset", False)
             for word, listed in _CHOICES.items():
@@ -117,6 +120,7 @@ class OneLineParser(argparse.ArgumentParser):
         from rtradar import settings
         from rtradar.system.fields import Limits, annotations_of, found_in
 
+        # A setting's type, default and text are those of `RunSettings` and settings.toml.
         usual, taken = settings.RunSettings(), getattr(settings, options).__annotations__
         hints = annotations_of(settings.RunSettings)
         for name, said in settings.setting_texts().items():
@@ -158,6 +162,8 @@ class OneLineParser(argparse.ArgumentParser):
             name = word.partition("=")[0]
             if name.startswith("--") and name not in self._option_string_actions:
                 known = [one for one in self._option_string_actions if one.startswith("--")]
+                # The suggestion is an option that begins like the word, or else one that is spelt
+                # alike.
                 near = [one for one in known if one.startswith(name)]
                 near = near or difflib.get_close_matches(name, known, 1)
                 self.error(f"no option {name}{f'; did you mean {near[0]}?' if near else ''}")

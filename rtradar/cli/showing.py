@@ -30,6 +30,7 @@ def list_names(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar list``."""
     found = dict(KINDS[options.kind]())
     yield {options.kind: [{"name": name, "description": text} for name, text in found.items()]}
+    # Descriptions are wrapped in a column that fits the terminal.
     width = max(map(len, found)) + 2
     columns = max(shutil.get_terminal_size().columns, width + 40)
     for name, text in found.items():
@@ -105,6 +106,7 @@ _OF_RADARS = ("range_bin_m", "max_range_m", "velocity_bin_mps", "max_velocity_mp
 def inspect_file(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar inspect``."""
     file = Path(options.file)
+    # Warnings are part of what was found, and are shown with the rest.
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         kind, found, text = _look(file, options)
@@ -178,6 +180,7 @@ def view(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
     from rtradar.pipeline.output import view as views
 
+    # A page is written into the folder of the run, unless only a still is asked for.
     page = options.out or (None if options.still else _own_page(options.folder))
     shown = views.view(
         options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour

@@ -180,7 +180,7 @@ shard.__name__ = "shard I/N, such as 2/8"
 
 
 def path(text: str) -> Path:
-    """Read a path; an empty one is refused, for it would be the current folder."""
+    """Read a path; an empty one is refused, because it would be the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("it is empty; give the name of a file or folder")
     return Path(text)

@@ -75,6 +75,8 @@ class Collection:
             raise InputError("no folder of clouds; give at least one of rtradar dataset build")
         self.folders = tuple(Path(folder) for folder in folders)
         self._name = ", ".join(f"'{folder}'" for folder in self.folders)
+        # A folder that is named twice counts once; samples that two folders share are refused
+        # below.
         paths: list[Path] = []
         for folder in dict.fromkeys(self.folders):
             own = [sample_path(folder, identity) for identity in read_index(folder)]
@@ -194,6 +196,7 @@ class Collection:
         """
         import xarray as xr
 
+        # The maps that are kept, and the axes that these have.
         kept = [KINDS[kind] for kind in self._kept(index)]
         axes = {axis for name in kept for axis in ARRAYS[name].dims if axis in ARRAYS}
         found = {
@@ -268,6 +271,7 @@ class Collection:
             If torch is missing, the kind is unknown or not kept, its arrays have several sizes, or
             the number of points is not positive.
         """
+        # Whatever would fail in a worker of a loader later is refused here.
         if kind not in list(KINDS):  # whatever it is
             raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
         if not is_whole(points) or points < 1:
@@ -289,6 +293,7 @@ class Collection:
                 "source = True: only kind = 'spatial' of samples with several people or objects "
                 "says who returned its points; leave it out"
             )
+        # Clouds are cut or filled to a number of points; maps must have one size by themselves.
         clouds = kind in ("clouds", "spatial")
         shapes = {read_shape(path, KINDS[kind]) for path in self.paths if not clouds}
         if len(shapes) > 1:

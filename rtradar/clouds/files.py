@@ -63,6 +63,7 @@ class CloudTable:
     def _meaning(self) -> str:
         table = zip(self._fields(), self.names, self.units, strict=True)
         meaning = ", ".join(f"{field} = {name} [{unit}]" for field, name, unit in table)
+        # A viewer shows NaN as nothing: the comment says why.
         missing = np.flatnonzero(np.isnan(self.values).any(axis=0))
         return meaning + "".join(
             f"; {self.names[column]} is not measured: NaN" for column in missing
@@ -142,6 +143,7 @@ def write_npz(path: Path, cloud: CloudTable, **more: NDArray[Any]) -> dict[str, 
 
     Arrays of other types are given by name.
     """
+    # Coordinates together, every other column by its name.
     extra = {name: cloud.values[:, 3 + k] for k, name in enumerate(cloud.names[3:])}
     with atomic_file(path) as file:
         axes, units = np.array(cloud.names[:3]), np.array(cloud.units[:3])
@@ -193,12 +195,15 @@ def read_npz(path: Path) -> CloudTable:
     arrays = read_arrays(path)
     points = np.asarray(arrays["points"], dtype=np.float64)
     rows = points.shape[:1]
+    # Columns beside the coordinates, if there are any, and if they are as long.
     known = [name for name in _EXTRA_UNITS if name in arrays and arrays[name].shape == rows]
     axes = tuple(map(str, arrays["axes"])) if "axes" in arrays else RDT_AXES
     units = tuple(map(str, arrays["units"])) if "units" in arrays else RDT_UNITS
     columns = [np.asarray(arrays[name], dtype=np.float64) for name in known]
     if points.ndim != 2 or points.shape[1] != 3 or len(axes) != 3 or len(units) != 3:
         raise ValueError(f"points have shape {points.shape}")
+    # Names and units go into comments of other formats, so that they must be as short and plain as
+    # those.
     words = [f"x = {axis} [{unit}]" for axis, unit in zip(axes, units, strict=True)]
     if not all(map(_MEANING.fullmatch, words)):
         raise ValueError("axes or units are no short words")
@@ -212,6 +217,7 @@ def read_ply(path: Path) -> CloudTable:
     lines = [line.split() for line in text.splitlines()]
     if lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
         raise ValueError("no header of a binary little-endian PLY")
+    # The first element must be the vertices, because its rows come first.
     elements = [k for k, line in enumerate(lines) if line[:1] == ["element"]]
     if not elements or lines[elements[0]][1] != "vertex":
         raise ValueError("its first element is no vertex")
@@ -224,6 +230,7 @@ def read_pcd(path: Path) -> CloudTable:
     """Read a binary PCD with one number per field; errors of many types if it is none."""
     text, body = _parted(path, b"DATA binary\n")
     lines = [line.split() for line in text.splitlines()]
+    # The header is words and values, line by line.
     entries = {line[0]: line[1:] for line in lines if len(line) > 1 and line[0][0] != "#"}
     if any(count != "1" for count in entries.get("COUNT", [])):
         raise ValueError("no header of a binary PCD with one number a field")
@@ -248,6 +255,7 @@ def _table(text: str, fields: list[tuple[str, str]], count: int, body: bytes) ->
         told = f"its header tells of {count} points of {kind.itemsize}"
         raise ValueError(f"{len(body)} bytes where {told}; it is cut off")
     rows = np.frombuffer(body, dtype=kind, count=count)
+    # Coordinates first, and of each column what the comment of rtradar says that it means.
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
     meant = {field: (name, unit) for field, name, unit in _MEANING.findall(text)}
     names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)

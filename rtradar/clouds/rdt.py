@@ -49,8 +49,10 @@ class UniformSample:
     def add(self, rows: NDArray[np.float64]) -> None:
         """Add the next rows (row, column) of the stream."""
         keys = np.concatenate([self._keys, self._random.random(len(rows))])
+        # The smallest keys of those that are held and of the new ones together stay.
         least = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
         is_new = least >= self._n_rows
+        # New rows take the places of those that go.
         free = np.ones(self._n_rows, dtype=bool)
         free[least[~is_new]] = False
         self._keys[free] = keys[least[is_new]]
@@ -151,6 +153,7 @@ class RdtCloud:
         if not (self._last_time < time_s < np.inf):
             later = "" if self._last is None else f", and later than {self._last_time} of the last"
             raise InputError(f"RDT cloud: time_s = {time_s}; it must be finite{later}")
+        # The first slab lies between an empty slice, one hop before, and the first frame.
         if self._last is None:
             self._slab(np.zeros_like(cells), cells, time_s - self._radar.frame_hop_s, time_s)
         else:
@@ -186,8 +189,11 @@ def _surface(
     # Only cubes that touch a detection have triangles: march over the padded box of detections.
     box = cells[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     padded = np.pad(box, ((0, 0), (1, 1), (1, 1))).astype(np.float32)
+    # A surface at 0.5 between cells of 0 and 1 lies half-way between their centres.
     indices, faces, _, _ = marching_cubes(padded, 0.5)
     places = indices.astype(np.float64)
+    # From indices to physical units: time between both slices, and range and velocity, less the
+    # layer of padding.
     whole = np.floor(places[:, 0]).astype(np.int64)
     steps = np.append(np.diff(times), 0.0)
     time = times[whole] + (places[:, 0] - whole) * steps[whole]

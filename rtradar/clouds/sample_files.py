@@ -149,6 +149,7 @@ def write_sample(
     Equal samples give equal bytes. InputError if the file cannot be written; the folder is then
     unchanged.
     """
+    # Keys in order, and arrays of one type and layout, give the same bytes on every machine.
     content = {"format": FORMAT, "label": sample.label, "provenance": sample.provenance}
     about = json.dumps(content, sort_keys=True, allow_nan=False)
     arrays = {
@@ -164,6 +165,7 @@ def write_sample(
             # An entry that is opened so is always dated 1980.
             with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w") as entry:
                 np.lib.format.write_array(entry, values, version=(1, 0), allow_pickle=False)
+        # Room for the digest at the very end, which is that of everything before it.
         archive.comment = b"0" * _DIGEST
     whole = buffer.getbuffer()
     whole[-_DIGEST:] = _digest(whole[:-_DIGEST])
@@ -194,6 +196,7 @@ def is_whole(path: Path, parameters: Mapping[str, Any] | None = None) -> bool:
         return False
     if parameters is None:
         return True
+    # Compared as JSON has them, in which tuples are lists.
     found = read_sample(path, "about")["provenance"]
     wanted = json.loads(json.dumps(parameters))
     return all(name in found and found[name] == value for name, value in wanted.items())
@@ -223,6 +226,7 @@ def read_sample(path: Path, name: str) -> Any:
     damaged or larger than 200 MB.
     """
     try:
+        # A file that is too large is not even opened.
         size = path.stat().st_size
         if size <= _MAX_BYTES:
             array = read_arrays(path, _MAX_BYTES, [name], _DIGEST)[name]
@@ -290,6 +294,7 @@ def write_index(folder: Path, identities: Iterable[str]) -> None:
     InputError if it cannot be written, or its name belongs to a file that is not an index.
     """
     path = folder / INDEX
+    # A file of somebody else is not replaced.
     if os.path.lexists(path):  # or a link that leads nowhere
         try:
             _content(path)

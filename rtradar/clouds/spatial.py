@@ -64,6 +64,7 @@ class SpatialCloud:
 
     def __post_init__(self) -> None:
         count = len(self.points)
+        # As many of everything as there are points.
         for field, given in vars(self).items():
             if given is None:
                 continue
@@ -135,6 +136,7 @@ def spatial_points(
         Points cell by cell, the strongest pair first. The power is the mean of the two peaks.
     """
     y, z = _peaks(spectra)
+    # The component along the boresight is what both sines leave of a unit vector.
     forward = 1 - y.sine**2 - z.sine**2
     cell, rank = np.nonzero((y.real | z.real) & (forward >= 0))
     direction = np.stack(
@@ -182,6 +184,7 @@ def points_of_sines(
         Points cell by cell. The power is the mean over the channels.
     """
     row, column = np.nonzero(mask)
+    # A sine that is not measured counts as 0 here, and stays NaN in the direction.
     forward = 1 - np.nansum(sines**2, axis=1)
     kept = forward >= 0
     direction = np.column_stack([np.sqrt(forward[kept]), sines[kept]])
@@ -204,6 +207,7 @@ def _in_world(places: NDArray[np.float64], radar: Radar, time_s: float) -> NDArr
         return np.asarray(radar.position_m) + places
     (axes,), (position,) = radar.poses_at([time_s])
     world = np.nan_to_num(places) @ axes.T + position
+    # A coordinate stays unmeasured only if the radar's axis is the world's.
     missing = np.isnan(places).all(axis=0) & (np.abs(np.diag(axes)) > 1 - 1e-12)
     return np.where(missing, np.nan, world)
 

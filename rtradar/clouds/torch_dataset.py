@@ -65,6 +65,7 @@ class SampleDataset(Dataset[Any]):
         item = torch.from_numpy(np.array(values, dtype=np.float32)), self._labels[index]
         if not self._source or self._n_points is None:
             return item
+        # The same points are taken of who returned them.
         source = read_sample(path, "spatial_source").astype(np.int64)
         source = of_size(source, self._n_points, in_order=in_order, empty=-2)
         return *item, torch.from_numpy(source)

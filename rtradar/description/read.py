@@ -93,11 +93,13 @@ def _scene(table: Table, folder: Path) -> Scene:
         own["radar"] = {**table_at("radar", own, "scene."), **pose}
     for _, key, entry in files_of(own):
         entry[key] = str((folder / entry[key]).absolute())
+    # A table without a base that says more than places is a scene by itself.
     base = own.pop("base", None if own.keys() - {"radar", "person"} else _SCENE)
     if base is None:
         return Scene.of_table(own)
     if not isinstance(base, str):
         raise InputError(f"[scene] base = {brief(base)}; it must be a name or a path")
+    # Otherwise it changes values of the base.
     path, below = scene_table(folder / base if Path(base).suffix else base)
     below = {"name": printable(path.stem), **rooted(below, path.parent)}
     return Scene.of_table(_merged(below, own))
@@ -119,6 +121,8 @@ def _people(table: Table, folder: Path, scene: Scene, settings: RunSettings) -> 
     """People of the run file, those without a place where the scene has its person."""
     where = {"position_m": list(scene.person_position_m), "heading_deg": scene.heading_deg}
     entries: list[Table] = []
+    # People without a place of their own stand where the scene has its person; actors take seed and
+    # duration of the run.
     for number, (_, entry) in enumerate(tables_at("people", table)):
         placed = entry.get("placement", "standard") == "recorded" or "position_m" in entry
         own = dict(entry) if placed else {**where, **entry}
@@ -155,6 +159,7 @@ def with_value(table: Table, key: str, value: object) -> dict[str, Any]:
     """
     found: dict[str, Any] = copy.copy(dict(table))
     check_keys("", {key.partition(".")[0]: 0}, (), KEYS[:4])
+    # Every table on the way is copied, so that the original stays as it is.
     at: Any = found
     *way, last = key.split(".")
     for name in way:
@@ -219,6 +224,7 @@ def given_parts(
     InputError
         Where there is no such name, a file cannot be read, or something is none of these.
     """
+    # A single one is a list of one; names and paths are loaded.
     several = (
         [moving] if isinstance(moving, str | Path) or not isinstance(moving, Sequence) else moving
     )

@@ -75,6 +75,8 @@ def _commit(git: Path) -> str:
     """Commit that is checked out, read from the folder of Git; empty where there is none."""
     try:
         head = (git / "HEAD").read_text().strip()
+        # HEAD names a commit, or a branch whose commit is in a file of its own or among the packed
+        # ones.
         name = head.removeprefix("ref: ")
         if name == head:
             return head
@@ -109,11 +111,13 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
     found["people"] = [dict(entry) for entry in table["people"]]
     # What they were when they were read.
     digests = {path_from(place, entry["path"]): entry["sha256"] for entry in table.get("files", ())}
+    # A motion that no file holds is saved beside the run file.
     for number, entry in enumerate(found["people"], start=1):
         if isinstance(motion := entry["motion"], Motion):
             entry["motion"] = f"person-{number}.motion"
             save_motion(folder / entry["motion"], motion)
             digests[entry["motion"]] = digest_of(folder / entry["motion"])
+    # Paths become relative to the folder, and each file that was read has its digest.
     found["scene"] = copy.deepcopy(found["scene"])
     for tables in (found, found["scene"]):
         for _, key, entry in files_of(tables):
@@ -122,7 +126,7 @@ def write_run_file(folder: Path, place: Path, table: Table) -> dict[str, Any]:
                 digests[entry[key]] = digest_of(path)
     if background := found["settings"].get("background"):
         found["settings"] = {**found["settings"], "background": path_from(place, background)}
-        # Of a folder what it was made from, for its samples follow from that.
+        # For a folder the run file counts, because its samples follow from that.
         for path in (background, os.path.join(background, "run.toml")):
             if os.path.isfile(path):
                 digests[path_from(place, path)] = digest_of(path)
@@ -163,6 +167,7 @@ def refuse_another(out: Path, motions: Iterable[Motion]) -> None:
         before = [_who(str(entry.get("motion")), entry, out) for _, entry in entries]
     except InputError:  # there is none, or nobody can tell
         return
+    # Who moves tells one run from another.
     now = [
         _who(str(own.source.keys["motion"]), own.source.keys, out) if own.source else own.name
         for own in motions
@@ -288,6 +293,7 @@ def table_of(people: Sequence[Person], radar: Radar, scene: Scene, settings: Run
         "scene": _scene(scene, missing),
         "settings": _settings(settings),
     }
+    # Digests from when the motions were read: a file may have changed since.
     sources = [source for person in people if (source := person.motion.source) is not None]
     digests = {path: digest for source in sources for path, digest in source.files.items()}
     files = [{"path": path, "sha256": digest} for path, digest in digests.items()]
@@ -331,6 +337,8 @@ def _scene(scene: Scene, missing: list[str]) -> Plain:
         found = copy.deepcopy(dict(scene.source))
         # People and radar have tables of their own, with their places.
         return {key: value for key, value in found.items() if key not in ("people", "radar")}
+    # A scene that was made in Python is described piece by piece; what has no form in a file is
+    # noted as missing.
     person = {"position_m": plain(scene.person_position_m), "heading_deg": scene.heading_deg}
     found = {"name": scene.name, "description": scene.description, "person": person}
     materials: Plain = {}

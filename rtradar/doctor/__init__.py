@@ -43,6 +43,7 @@ def examine() -> Report:
         or why not. ``chosen`` is Mitsuba's variant that ``--variant auto`` takes, None where
         nothing works; ``advice`` says what to do, most urgent first.
     """
+    # Every libLLVM that is found is tried, not only the one that a run would take.
     libraries = candidates()
     results = [probe_backend(VARIANTS["llvm"], library, fresh=True) for library in libraries]
     tried = list(zip(libraries, results, strict=True))

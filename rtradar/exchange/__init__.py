@@ -115,6 +115,7 @@ def export(
             f"allowed: {', '.join(IF_FORMATS)} for IF samples, "
             f"{', '.join(CLOUD_FORMATS)} for clouds"
         )
+    # A folder is that of a run with its IF samples, a file is a cloud.
     if os.path.isdir(origin):
         if suffix in CLOUD_FORMATS:
             raise InputError(
@@ -126,6 +127,7 @@ def export(
             f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made"
         )
     else:
+        # The folder of a run that did not finish is refused.
         if os.path.isdir(origin.parent):
             check_whole(origin.parent)
         cloud = read_cloud(origin)
@@ -191,6 +193,7 @@ def open_samples(
             open_regular(place).close()  # not at a pipe, which would seem empty
         if suffix == ".bin":
             return open_int16(place, radar, dca1000)
+        # Readers of other people's files fail in many ways; the user gets one line.
         found = IF_FORMATS[suffix].read(place)
     except DAMAGE as error:
         raise unreadable(place, "IF samples", error) from None
@@ -225,6 +228,7 @@ def read_if(path: str | Path) -> IfCube:
             f"'{path}' has cycles of {found.tx_per_cycle} Tx, and its radar '{found.radar.name}' "
             f"{rows}; read it with rtradar.exchange.open_samples, and give its radar"
         )
+    # Rows come Tx by Tx, so that whole cycles have an axis of Tx.
     cycles = len(found) // rows
     samples = found[: cycles * rows].reshape(cycles, rows, *found.shape[1:])
     return IfCube(np.ascontiguousarray(samples), found.radar)

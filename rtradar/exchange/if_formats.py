@@ -50,6 +50,7 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
     MATLAB reverses the axes: (chirp, tx, rx, sample) is stored as (sample, rx, tx, chirp).
     """
     chirps, *rest = recording.cube_shape
+    # A MATLAB 7.3 file is HDF5 behind a block of text of its own.
     chunk = (*rest[::-1], recording.step)
     with atomic_file(path) as raw, LastingFile(raw) as written:
         with h5py.File(written, "w", userblock_size=_MAT_HEADER_BYTES, libver=_OLD_LAYOUT) as file:
@@ -58,9 +59,11 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
             for first, block in recording.blocks("writing"):
                 whole = np.zeros(chunk, dtype=np.complex64)  # the last chunk is stored whole too
                 whole[..., : len(block)] = block.T
-                # Directly, for HDF5 would keep some of what it writes in memory.
+                # Directly, because HDF5 would keep some of what it writes in memory.
                 data.id.write_direct_chunk((0, 0, 0, first), whole.tobytes())
                 written.check()
+            # Times and places, and the radar as a struct: numbers for MATLAB, and as text
+            # everything, for `open_mat`.
             for name, quantity in recording.quantities().items():
                 _put(file, name, np.atleast_2d(quantity.values))
             struct = file.create_group("radar")
@@ -69,6 +72,8 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
                 _put(struct, name, [[value]])
             _put_text(struct, "name", recording.radar.name or "-")
             _put_text(struct, "all", recording.radar_text)
+        # The header can be written when HDF5 has closed the file: text, an offset of zeros, the
+        # version, and how bytes are ordered.
         written.seek(0)
         written.write(_MAT_HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
     return {"variable": "if_samples", "type": "complex single"}
@@ -86,6 +91,7 @@ def open_mat(path: Path) -> SampleFile:
             return _open_old_mat(path, raw)
     with open_regular(path) as raw, h5py.File(raw, "r") as file:
         data = stored(file, "if_samples", compressed=True)
+        # MATLAB's axes are reversed; its text is numbers of characters.
         shape, kind = data.shape[::-1], data.dtype
         text = "".join(map(chr, stored(file, "radar/all")[:].ravel())) if "radar" in file else ""
 
@@ -123,6 +129,7 @@ def _rows(
     """
     own, real = shape[1] if len(shape) == 4 else None, np.dtype(kind).kind in "iuf"
     tx = own or 1
+    # Two real samples make one complex one.
     if len(shape) not in (3, 4) or min(shape) < 1 or (real and shape[-1] % 2):
         whole = ", an even number of real samples" if real else ""
         raise ValueError(
@@ -131,6 +138,7 @@ def _rows(
         )
 
     def rows(first: int, last: int) -> NDArray[np.complex64]:
+        # Whole cycles that hold the rows are read, and cut to these.
         begin = first // tx
         block = read(begin, -(-last // tx)).reshape(-1, *shape[-2:])
         block = block[first - begin * tx : last - begin * tx]
@@ -162,6 +170,7 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         LastingFile(raw) as written,
         h5py.File(written, "w", **layout) as file,
     ):
+        # A variable for each axis, then the samples in two parts, then their times and places.
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
             meaning = "0, 1, 2 are x, y, z" if name == "xyz" else f"number of the {name}"
             netcdf_array(file, name, (name,), "1", meaning, data=np.arange(length))
@@ -178,6 +187,7 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
             part.attrs["coordinates"] = "chirp_time sample_time"
         file.attrs.update(recording.waveform())
         file.attrs["title"], file.attrs["radar"] = recording.name, recording.radar_text
+        # Chunk by chunk, which are written directly, past the cache of HDF5.
         for first, block in recording.blocks("writing"):
             for part, values in zip(parts, (block.real, block.imag), strict=True):
                 whole = np.zeros(chunk, dtype=np.float32)  # the last chunk is stored whole too
@@ -224,6 +234,7 @@ def open_npy(path: Path) -> SampleFile:
         raise ValueError(in_short(error)) from None
     if found.dtype.kind not in "ciuf":
         raise ValueError(f"it holds {found.dtype}, not numbers")
+    # Rows are read one after another, so they must lie so.
     if not found.flags.c_contiguous:
         raise ValueError("it is in the order of Fortran; save numpy.ascontiguousarray of it")
     if found.offset + found.nbytes != path.stat().st_size:

@@ -49,6 +49,7 @@ def write_int16(
     written, a foreign file has the name of the JSON file, or a sample is not finite.
     """
     beside = path.with_suffix(".json")
+    # Two files are written; a JSON file of somebody else is not replaced.
     for file in (path, beside):
         if file.is_dir():
             raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
@@ -60,6 +61,7 @@ def write_int16(
     real = layout is not None and layout.real
     if layout is not None:
         layout = of_radar(layout, recording.radar)
+    # The samples are read twice: first for the largest number, which sets the scale of all.
     peak = 0.0
     for _, block in recording.blocks("finding the peak"):
         largest = float(np.abs(_parts(block, real)).max())
@@ -70,6 +72,7 @@ def write_int16(
             )
         peak = max(peak, largest)
     scale = peak / _LARGEST if peak else 1.0
+    # The description appears only when the samples are complete.
     about = _about(path, recording, layout) | {"scale": scale, "quantisation": scale / 2}
     with atomic_file(beside) as text, atomic_file(path) as raw:
         text.write((json.dumps(about, indent=1) + "\n").encode("utf-8"))
@@ -106,6 +109,8 @@ def _about(path: Path, recording: IfRecording, layout: Dca1000Layout | None) -> 
         **recording.waveform(),
         "radar": json.loads(recording.radar_text),
     }
+    # A raw capture has no axes of antennas: its words come in the order in which the board sends
+    # them.
     if layout is not None:
         shape = [recording.shape[0], words_of(layout, radar)]
         return about | {
@@ -128,6 +133,7 @@ def open_int16(
     about = _description(path) or {}
     if not about and radar is None:
         raise ValueError("no JSON file beside it tells of its radar, and none is given (--radar)")
+    # What is given goes before what the JSON file says.
     radar = radar_of(json.dumps(about["radar"])) if radar is None else radar
     if layout is None and "dca1000" in about:
         layout = Dca1000Layout(**about["dca1000"])
@@ -138,12 +144,14 @@ def open_int16(
         raise ValueError(f"scale is {scale:g}")
     if layout is None:
         return _open_plain(path, radar, scale, tuple(map(int, about["shape"])))
+    # A file that a board sent may still have the headers of packets in it.
     own, packets = of_radar(layout, radar), None if about else packets_in(path)
     n_bytes = path.stat().st_size if packets is None else packets.size
     row = 2 * words_of(own, radar)
     take: Callable[[int, int], NDArray[np.int16]] = partial(_words, path)
     if packets is not None:
         take, n_bytes = packets.words, _cut(packets, _whole(radar) * row)
+    # Anything but whole frames, or cycles, means another radar or another order.
     chirps, odd = divmod(n_bytes, row)
     if odd or not chirps or chirps % _whole(radar):
         raise InputError(_of_another_size(path, radar, own, n_bytes))
@@ -284,6 +292,7 @@ def of_radar(layout: Dca1000Layout, radar: Radar) -> Dca1000Layout:
     """Settle the lanes; InputError where a chip sends no chirps of this radar in this order."""
     if layout.lanes is None:
         return of_radar(replace(layout, lanes=4 if _FOUR_LANES.match(radar.name) else 2), radar)
+    # What a chip cannot send in this order.
     n_rx, on = radar.n_rx, layout.rx_mask and layout.rx_mask.bit_count()
     if on is not None and on != n_rx:
         raise InputError(
@@ -313,10 +322,13 @@ def pack(parts: NDArray[np.int16], layout: Dca1000Layout) -> NDArray[np.int16]:
     if layout.q_first:
         parts = parts[..., ::-1]
     chirps, n_rx, samples, n_parts = parts.shape
+    # Four lanes side by side, one for each Rx, zeros on those that are off: I of all lanes, then Q
+    # of all.
     if layout.lanes == 4:
         lanes = np.zeros((chirps, samples, n_parts, _MOST_RX), dtype=np.int16)
         lanes[..., _lanes(layout, n_rx)] = np.moveaxis(parts, 1, -1)
         return lanes.reshape(chirps, -1)
+    # Two lanes send samples in pairs: both I, then both Q, one Rx after the other.
     if n_parts == 2:
         parts = parts.reshape(chirps, n_rx, -1, 2, 2).swapaxes(-1, -2)
     return parts.reshape(chirps, -1)
@@ -367,6 +379,7 @@ class Packets:
 
     def words(self, offset: int, count: int) -> NDArray[np.int16]:
         """Return ``count`` words from a byte of the words on; those of lost packets are 0."""
+        # Whole packets that hold the words are read, without their headers, and cut to these.
         first, end = offset // PAYLOAD_BYTES, -(-(offset + 2 * count) // PAYLOAD_BYTES)
         data = np.zeros((end - first, PAYLOAD_BYTES), np.uint8)
         step = PAYLOAD_BYTES + self.header
@@ -383,16 +396,19 @@ def packets_in(path: Path) -> Packets | None:
     """Find the packets of a file; None where it holds words alone."""
     size = path.stat().st_size
     for header in _HEADERS:
+        # Each length of a header that is known is tried: all packets but the last are of one size.
         step = PAYLOAD_BYTES + header
         count = -(-size // step)
         last = size - (count - 1) * step - header
         if count < 2 or last < 2 or last % 2:
             continue
         raw = np.memmap(path, np.uint8, "r")
+        # The headers alone, a packet apart, without a copy of the file.
         rows = np.lib.stride_tricks.as_strided(raw, (count, header), (step, 1), writeable=False)
         # Two tell of most files; all of them touch every page of a large one.
         if not all(_tells_twice(some) for some in (rows[:2], rows)):
             continue
+        # The number of a packet says its place in the capture; one that is missing was lost.
         numbers = _number(rows[:, :4])
         whole = int(numbers.max())
         if len(np.unique(numbers)) < count or count < (1 - _MOST_LOST) * whole:

@@ -157,7 +157,7 @@ class IfRecording(SampleFile):
     def cube_shape(self) -> tuple[int, int, int, int]:
         """Length of the chirp, tx, rx and sample axes.
 
-        Under Doppler division the tx axis is 1, for all Tx are received as one sum.
+        Under Doppler division the tx axis is 1, because all Tx are received as one sum.
         """
         tx = rows_in_cycle(self.radar)
         return (self.shape[0] // tx, tx, *self.shape[1:])
@@ -179,6 +179,7 @@ class IfRecording(SampleFile):
 
     def quantities(self) -> dict[str, Quantity]:
         """Return times and positions along the axes of the samples."""
+        # What a tool needs to process samples: when each was taken, and where antennas are.
         radar, (chirps, tx, *_) = self.radar, self.cube_shape
         times = radar.chirp_times(chirps * tx).reshape(chirps, tx)
         since = "centre of each chirp since the start of the capture"
@@ -230,6 +231,7 @@ def open_recording(folder: Path) -> IfRecording:
         stored = check_store(folder / "if.zarr")
     except DAMAGE as error:
         raise unreadable(folder / "if.zarr", "IF samples", error) from None
+    # An array that does not fit its radar is none that this run has written.
     shape, kind = stored.shape, np.dtype(stored.dtype)
     expected = (radar.n_rx, radar.samples_per_chirp)
     least = rows_in_cycle(radar)
@@ -267,6 +269,7 @@ def check_store(store: Path) -> Any:
     """Open a Zarr array that may be anybody's; OSError or ValueError if it is none or too large."""
     import zarr  # slow to import
 
+    # Before Zarr reads anything, because it would believe what a stranger's file claims.
     largest = _largest_file(store)
     try:
         array = zarr.open_array(store, mode="r")

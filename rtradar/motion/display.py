@@ -49,7 +49,7 @@ def rows(motion: Motion) -> dict[str, str]:
 def poses(motion: Motion, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return times (pose,) [s] of ``most`` frames or fewer, and their joints (pose, joint, 3) [m].
 
-    They are spread evenly over the motion. Other frames are not computed, for there may be a
+    They are spread evenly over the motion. Other frames are not computed, because there may be a
     million of them.
     """
     times = motion.frame_times
@@ -83,10 +83,12 @@ def plot_motion(motion: Motion, ax: Axes | None) -> Axes:
         ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
         dress(ax, title=motion.name)
         return ax
+    # Both views have one scale, and heights that follow from how far the person moves.
     wide, *tall = (float(span[axis]) + 0.4 for axis in (across, 2, 1 - across))
     scale = min(5.2 / wide, *(3.0 / height for height in tall))  # [inch/m], the same in both views
     heights = [max(scale * height, 0.9) for height in tall]
     figure = figure_for(sum(heights) + 2.0)
+    # Above and below share the legend, which is therefore one of the figure.
     side, above = figure.subplots(2, 1, height_ratios=heights)
     handles = _draw(side, motion, path, (across, 2))
     _draw(above, motion, path, (across, 1 - across))
@@ -119,6 +121,7 @@ def _draw(
 
     theme, view = theme_of(axes), list(seen)
     times, joints = poses(motion, _POSES)
+    # A bone is a line from each joint's parent to the joint, seen in two of the three coordinates.
     children = [joint for joint, parent in enumerate(motion.parents) if parent >= 0]
     parents = [motion.parents[joint] for joint in children]
     bones = np.stack([joints[:, parents], joints[:, children]], axis=2)[..., view]

@@ -113,6 +113,7 @@ class Motion:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes
         count, frames = len(self.joints), len(self.root_positions)
+        # Arrays are made contiguous, and checked in blocks where they wait in a file.
         for field, shape in (
             ("offsets", (count, 3)),
             ("root_positions", (frames, 3)),
@@ -126,11 +127,13 @@ class Motion:
             object.__setattr__(self, field, array)
         if len(set(self.joints)) != count:
             raise self._refusal("joint names repeat; every joint needs its own name")
+        # The tree: names once each, one root, and parents before their children.
         ordered = all(0 <= parent < j for j, parent in enumerate(self.parents) if j)
         if len(self.parents) != count or self.parents[0] != -1 or not ordered:
             raise self._refusal("parents must name one root first (-1), and precede their children")
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
             raise self._refusal(f"rate_hz = {self.rate_hz}; it must be positive")
+        # q and -q are one rotation; a spline needs neighbouring frames on the same side.
         object.__setattr__(self, "rotations", sign_continuous(self.rotations))
         norms = (np.linalg.norm(rows, axis=-1) for (rows,) in in_blocks(self.rotations))
         extremes = np.array([(norm.min(), norm.max()) for norm in norms])
@@ -139,6 +142,7 @@ class Motion:
             raise self._refusal(
                 f"rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})"
             )
+        # The frames must cover the time from 0 to the end, or poses there would be extrapolated.
         last = self.first_frame_s + (frames - 1) / self.rate_hz
         given = self.length_s is not None
         if self.first_frame_s > 0 or (given and not 0 <= self.duration_s <= last + _TIME_SLACK_S):
@@ -245,12 +249,14 @@ class Motion:
                 f"{self.duration_s:.6g} s"
             )
         instants = np.clip(instants, 0.0, self.duration_s)
+        # One frame is a statue: no spline goes through a single value.
         if len(self.root_positions) == 1:
             still = np.repeat(self.rotations, len(instants), axis=0)
             return self._forward(self.root_positions, still), still
         positions = np.empty((len(instants), len(self.joints), 3))
         quaternions = np.empty((len(instants), len(self.joints), 4))
         found = positions, quaternions.reshape(len(instants), -1)
+        # Splines are made for blocks of frames, and each block serves all times in it.
         frame = (instants - self.first_frame_s) * self.rate_hz
         blocks = np.floor(frame / _BLOCK_FRAMES).astype(np.int64)
         skeleton = self.offsets, np.asarray(self.parents, dtype=np.int64)
@@ -285,6 +291,7 @@ class Motion:
         return {}
 
     def _forward(self, roots: Array, quaternions: Array) -> Array:
+        # Each bone from its parent first, and then the sums along the chains from the root.
         positions = quaternion_rotate(quaternions, self.offsets)
         positions[:, 0] = roots
         for joint, parent in enumerate(self.parents[1:], start=1):

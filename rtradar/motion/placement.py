@@ -21,9 +21,9 @@ middle."""
 
 WALK_DISTANCE_M, WALK_STRAIGHTNESS, WALK_ALONG_HEADING = 1.1, 0.5, 0.5
 """Least distance of a walk from its beginning [m], where a kick steps less; least ratio of the
-straight line to the path; and least median cosine between path and the hips' heading, for a fighter
-who steps sideways does not walk. Short intervals of straight walks fall below the distance, and
-then face by their hips, which look the same way."""
+straight line to the path; and least median cosine between path and the hips' heading, because a
+fighter who steps sideways does not walk. Short intervals of straight walks fall below the distance,
+and then face by their hips, which look the same way."""
 
 
 def place(
@@ -57,11 +57,14 @@ def place(
     """
     part = _interval(motion, start_s, duration_s, heading_deg)
     nodes = to_nodes(part)
+    # Frames beyond the interval are there for interpolation, and do not count for where the person
+    # is.
     inside = (part.frame_times >= -1e-9) & (part.frame_times <= part.duration_s + 1e-9)
     if not inside.any():  # an interval between two frames
         inside[:] = True
     roots = nodes.root_positions[inside]
     headings = hip_headings(nodes)[inside]
+    # Heading before the radar: the walk's direction, or else that of the hips, is turned to -x.
     facing = median_heading(headings)
     direction = walk_direction(roots, headings)
     along = facing if direction is None else direction
@@ -110,6 +113,7 @@ def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
         Interval with up to `MARGIN_FRAMES` frames more on each side, which `place` needs.
     """
     frames = len(motion.root_positions)
+    # In frames of the recording. A time on a frame but for rounding is that frame.
     begin = (start_s - motion.first_frame_s) * motion.rate_hz
     end = begin + length_s * motion.rate_hz
     first = max(0, math.floor(begin + 1e-6) - MARGIN_FRAMES)
@@ -160,7 +164,9 @@ def walk_direction(
     farthest = np.asarray(away[last])
     distance = float(np.linalg.norm(farthest))
     path = float(np.linalg.norm(np.diff(roots[: last + 1, :2], axis=0), axis=1).sum())
+    # Who stays near the beginning, or goes by a way that is far from straight, does not walk.
     if distance < max(WALK_DISTANCE_M, WALK_STRAIGHTNESS * path):
         return None
+    # Backward counts as along, hence the magnitude; a sidestep does not.
     along = float(np.median(np.abs(headings @ farthest))) / distance
     return farthest if along >= WALK_ALONG_HEADING else None

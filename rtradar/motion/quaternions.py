@@ -61,6 +61,8 @@ def smallest_rotation(before: Array, after: Array) -> Array:
     Between opposite vectors half a turn about any line across them will do.
     """
     cosine = np.sum(before * after, axis=-1, keepdims=True)
+    # With (sin a n, 1 + cos a), twice cos(a/2) times (sin(a/2) n, cos(a/2)): half the angle without
+    # trigonometric functions.
     rotation = np.concatenate([np.cross(before, after), 1 + cosine], axis=-1)
     norms = np.linalg.norm(rotation, axis=-1, keepdims=True)
     across = np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=-1)])
@@ -79,6 +81,7 @@ def sign_continuous(quaternions: Array) -> Array:
 def _with_signs(quaternions: Array) -> Iterator[Array]:
     sign = np.ones(quaternions.shape[1:-1])
     for frames, same_side in _sides(quaternions):
+        # Each change of side turns the sign of all frames after it.
         signs = sign * np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
         sign = signs[-1]
         yield frames * signs[..., None]

@@ -105,6 +105,7 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
     Of the units that make a person, that of an adult counts; children of whom nothing else is known
     are refused where another unit makes an adult of them, too.
     """
+    # Adults first: only where no unit makes one, children are considered.
     for low, high in (_ADULT_M, STATURE_M):
         fitting = {name: unit for name, unit in UNITS_M.items() if low <= stature * unit <= high}
         if len(fitting) == 1:
@@ -161,8 +162,10 @@ def _stances(nodes: Array) -> dict[str, _Stance]:
     found = {}
     for up in UPWARD:
         axis, sign = "xyz".index(up[-1]), -1.0 if up[0] == "-" else 1.0
+        # How high the lowest joint is along this axis, over time: on a floor it hardly changes.
         low = np.nanmin(sign * nodes[..., axis], axis=1)
         least, median, most = np.nanquantile(low, (0.1, 0.5, 0.9)) / size
+        # How far the pelvis goes along the two other axes, which would be level.
         level = np.delete(nodes[:, 0], axis, axis=1)
         free = np.subtract(*np.nanquantile(level, (0.95, 0.05), axis=0)) / size
         travels = bool(free.max() > _TRAVELS)
@@ -199,6 +202,8 @@ def found_up(where: str, nodes: Array, *, given: str = "", usual: str = "") -> t
     seen = nodes[~np.isnan(nodes[..., 0]).all(axis=1)]
     stances = _stances(seen[:: max(1, len(seen) // _LOOKED_AT)])
     upright = max(stances.values(), key=lambda one: one.upright)
+    # What is said is believed; a warning needs both that the person lies by it, and that they stand
+    # by another axis.
     if given:
         own = stances[given]
         sure = upright.upright > _MOSTLY and upright.steady and (upright.on_zero or upright.free)
@@ -210,6 +215,8 @@ def found_up(where: str, nodes: Array, *, given: str = "", usual: str = "") -> t
         return given, f"up: {given}, as given"
     if usual:
         return _up_of_format(where, upright, stances[usual])
+    # Nobody says it: the axes along which the person stands, narrowed down by a floor and by one
+    # near zero, until one is left.
     standing = [one for one in stances.values() if one.upright >= _SOMETIMES]
     for narrower in ("steady", "on_zero"):
         if len(standing) > 1:
@@ -227,6 +234,8 @@ def _up_of_format(where: str, upright: _Stance, own: _Stance) -> tuple[str, str]
     """Up where the format has an axis, which files of some programs do not keep to."""
     if own.upright >= _MOSTLY or upright.upright < _MOSTLY:
         return own.up, f"up: {own.up}, as the format has it"
+    # The person lies by the format's axis and stands by another. A floor under one of both decides,
+    # and if there are two, one at zero.
     good = [one for one in (own, upright) if one.steady]
     if len(good) == 2:
         good = [one for one in good if one.on_zero]
@@ -276,6 +285,8 @@ def to_world_from(up: str) -> Array:
 def leading_t_pose(nodes: Array, rate_hz: float) -> int:
     """Count the frames of a T-pose before the motion, from which the hands jump away [m]."""
     hands = nodes[:, [NODES.index("l_wrist"), NODES.index("r_wrist")]]
+    # Some recordings begin with a pose of calibration, which the motion follows at once: from one
+    # frame to the next the hands are far away, much faster than they usually move later.
     speed = np.linalg.norm(np.diff(hands, axis=0), axis=2).max(axis=1) * rate_hz
     jumps = np.flatnonzero(speed[: round(_LONGEST_POSE_S * rate_hz)] > _T_POSE_M_S)
     if not len(jumps) or jumps[0] + 2 >= len(speed):
@@ -298,6 +309,7 @@ def warn_of_speed(where: str, names: Sequence[str], positions: Array, rate_hz: f
     """Say the largest speed of a joint, and warn where no person is so fast."""
     fastest, joint, frame, first = 0.0, 0, 0, 0
     before = positions[:0]
+    # In blocks, each with the last frame of the one before, because a speed is between two frames.
     for (block,) in in_blocks(positions):
         rows = np.concatenate([before, block])
         speed = np.linalg.norm(np.diff(rows, axis=0), axis=2) * rate_hz
@@ -320,19 +332,23 @@ def warn_of_rate(where: str, nodes: Array, rate_hz: float) -> None:
     ``nodes (frame, node, 3)`` are in the world [m]. Who is in the air falls with 9.8 m/s^2; who
     walks, with a foot on the floor at all times, makes fewer than 3.2 steps a second.
     """
+    # In the air are those whose lowest foot point is well above where it usually is.
     feet = nodes[:, [NODES.index(f"{side}_{at}") for side in "lr" for at in ("ankle", "toe")], 2]
     lowest = feet.min(axis=1)
     aloft = lowest > np.quantile(lowest, 0.05) + _ALOFT_M
     edges = np.flatnonzero(np.diff(np.concatenate([[0], aloft, [0]])))
     falls = []
+    # A parabola through the height of the pelvis in each flight gives its acceleration.
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         if end - begin >= _FALL_FRAMES:
             times = np.arange(end - begin) / rate_hz
             falls.append(-2 * np.polyfit(times, nodes[begin:end, 0, 2], 2)[0])
+    # Each time the ankles pass each other along the way, a step is made.
     apart = of_node(nodes, "l_ankle") - of_node(nodes, "r_ankle")
     passes = int((np.diff(np.sign(apart @ _mean_way(nodes))) != 0).sum())
     duration_s = len(nodes) / rate_hz
     says = ""
+    # With frames at the wrong rate r' the fall has (r'/r)^2 times its acceleration.
     if falls and not aloft[[0, -1]].any():
         ratio = float(np.sqrt(np.median(falls) / 9.81)) if np.median(falls) > 0 else 1.0
         if any(low < ratio < high for low, high in _HALF_OR_TWICE):
@@ -393,12 +409,15 @@ def settled(
         unit_m = found_unit(where, about)[0] if unit_m is None else unit_m
         made = _turned_up(motion.scaled(unit_m), to_world_from(up or "y"))
         return replace(made, girth=motion.girth)
+    # Back to the unit and the axes of the file, in which unit and up are found.
     nodes = about / _NOMINAL_STATURE_M * nodes @ to_world_from("y")
     to_world, unit_m, (unit, upward) = settled_nodes(
         where, nodes, unit_m=unit_m, unit_by=unit_by, up=up or "", usual="y"
     )
     found = [unit, tall(stature_of(nodes) * unit_m), upward, rate_of(motion.rate_hz)]
     made = _turned_up(motion if unit_m == 1 else motion.scaled(unit_m), to_world)
+    # A T-pose is looked for in the first seconds only, so that long recordings need not be
+    # retargeted whole.
     first = slice(round(2 * _LONGEST_POSE_S * made.rate_hz))
     dropped = leading_t_pose(to_nodes(_of_frames(made, itemgetter(first))).positions, made.rate_hz)
     if dropped:

@@ -78,6 +78,8 @@ class Convention:
         known = self.found(there)
         known |= dict.fromkeys(self.may_lack, "")
         lacking = dict[str, None]()
+        # A node by one joint lacks one of its alternatives; one by several joints lacks those that
+        # are not there.
         for choices in (self.joints[node] for node in self.joints if node not in known):
             if all(_names(choice) == [choice] for choice in choices):
                 lacking[" or ".join(choices)] = None
@@ -112,6 +114,7 @@ def _read(path: Path, kind: str) -> tuple[Convention, ...]:
 def _convention(path: Path, table: Mapping[str, Any], kind: str) -> Convention:
     open_ended = not table.get("complete", False)
     try:
+        # Names of the limbs are written once, with a place for the side.
         texts = dict(table["middle"])
         for side, name in zip("lr", table["sides"], strict=True):
             for node, text in table["sided"].items():
@@ -175,9 +178,12 @@ def node_positions(
     convention: Convention, names: Sequence[str], positions: Array, nodes: Sequence[str]
 ) -> Array:
     """Positions (frame, node, 3) of the nodes from those of joints (frame, joint, 3)."""
+    # Reversed, so that of names that are alike the first one counts.
     column = {plain(name): k for k, name in reversed(list(enumerate(names)))}
     found, choices = np.empty((len(positions), len(nodes), 3)), convention.found(column)
     for k, node in enumerate(nodes):
+        # A node is the mean of joints `a+b`, or lies a fraction of the way from one such mean to
+        # another, `a+b>c 0.4`.
         ends = [
             np.mean([positions[:, column[name]] for name in end.split("+")], axis=0)
             for end in choices[node].partition(" ")[0].split(">")
@@ -251,9 +257,12 @@ def to_nodes(motion: Motion) -> Motion:
     if motion.joints == NODES:
         return motion
     convention, joints = _recognise(motion)
+    # A bone for every part: those between two named joints, and the three of the spine.
     named = [node for node in joints if node not in ("root", "thorax")]
     bones = {node: _between(motion, joints[NODE_PARENT[node]], joints[node]) for node in named}
     bones |= _spine(motion, joints["root"], joints["thorax"])
+    # Skeletons that end at wrist, neck or ball of the foot get hands, heads and toes of usual
+    # length.
     if convention.open_ended:
         for side in ("l", "r"):
             ankle, wrist, toe = (f"{side}_{node}" for node in ("ankle", "wrist", "toe"))
@@ -262,6 +271,7 @@ def to_nodes(motion: Motion) -> Motion:
             bones[f"{side}_hand"] = _extended(motion, bones[f"{side}_hand"], joints[wrist], length)
         length = bones["l_knee"].length * HEAD_OF_THIGH
         bones["head"] = _extended(motion, bones["head"], joints["neck"], length)
+    # A part without length has no direction.
     for node, parent in NODE_PARENT.items():
         if bones[node].length < MINIMUM_PART_M:
             known = [joints[end] for end in (parent, node) if end in joints]
@@ -271,6 +281,7 @@ def to_nodes(motion: Motion) -> Motion:
                 f"mm long ({ends}); every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, "
                 "mend the skeleton"
             )
+    # Rotations of all bones, some frames at a time.
     root_positions, rotations = FileBackedRows(), FileBackedRows()
     for frames in in_blocks(motion.positions, motion.rotations):
         root_positions.append(frames[0][:, joints["root"]])
@@ -311,6 +322,7 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     if motion.parents[last] == first or last == first:
         return _Bone(motion.offsets[last] if last != first else np.zeros(3), carried)
 
+    # A chain of joints becomes one bone: the chord between its ends, in the axes of the last joint.
     def chord(positions: Array, rotations: Array) -> Array:
         apart = positions[:, last] - positions[:, first]
         return quaternion_rotate(rotations[:, last] * [-1, -1, -1, 1], apart)
@@ -320,6 +332,7 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     length = float(np.median(np.linalg.norm(chords, axis=1)))
     if length < MINIMUM_PART_M:
         return _Bone(np.array([0.0, 0.0, length]), carried)
+    # The bone's own vector is the usual direction of the chord, from which it swings a little.
     rest = np.median(_directions(chords), axis=0)
     rest /= max(float(np.linalg.norm(rest)), 1e-12)
 
@@ -341,6 +354,7 @@ def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
     Three bones are taken as they are; of fewer the longest is split; of more, the joints nearest to
     each third stay.
     """
+    # The joints from root to thorax, and how far along the trunk each is.
     chain = [thorax]
     while chain[0] != root:
         if motion.parents[chain[0]] < 0:
@@ -362,6 +376,7 @@ def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
     def off_thirds(k: int) -> float:
         return min(abs(heights[k] / heights[-1] - third) for third in (1 / 3, 2 / 3))
 
+    # Four ends make three bones.
     while len(distinct) > 4:
         distinct.remove(max(distinct[1:-1], key=off_thirds))
     ends = list(itertools.pairwise(distinct))

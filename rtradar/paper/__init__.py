@@ -87,6 +87,8 @@ def make_paper(
         kept = _kept(folder, settings)
         # Before any picture, so that each is known as ours however this ends.
         content = _write(folder, settings, kept)
+        # Each part is written as soon as it is measured, so that a command that was stopped can go
+        # on.
         parts = _parts()
         with tqdm(total=len(parts), initial=len(kept), unit="part", disable=None) as bar:
             for name, measure in parts.items():
@@ -107,6 +109,7 @@ def make_paper(
 
 def _kept(folder: Path, settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the parts that an earlier command with the same settings has finished."""
+    # Figures of other settings or of another version would not fit the rest.
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         there = read_json(folder / PAPER_FILES.listing)
         if there["settings"] == settings and there["version"] == version("rtradar"):
@@ -156,6 +159,6 @@ def _write_page(folder: Path, sources: Sources, content: Mapping[str, Any]) -> N
 
 
 def _link(title: str) -> str:
-    """Return a title for the contents: the number of what has one, the subject of what has none."""
+    """Return a title for the contents: the number if the item has one, else its subject."""
     number, _, subject = title.partition(": ")
     return f"{subject} ({number.split()[1]})" if number.startswith("Section") else number

@@ -54,6 +54,7 @@ def activity_figures(sources: Sources) -> dict[str, Any]:
         Figures by their names.
     """
     radar = Radar.preset("paper-12ghz")
+    # All four activities are run; the pictures show different maps of them.
     results: dict[str, Result] = {}
     cpu_s = []
     for name, activity in ACTIVITIES.items():
@@ -124,6 +125,8 @@ def _of_first_frame(cloud: SpatialCloud, result: Result) -> NDArray[np.bool_]:
 
 def _draw_surface(result: Result, axes: Any) -> None:
     """Draw the isosurface of the detections over time, range and velocity."""
+    # Padding closes the surface where the detections reach the edge of the maps. Indices then
+    # become seconds, metres, and metres per second.
     detected = np.pad(result.maps["detections"].values > 0, 1)
     places, faces, _, _ = marching_cubes(detected.astype(np.float32), 0.5)
     axis = [result.maps[name].values for name in ("time", "range", "velocity")]
@@ -149,6 +152,7 @@ def _draw_angles_in_metres(sources: Sources, result: Result) -> None:
     for axes, name, label in zip(
         figure.subplots(1, 2), ("azimuth", "elevation"), ("Y [m]", "Z [m]"), strict=True
     ):
+        # Cells of range and angle are drawn in metres along and across the boresight.
         power = result.maps[f"range_{name}"].values[0]
         distance = _edges(result.maps["range"].values)[:, None]
         angle = _edges(result.maps[name].values)
@@ -181,6 +185,8 @@ def _findings(results: Results) -> dict[str, Any]:
             f"{activity}_points": result.summary["rdt_triangles"],
             f"{activity}_first": int(_of_first_frame(result.spatial, result).sum()),
         }
+        # These points would alias with the same chirps at 60 and 77 GHz, which have these
+        # unambiguous velocities.
         for name, limit_mps in (("60", 1.61), ("77", 1.27)):
             found[f"{activity}_beyond_{name}"] = 100 * float(np.mean(speed > limit_mps))
     jack = results["jumping_jack"]
@@ -188,6 +194,8 @@ def _findings(results: Results) -> dict[str, Any]:
     found["slices_25"], found["slices_75"] = (len(jack.maps["time"][::every]) for every in (1, 3))
     for name in ("azimuth", "elevation"):
         found[f"{name}_deg"] = _strongest_deg(jack, name)
+    # Here is by how much the power of the whole body falls if one part is left out, from the mean
+    # power of each part.
     of_parts = [list(result.summary["part_power_m2"].values()) for result in results.values()]
     power = np.mean(of_parts, axis=0)
     change_db = 10 * np.log10(1 - power / power.sum())
@@ -234,6 +242,7 @@ def detection_figures(sources: Sources) -> dict[str, Any]:
     dict
         Figures by their names.
     """
+    # One frame is detected on one channel and on the sum of all channels.
     radar = Radar.preset("paper-12ghz")
     duration_s = radar.frame_duration_s + radar.cycle_duration_s
     capture = simulate(sources.motion("jumping_jack"), radar, duration_s=duration_s)
@@ -318,6 +327,7 @@ def cost_figures(sources: Sources) -> dict[str, Any]:
     longest_s = min(activity.shown_s, motion.duration_s)
     duration_s = min(_QUICK_S, longest_s) if sources.quick else longest_s
     summary = run(motion, Radar.preset("paper-77ghz"), duration_s=duration_s).summary
+    # These pictures show what the same chirps alias at higher carriers.
     figure = new_figure(3.8, width_in=9.0)
     for axes, name in zip(figure.subplots(1, 2), ("60", "77"), strict=True):
         radar = slow_chirps(name)

@@ -32,12 +32,15 @@ def radar_figures(sources: Sources) -> dict[str, Any]:
     dict
         Figures by their names.
     """
+    # Figure 1 has a small array, and figure 3 that of the paper.
     radar = Radar.preset("paper-12ghz")
     pair = dataclasses.replace(radar, name="2Tx-4Rx", tx_y=2, tx_z=0, rx_y=4, rx_z=0)
     for name, drawn in (("figure-1", pair), ("figure-3", radar)):
         figure = new_figure(4.6)
         drawn.plot(ax=figure.subplots())
         save_figure(figure, sources.out / f"{name}.png")
+    # The paper takes the wavelength at the start of the sweep for some limits; ours are at its
+    # centre.
     start_m = SPEED_OF_LIGHT_MPS / radar.start_frequency_hz
     high = {name: slow_chirps(name).max_velocity_mps for name in ("60", "77")}
     delay_s = 2 * 5.0 / SPEED_OF_LIGHT_MPS
@@ -87,6 +90,8 @@ def slow_chirps(name: str) -> Radar:
 
 def _far_field(radar: Radar) -> dict[str, Any]:
     """Compute what a far-field FFT makes of a point at 4 m before the array."""
+    # The phases are those of the exact paths, and the beams those of a far-field transform: once of
+    # these phases, and once of equal phases, as if the point were in focus.
     tx, rx = radar.tx_m[: radar.tx_y], radar.rx_m[: radar.rx_y]
     point = np.array([_TARGET_M, 0.0, 0.0])
     length = np.linalg.norm(tx - point, axis=1)[:, None] + np.linalg.norm(rx - point, axis=1)
@@ -111,6 +116,8 @@ def _far_field(radar: Radar) -> dict[str, Any]:
 
 def _levels(radar: Radar) -> dict[str, Any]:
     """Compute the paper's two levels of truth above its own noise, and its false-alarm rate."""
+    # The paper's windows are not normalised, so they raise the noise of a cell by the sum of their
+    # squares.
     windows = hann(radar.samples_per_chirp), hann(radar.cycles_per_frame)
     gain = math.prod(float((window**2).sum()) for window in windows)
     noise_db = 10 * math.log10(_BODY_PARTS * _NOISE_M2 * gain)

@@ -217,6 +217,7 @@ def find_recordings(folder: Path | None) -> dict[str, Path]:
         return {}
     there = sorted(folder.rglob("HDM_*.amc"))
     found = {}
+    # Later patterns overwrite earlier ones, so the preferred recording comes last.
     for name, activity in ACTIVITIES.items():
         for pattern in reversed(activity.recordings):
             if fitting := [path for path in there if f"_{pattern}" in path.name]:

@@ -47,6 +47,7 @@ def learning_figures(sources: Sources) -> dict[str, Any]:
 
         result |= train_anew(sources.out)
     _draw(sources, result)
+    # Table 4 has the ten folds of the paper for each size of a cloud, and ours beside them.
     paper = {size: np.array(result["paper"][size]) for size in SIZES}
     chosen = paper["1000"]
     where = "this run" if sources.full else f"commit {result['commit']} of {result['date']}"
@@ -64,6 +65,7 @@ def learning_figures(sources: Sources) -> dict[str, Any]:
         "quartiles": " and ".join(f"{value:.1f}" for value in np.quantile(chosen, (0.25, 0.75))),
         "spatial": _spatial(result["spatial"], full=sources.full),
     }
+    # The paper shows the curves of single trainings.
     trial, long = result["first_trial"], result["all_epochs"]
     found |= {
         "first_trial_epochs": len(trial["test_accuracy"]),
@@ -97,6 +99,7 @@ def _draw(sources: Sources, result: Mapping[str, Any]) -> None:
     figure = new_figure(4.2)
     axes = figure.subplots()
     place = np.arange(len(SIZES), dtype=np.float64)
+    # The boxes of the paper and ours stand side by side for each size.
     for beside, name, colour in ((-0.18, "paper", LIGHT.faint), (0.18, "ours", LIGHT.cycle[0])):
         boxes = [result[name][size] for size in SIZES]
         axes.boxplot(

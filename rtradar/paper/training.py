@@ -36,6 +36,8 @@ class SpatialClouds(Collection):
 
     def points(self, index: int) -> NDArray[np.float64]:
         """Draw x, y and z [m] of points of the spatial cloud, (point, 3), for one sample."""
+        # The random stream depends only on the sample, so its points are the same whenever they are
+        # read.
         points = self.spatial(index)
         random = np.random.default_rng(stream(0, index))
         count = int(SIZES[-1])
@@ -63,6 +65,7 @@ def train_anew(out: Path) -> dict[str, Any]:
     device = pick_device("auto")
     precision = pick_precision(device)
     studies: dict[str, Study] = {}
+    # Each recipe is trained at every size of a cloud.
     for name, recipe in (("ours", PAPER), ("lean", LEAN)):
         for size in SIZES:
             own = recipe.changed(points=int(size), precision=precision)
@@ -76,6 +79,7 @@ def train_anew(out: Path) -> dict[str, Any]:
         if name == "ours":
             found["best"] = _best(studies["1000"])
             found["spatial"] = _of_spatial_clouds(data, out, studies["1000"], precision, device)
+    # Two single trainings of the first fold give the curves that the paper shows.
     first = partial(train_study, clouds, only=[1], device=device)
     trial = first(out / "full-first-trial", _FIRST_TRIAL).outcomes[0]
     longer = PAPER.changed(stop_below=0.0, precision=precision)
@@ -87,7 +91,7 @@ def _of_spatial_clouds(
     data: Path, out: Path, rdt: Study, precision: Precision, device: torch.device
 ) -> dict[str, Any]:
     """Train on spatial clouds as the paper tried it, beside RDT clouds of the same captures."""
-    # Each cloud is scaled by one number, for x, y and z are alike.
+    # Each cloud is scaled by one number, because x, y and z are alike.
     recipe = PAPER.changed(scaling="unit-sphere", precision=precision)
     clouds = SpatialClouds(data)
     study = train_study(clouds, out / "full-spatial", recipe, device=device)

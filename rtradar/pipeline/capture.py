@@ -58,7 +58,7 @@ class PreparedRoom(NamedTuple):
 class Capture:
     """Everything that `prepare` settles before the first echo is computed.
 
-    ``people`` are those of the scene and those who were given, ``body`` is all of them at their
+    ``people`` are the scene's own and those who were given, ``body`` is all of them at their
     places, and ``processing`` has the radar at its position in the scene.
     ``model`` includes the paths over walls if the scene has any; ``room`` is the room, or None.
     ``summed`` is the model of the echoes that are summed at every chirp: all but ghosts that the
@@ -119,6 +119,8 @@ class Capture:
         most = block_chirps(self.radar)
         # The blocks of an array on disk are its chunks.
         at_once = most if kept is not None else min(sink.max_chirps, most)
+        # Range spectra fill one array again and again; the sink is done with them before the next
+        # block.
         range_spectra = self.processing.range_spectra(at_once)
         for first, received in self.received(at_once, progress=progress):
             if kept is not None:
@@ -147,22 +149,30 @@ class Capture:
             n = len(echoes.tx)
             samples, chirps = samples_of[:n], np.arange(first, first + n)
 
+            # What moves comes first: a tone for each echo that is summed exactly, and the ghosts
+            # over walls that are interpolated between keyframes in time.
             with stages.time("signal"):
                 times = radar.chirp_times(n, first)
                 synthesize(echoes, radar, times, dtype=np.complex64, out=samples)
                 if ghosts is not None:
                     ghosts.add(samples, chirps)
+            # The phase noise that is left in an echo depends on its delay. Moving echoes share the
+            # phase noise of their mean delay, so they are turned before the room is added: its
+            # echoes have delays of their own.
             phases = None
             if self.receiver is not None:
                 with stages.time("receiver"):
                     phases = self.receiver.phases(echoes, first)
                     self.receiver.turn_moving(samples, phases)
+            # Of the static room the samples are known, less what people occlude of it now.
             if clutter is not None:
                 with stages.time("clutter"):
                     clutter.add(samples, chirps)
             if self.receiver is not None:
                 with stages.time("receiver"):
                     self.receiver.transmit(samples, phases, first)
+            # Thermal noise belongs to a receiver and not to a pair of Tx and Rx: under DDM it comes
+            # after the sum over all Tx.
             with stages.time("noise"):
                 received = receive(samples, radar, first)
                 self.noise.add(received, radar, first)
@@ -174,6 +184,7 @@ class Capture:
         # A function of its own: names that a loop binds would keep echoes alive while the next
         # block is computed.
         def block(chirps: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+            # The shadow in the clutter is computed in another thread while the echoes are traced.
             with stages.time("scatter"), one_blas_thread():
                 if clutter is not None:
                     clutter.begin(chirps)

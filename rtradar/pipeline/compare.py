@@ -119,9 +119,11 @@ def compare(
     settings = asked
     kind = files_of_runs("compare.json", _FILES, [*MODELS, *MODELS.gone])
     place = check_path("out", out)
+    # Nothing is left in the folder where one of the runs fails.
     with atomic_folder(place, kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         occluded: dict[str, dict[str, Any]] = {}
+        # A run of each level, with what parts occlude of each other at that level.
         for name in names:
             own = replace(settings, fidelity=name)
             written: dict[str, Any] = {"pictures": pictures, "place": place / name}
@@ -130,10 +132,12 @@ def compare(
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary, reference = _summary(results, occluded), results[names[-1]]
+        # The reference once more with another seed shows how much of a difference is chance.
         with TemporaryDirectory() as again:
             own = replace(settings, fidelity=names[-1], seed=settings.seed + 1)
             other = run_into(Path(again, "again"), *parts, own)
             summary["other_seed"] = _figures(other, occluded[names[-1]], reference)
+        # Pictures, the page, and the tables of figures.
         drawn, unit = _draw(results, folder, summary)
         views = {name: load_run_view(folder / name) for name in names}
         rows = comparison_rows(summary)
@@ -215,10 +219,12 @@ def compare_recordings(
     place = check_path("out", out)
     names = [f"{number:02d}-{_file_name(own)}" for number, own in enumerate(motions, start=1)]
     shared: dict[str, Any] = {"fidelities": fidelities, "overwrite": overwrite, **options}
+    # Each recording is compared by itself, in a folder of its own.
     found = [
         compare(motion, radar, scene, out=place / name, pictures=pictures, **shared).summary
         for name, motion in zip(names, motions, strict=True)
     ]
+    # What all recordings share is taken from the first, and the figures are averaged.
     first = found[0]
     summary: dict[str, Any] = {name: first[name] for name in ("reference", "versions")}
     summary |= {"recordings": names, "confidence": CONFIDENCE}
@@ -274,15 +280,19 @@ def plan_levels(
         As by `compare`.
     """
     settings, parts = _given("plan_levels", motion, radar, scene, options)
+    # How long the capture will be, after the scene has placed the radar.
     moving, before, there = parts
     there, everyone = people_in(there, moving)
     body, placed = body_of_people(everyone, settings), there.place(before)
     capture_s = placed.duration_of(placed.chirps_in(body.duration_s))
+    # The level that keeps the tolerance is measured as well, and before the others.
     advice = None
     if tolerance_db is not None:
         level, why = choose_level(placed, body, tolerance_db, None)
         advice = {"level": level, "why": why}
         fidelities = [level, *(name for name in fidelities if name != level)]
+    # A run of two frames has a fixed cost; what a few frames more add to it is the cost of radar
+    # time.
     first_s = min(placed.frame_duration_s + placed.frame_hop_s, capture_s)
     levels = {}
     for name in fidelities:
@@ -327,6 +337,7 @@ def _occluded(
     alone = power_alone(motion, radar, scene, settings)
     if alone is None:
         alone = np.full(seen.shape, np.nan)
+    # A part that returns nothing even alone has no fraction; NaN and infinity become None.
     with np.errstate(divide="ignore", invalid="ignore"):
         of_parts = 1 - seen.sum(axis=0) / alone.sum(axis=0)
         whole = finite(float(1 - seen.sum() / alone.sum()))
@@ -354,6 +365,8 @@ def _figures(result: Result, occluded: Mapping[str, Any], reference: Result) -> 
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
     ours, its = _budget(result), _budget(reference)
+    # Where nothing is seen, the power is 0, and its level the least that there is instead of minus
+    # infinity.
     least = np.finfo(np.float64).tiny
     levels = (10 * np.log10(np.maximum(one.power_at.sum(axis=1), least)) for one in (ours, its))
     power = np.subtract(*levels)
@@ -387,6 +400,7 @@ def _draw(
         strongest = max(float(power.max()) for power in powers.values())
         return field_unit(radar, spreading=parameters["spreading"], strongest_m2=strongest)
 
+    # The echo power over time, summed over parts, and the mean power of each part.
     power, parts = (folder / file for file in list(_PICTURES.values())[:2])
     total, mean = (
         {name: reduced(_budget(one).power_at, axis) for name, one in results.items()}
@@ -443,6 +457,7 @@ def compare_folders(
         raise InputError(
             f"folders {', '.join(names) or '(none)'}; give two or more, each of another name"
         )
+    # All folders are read and checked before anything is written.
     read = {}
     for name, folder in zip(names, map(Path, folders), strict=True):
         check_whole(folder)
@@ -458,6 +473,7 @@ def compare_folders(
     # What was measured has no run file.
     runs = {name: own for name, folder in read.items() if (own := folder.summary.get("run"))}
     summary = {"reference": names[-1], "folders": found, "differ": differing(runs)}
+    # Pictures, the page, and the tables of figures.
     with atomic_folder(Path(out), _OF_FOLDERS, overwrite=overwrite) as place:
         pictures = draw_maps_and_clouds(place, read, " and ".join(names))
         rows = comparison_rows(summary)

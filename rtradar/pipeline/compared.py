@@ -195,6 +195,7 @@ def means_of(found: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         means[key] = None
         if None not in values:
             mean, count = float(np.mean(values)), len(values)
+            # Half the interval is Student's quantile times the standard error of the mean.
             half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2) * np.std(values, ddof=1))
             half /= math.sqrt(count)
             means[key] = {"mean": mean, "low": mean - half, "high": mean + half}
@@ -251,6 +252,7 @@ def level_agreement(
     if not ours.size:
         return LevelAgreement(np.nan, np.nan, np.nan)
     difference = ours - other
+    # A correlation divides by the spread of both maps.
     flat = ours.size < 2 or np.ptp(ours) == 0 or np.ptp(other) == 0
     correlation = np.nan if flat else float(np.corrcoef(ours, other)[0, 1])
     rms_db = float(np.sqrt((difference**2).mean()))
@@ -262,6 +264,7 @@ def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
     values = np.asarray(power)
     if not values.size:  # a capture too short for a spectrogram
         return np.zeros(values.shape, dtype=np.bool_)
+    # Most cells of a spectrogram hold noise alone, so that the median is its level.
     floor = max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0)))
     return np.asarray(values > floor)
 
@@ -296,6 +299,7 @@ def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
     Of captures of other lengths the frames at the start count. Where units differ there is a gain
     between both, and root mean squares are about the mean difference.
     """
+    # Maps are read frame by frame, and of each only the cells that either detects are kept.
     with open_run_maps(ours) as first, open_run_maps(reference) as second:
         both = first, second
         shared, either, cells = 0, 0, []
@@ -305,6 +309,7 @@ def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
             shared, either = shared + int((masks[0] & masks[1]).sum()), either + int(union.sum())
             cells.append(np.array([maps["range_doppler"][frame][union] for maps in both]))
         power = np.concatenate(cells, axis=1)
+        # Long spectrograms are thinned alike, so that columns still belong together.
         columns = min(len(maps["spectrogram_time"]) for maps in both)
         spectrograms = [
             thinned(maps["spectrogram"], maps["spectrogram_time"][:columns])[0] for maps in both
@@ -312,6 +317,8 @@ def _map_figures(ours: Result, reference: Result) -> dict[str, float | None]:
     seen = above_noise(spectrograms[0]) | above_noise(spectrograms[1])
     levels = level_agreement(power[0], power[1], np.ones(power.shape[1], dtype=bool))
     alike = level_agreement(spectrograms[0], spectrograms[1], seen)
+    # The factor between two units is a mean difference in decibels. The rms about the mean follows
+    # from rms^2 = mean^2 + variance.
     if unit_of(ours) != unit_of(reference):
         levels, alike = (
             one._replace(rms_db=math.sqrt(max(one.rms_db**2 - one.mean_db**2, 0.0)))
@@ -345,6 +352,8 @@ def draw_maps_and_clouds(
     spectrogram.
     """
     drawn = {name: place / file for name, file in MAP_PICTURES.items()}
+    # The maps of all results are open at once, because the reference chooses the frame that all of
+    # them show.
     with ExitStack() as stack:
         plots = {
             name: plots_of(one, stack.enter_context(open_run_maps(one)))
@@ -356,6 +365,7 @@ def draw_maps_and_clouds(
             time_s = float(its.maps["time"][its.frame()[0]])
         kinds = "range_doppler", "spectrogram"
         shown = {name: own.maps_at(time_s, kinds) for name, own in plots.items()}
+    # A kind of map is drawn only where every result has it.
     for name, kind in zip(("Range-Doppler", "Spectrogram"), kinds, strict=True):
         maps = {own: found[kind] for own, found in shown.items() if kind in found}
         if len(maps) == len(compared):

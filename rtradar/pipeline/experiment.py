@@ -230,6 +230,7 @@ def sweep(
     combinations = list(itertools.product(*values.values()))
     if not keys or not 1 <= len(combinations) <= _MOST_RUNS:
         raise InputError(f"sweep: {len(combinations)} runs; allowed are 1 to {_MOST_RUNS}")
+    # Every combination of the values is made before the first run starts.
     variants = []
     for combination in combinations:
         own = experiment
@@ -250,6 +251,7 @@ def sweep(
         figures = _figures(result, first)
         runs.append({"folder": folder, "values": list(combination), "figures": figures})
     summary: dict[str, Any] = {"keys": keys, "runs": runs}
+    # The table and the picture over all runs.
     with atomic_folder(place, _FILES, overwrite=overwrite) as written:
         rows = [
             (run["folder"], *run["values"], *(run["figures"][name] for name in FIGURES))
@@ -279,6 +281,7 @@ def _draw(path: Path, summary: Mapping[str, Any]) -> None:
 
     runs, keys = summary["runs"], summary["keys"]
     shown = [name for name in FIGURES if any(run["figures"][name] is not None for run in runs)]
+    # Values of one key that are numbers are places on an axis; else the runs stand side by side.
     numbers = len(keys) == 1 and all(isinstance(run["values"][0], int | float) for run in runs)
     places = [run["values"][0] if numbers else n for n, run in enumerate(runs)]
     figure = new_figure(0.6 + 1.5 * len(shown))

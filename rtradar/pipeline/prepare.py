@@ -141,6 +141,8 @@ def with_background(processing: Processing) -> Processing:
             f"background: radar '{radar.name}' {how}, and a room is then not the same in every "
             "cycle; leave --background out"
         )
+    # The mean over all cycles of a recording of the room alone is what stands still in it; its
+    # range spectra are subtracted from every cycle.
     with processing.stages.time("background"), warnings.catch_warnings():
         # They were given when it was simulated.
         warnings.simplefilter("ignore", ValidityWarning)
@@ -156,7 +158,9 @@ def _mean_cycle(path: Path, radar: Radar, unit: str) -> NDArray[np.complex64]:
         raise InputError(
             f"background '{path}' does not exist; give the folder of a run, or a file of IF samples"
         )
+    # Whole cycles at a time, so that every block has all Tx.
     step = max(1, _ROWS_AT_ONCE // radar.n_tx) * radar.n_tx
+    # A run whose samples were not kept is simulated again.
     if (path / "run.toml").is_file() and not (path / "if.zarr").exists():
         parts = parts_of(read_run_file(path / "run.toml"), path)
         # Its samples still hold the background that was subtracted from its maps.
@@ -170,12 +174,15 @@ def _mean_cycle(path: Path, radar: Radar, unit: str) -> NDArray[np.complex64]:
     told = f"background '{path}': "
     if of_unit != unit:
         raise InputError(f"{told}its samples are in {of_unit}, and these in {unit}")
+    # Any other radar, or the same one elsewhere, sees another room.
     for field in fields(Radar):
         if field.name != "name" and getattr(theirs, field.name) != getattr(radar, field.name):
             raise InputError(
                 f"{told}its radar has another {field.name}; give a run or a recording of the room "
                 "by the same radar at the same place"
             )
+    # Summed in double: a mean over thousands of cycles of equal samples would lose digits in
+    # single.
     total = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex128)
     count = 0
     for block in blocks:
@@ -213,6 +220,7 @@ def _surveyed(
     settings: RunSettings,
 ) -> LinkBudget:
     """Return the link budget with the limits of the objects; of nobody visible, all warnings."""
+    # Warnings are held back, because those of a budget without any echo say why nobody is visible.
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ValidityWarning)
         alone, spreading = model.people_alone, settings.spreading
@@ -220,6 +228,7 @@ def _surveyed(
         limits = model.limits
         for limit in limits:
             warn_of(limit)
+    # They are given all the same, each from the place where it arose.
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     all_limits = [*budget.limits, *limits]
@@ -299,11 +308,14 @@ def _expected(
     # Which paths of a room need a model of their own is not yet known.
     chirps, room = np.arange(2 * radar.n_tx), model.room
     echoes = model.echoes(chirps) if room is None else room.optical_echoes(chirps)
+    # Parts of people come first; objects are movers of their own.
     own = echoes.part < len(budget.part_power)
     delays = mean_delays(replace(echoes, amplitude=np.where(own, echoes.amplitude, 0)))
     power = sum(budget.person_power)
     people = Mover(power, _CREST * power, float(delays.mean()))
     objects = (Mover(largest, largest, delay_s) for largest, delay_s in model.movers(n_chirps))
+    # Weights of a window function sum to 1, so noise in a cell of the map falls by the sum of their
+    # squares, over range and over Doppler.
     gain = float((weights(windows.range, radar.samples_per_chirp) ** 2).sum())
     gain *= float((weights(windows.doppler, radar.cycles_per_frame) ** 2).sum())
     return Expected((people, *objects), noise.power, noise.power * gain)
@@ -315,6 +327,7 @@ def _noise(radar: Radar, budget: LinkBudget, settings: RunSettings) -> Noise:
         return Noise(settings.noise_power_m2, settings.seed)
     if not isinstance(settings.snr_db, str):
         return Noise.for_snr(budget.power, settings.snr_db, settings.seed)
+    # Noise in watts over the watts of an echo of 1 m^2 is noise in the unit of the samples.
     power = radar.noise_power_w / radar.watts_per_m2
     if power > budget.power * 10 ** (MAX_SNR_DB / 10):
         raise InputError(
@@ -346,9 +359,12 @@ def _prepare_room(
     the walls.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
+    # The tolerated error is a power relative to that of people, and 0 where everything is exact.
     allowed = 0.0
     if settings.path_tolerance_db is not None:
         allowed = person_power_m2 * 10 ** (settings.path_tolerance_db / 10)
+    # Three things may err: ghosts that are left out, ghosts that are interpolated in time, and the
+    # shadow of people in the clutter. Each takes what those before it have left of the budget.
     model, error, ghosts, said = everything.room, 0.0, None, dict[str, Any]()
     summary: dict[str, Any] = {"paths": [], "faces": []}
     if model is not None:
@@ -363,11 +379,14 @@ def _prepare_room(
         summary["paths"] = [asdict(path) for path in paths]
         summary["faces"] = [face._asdict() for face in model.faces]
         said = {"left_out": model.left_out, **said}
+    # The clutter takes at least one reflection by walls, also where people have no ghosts.
     order = max(settings.order, 1)
 
     def trace(still: Radar) -> Clutter:
         return Clutter(still, scene, variant=variant, order=order).prune(noise)
 
+    # Static clutter: traced anew along the way of a radar that moves, exactly the same in every
+    # cycle where nobody casts a shadow, and else less what people and objects occlude of it.
     clutter = trace(radar.at(0.0))
     if radar.is_moving:
         static: RoomIf = MovingRoomIf(radar, radar.duration_of(n_chirps), trace)
@@ -376,6 +395,7 @@ def _prepare_room(
     else:
         shadow = ClutterShadow(clutter, body, scene.objects, allowed - error)
         static, error = RoomIf(radar, clutter.cycle(), shadow), error + shadow.error_m2
+    # What was found, kept and left out, for the summary.
     ratio = person_power_m2 / static.power_m2 if model is not None and static.power_m2 > 0 else None
     summary["clutter"] = {
         "power_m2": static.power_m2,

@@ -139,7 +139,7 @@ class Processing:
 def block_chirps(radar: Radar) -> int:
     """Return how many chirps are computed or processed together: a hop of the frames, or a frame.
 
-    Maps depend on it in their last bits, for steps of the range-time map end with a block.
+    Maps depend on it in their last bits, because steps of the range-time map end with a block.
     """
     return min(math.ceil(radar.hop_cycles), radar.cycles_per_frame) * radar.n_tx
 
@@ -206,6 +206,7 @@ class CloudMaker:
         self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.settings.seed)
         self._ranges = RangeSideLobes(processing.window_functions.range, radar.range_m)
         self._spatial = UniformSample(SPATIAL_POINTS, processing.settings.seed, columns=8)
+        # Blocks are whole steps of the range-time map, as many as the cache has room for.
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
         self.max_chirps = step * max(1, int(_MAX_BYTES / step_bytes))
@@ -225,6 +226,7 @@ class CloudMaker:
         radar, stages = self._processing.radar, self._processing.stages
         window_functions = self._processing.window_functions
         frames = self._sliding.push(spectra)
+        # The generator copies into its buffer as it goes on, and this time has a stage of its own.
         while True:
             with stages.time("frames"):
                 frame = next(frames, None)
@@ -233,14 +235,18 @@ class CloudMaker:
             _, start, window = frame
             with stages.time("clutter removal"):
                 cube = self._processing.removal.window(window)
+            # The range-Doppler map, and what is detected on it.
             with stages.time("doppler"):
                 power = power_map(cube, radar, window_functions=window_functions)
             with stages.time("cfar"):
                 mask, sines = self._processing.detect(power, cube)
+            # The mask of each frame is a layer of the volume whose surface becomes the RDT cloud.
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
                 self._ranges.add(power, mask)
+            # Who returned the cells, and where they lie in space. A detector of points finds the
+            # directions itself; else they are the peaks of the angle spectra.
             angles = sources = None
             if self._source_of is not None:
                 with stages.time("sources"):
@@ -254,6 +260,8 @@ class CloudMaker:
                         if sines is None
                         else points_of_sines(sines, mask, power, *given)
                     )
+                    # Eight numbers for each point, of which a uniform sample is kept in constant
+                    # memory.
                     nobody = np.full(len(found.time), -1)
                     who = (nobody if own is None else own for own in (found.source, found.part))
                     columns = found.points, found.velocity, found.power, found.time, *who
@@ -265,6 +273,7 @@ class CloudMaker:
         with self._processing.stages.time("cloud"):
             rdt = self._rdt.finish()
             rows = self._spatial.rows()
+            # The sample is in random order; points are given in the order of time.
             rows = rows[np.argsort(rows[:, 5], kind="stable")]
         who = () if self._source_of is None else rows[:, 6:].astype(np.int64).T
         spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5], *who)
@@ -281,10 +290,12 @@ def frame_angles(
     rows, columns = np.nonzero(mask)
     velocity = radar.velocity_mps(radar.cycles_per_frame)
     blocks = []
+    # Some cells at a time: all channels of all cells of a busy frame would take much memory.
     for first in range(0, max(len(rows), 1), _CELLS_AT_ONCE):
         row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
         values = cell_spectra(cube, radar, row, column, window_functions=window_functions)
         blocks.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
+    # The blocks are joined as if all cells had been measured at once.
     if len(blocks) == 1:
         return blocks[0]
     joined: dict[str, Any] = {}
@@ -316,6 +327,8 @@ def bytes_of_maps(radar: Radar, n_chirps: float, *, sources: bool = False) -> fl
 
     ``sources`` says whether there is a map of who returned each detection.
     """
+    # Frames in the capture, and steps of the range-time map, of which each frame with a gap begins
+    # one.
     frames = max(n_chirps / radar.n_tx - radar.cycles_per_frame, 0) / radar.hop_cycles + 1
     steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S + radar.in_frames * frames
     power, mask = np.dtype(np.float32).itemsize, np.dtype(np.uint8).itemsize

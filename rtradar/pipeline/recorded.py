@@ -121,6 +121,7 @@ class Samples:
         self.title = f"{_NAME}, {radar.name}"
         self._cycle_rows = radar.n_tx // chirps_together(radar)
         self.n_chirps, self.frame_starts = 0, radar.window_starts(0)
+        # An array has a known length, and with it known frames; blocks are checked as they come.
         if hasattr(samples, "dtype"):
             rows = _rows(samples, radar)
             self.frame_starts = self._checked(len(rows) // self._cycle_rows * radar.n_tx)
@@ -148,10 +149,11 @@ class Samples:
         most = block_chirps(self._radar) // chirps_together(self._radar)
         held: list[NDArray[np.complex64]] = []
         count = 0
+        # Pieces of any length are cut and joined to blocks of one length.
         for piece in self._pieces:
             begin = 0
             while begin < len(piece):
-                # Copies, for the caller may fill the same array again.
+                # Copies, because the caller may fill the same array again.
                 with np.errstate(over="ignore"):
                     part = np.array(piece[begin : begin + most - count], dtype=np.complex64)
                 held.append(part)
@@ -159,6 +161,7 @@ class Samples:
                 if count == most:
                     yield self._block(held)
                     held, count = [], 0
+        # What is left makes a shorter block, if it holds a whole cycle.
         if count >= self._cycle_rows:
             yield self._block(held)
         self._checked(self.n_chirps)
@@ -198,6 +201,7 @@ def _rows(samples: Any, radar: Radar) -> Any:
     """Return samples as rows (chirp, rx, sample), one for each cycle under DDM."""
     sums = radar.receives_sums
     allowed = _DIMENSIONS[:1] if sums else _DIMENSIONS
+    # Named dimensions may be in any order.
     if hasattr(samples, "dims"):
         order = next((names for names in allowed if set(names) == set(samples.dims)), None)
         if order is None:
@@ -207,6 +211,7 @@ def _rows(samples: Any, radar: Radar) -> Any:
                 f"allowed: {' or '.join(texts)}"
             )
         samples = samples.transpose(*order)
+    # The samples themselves are not read yet: they may be rows of a file.
     kind, shape = np.dtype(samples.dtype), tuple(samples.shape)
     if kind.kind != "c":
         raise InputError(f"IF samples are of type {kind}; they must be complex numbers")
@@ -217,6 +222,7 @@ def _rows(samples: Any, radar: Radar) -> Any:
             f"IF samples have cycles of {tx} Tx; radar '{radar.name}' has {own}: give the radar "
             "that received them"
         )
+    # Cycles by Tx are laid out as chirps, which come in the same order.
     if len(shape) == 4 and not sums and shape[1:] == (radar.n_tx, *end):
         return np.asarray(samples).reshape(-1, *end)
     if len(shape) != 3 or shape[1:] != end:

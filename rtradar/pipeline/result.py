@@ -149,6 +149,7 @@ class Result:
             raise InputError(
                 "view: IF samples have no body to show; look at the maps with result.plot"
             )
+        # The page is written as a file, as for `rtradar view`, and read again.
         with TemporaryDirectory() as folder:
             write_view(Path(folder) / "view.html", run_view)
             page = (Path(folder) / "view.html").read_text(encoding="utf-8")

@@ -168,6 +168,7 @@ def results_of(
     ``place`` is where the folder will be in the end, if that is elsewhere.
     """
     stages = source.processing.stages
+    # In memory: the maps go into a file that is held in memory, and are read from it as a dataset.
     if out is None:
         file = BytesIO()
         result, table = _streamed(source, file)
@@ -179,6 +180,7 @@ def results_of(
                 result.summary["run"] = in_words(table.capture.described())
                 held["_truth"] = read_truth(file)
         return replace(result, summary=finished(result.summary | cost(source)), **held)
+    # In a folder: all files appear together, or none of them where something fails.
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
         kept = None
         if source.processing.settings.save_if:
@@ -187,6 +189,8 @@ def results_of(
         summary = result.summary
         with stages.time("write"):
             write_clouds(folder, result.points, result.spatial)
+        # Everything that is drawn is drawn from the file of the maps, which need not fit into
+        # memory.
         room = run_view = None
         with read_maps(folder / "maps.h5") as maps:
             plots = plots_of(result, maps)
@@ -204,6 +208,7 @@ def results_of(
                     draw_pictures(folder, plots, room)
             with stages.time("report"):
                 write_report(folder / "report.html", plots, room=room, run_view=run_view)
+        # The summary comes last, because it lists all files and has the time that everything took.
         return replace(result, summary=finished(summary | cost(source), folder), out=out.absolute())
 
 
@@ -221,6 +226,7 @@ def _streamed(
         # Only what is simulated may be kept.
         source.stream(writer, *([] if kept is None else [kept]))
         clouds = writer.finish()
+    # Of samples that were recorded neither echoes nor people are known.
     simulated: dict[str, Any] = {}
     if table is not None:
         budget, experiment = table.capture.link_budget, Experiment(table.capture.described())

@@ -53,10 +53,12 @@ class Sources:
         self._owner = np.append(capture.body.owner, objects)
         windows = capture.processing.window_functions
         self._doppler = weights(windows.doppler, self._cycles)
+        # How a tone spreads over range bins, and how far it must be followed.
         self._spread, self._reach = _spread(windows.range, radar.samples_per_chirp)
         after = self._spread[len(self._spread) // 2 :] ** 2
         # Largest power from each bin after the tone on.
         self._falls = np.maximum.accumulate(after[::-1])[::-1][: _FINE * self._reach : _FINE]
+        # Noise power in a cell of one channel, as rectangular window functions would leave it.
         noise = capture.noise.power / radar.samples_per_chirp / self._cycles
         self._weak_m2 = _WEAK * noise
 
@@ -73,10 +75,13 @@ class Sources:
             return CellSources(np.full(len(rows), -1), np.full(len(rows), -1))
         of_parts = self.expected(start_cycle, rows, columns)
         # The parts of one owner are neighbours.
+        # Sums over the parts of each person or object, then the largest of these.
         first_parts = np.flatnonzero(np.diff(self._owner, prepend=-1))
         of_owners = np.add.reduceat(of_parts, first_parts, axis=0)
         best, source = of_owners.max(axis=0), of_owners.argmax(axis=0)
         part = np.where(self._owner[:, None] == source, of_parts, -1.0).argmax(axis=0)
+        # Nobody's where the room returns more, or where far more was received than anybody
+        # explains.
         known = (best > self._still[rows, columns]) & (power[rows, columns] < _UNEXPECTED * best)
         return CellSources(np.where(known, source, -1), np.where(known, part, -1))
 
@@ -100,6 +105,7 @@ class Sources:
         most_m2 = looks.power_m2.max(axis=0, initial=0.0)
         reach = _FINE * (self._falls * most_m2[:, None] > self._weak_m2).sum(axis=1)
         low, high = steps.min(axis=0) - reach, steps.max(axis=0) + reach
+        # Only pairs of an echo and a range bin with detections in it count that the echo reaches.
         bins, bin_of_cell = np.unique(rows, return_inverse=True)
         asked = _FINE * bins
         echo, number = np.nonzero((asked >= low[:, None]) & (asked <= high[:, None]))
@@ -112,15 +118,18 @@ class Sources:
 
         def spectra(first: int) -> tuple[NDArray[np.int64], Array]:
             some = slice(first, first + _AT_ONCE)
+            # The field of each echo in its bin over slow time, and the Doppler spectrum of that.
             away = _FINE * (bins[number[some]] + self._reach)
             signal = np.empty((n_cycles, len(away)), dtype=np.complex64)
             fields_in_bins(echo[some], away, steps, fields, self._spread, signal)
             spectrum = doppler_power(signal[:, None], range(1), self._doppler, 1)
+            # Echoes of one part in one bin follow each other, and their powers add up.
             targets, begin = np.unique(target[some], return_index=True)
             return targets, np.add.reduceat(spectrum, begin, axis=1)
 
         for targets, power_m2 in thread_map(spectra, range(0, len(echo), _AT_ONCE)):
             found[:, targets] += power_m2
+        # Pairs that no echo reaches have the last column, which is nothing.
         place = np.full(n_parts * len(bins), len(reached))
         place[reached] = np.arange(len(reached))
         of_cells = place.reshape(n_parts, len(bins))[:, bin_of_cell]
@@ -137,6 +146,7 @@ class Sources:
             np.array([getattr(one, name)[:count] for one in looks], dtype=np.float64)
             for name in ("range_m", "rate_mps", "power_m2")
         )
+        # What is beyond the last range is removed by the filter before the ADC.
         power_m2 = np.where(range_m < radar.max_range_m, power_m2, 0.0)
         kept = np.flatnonzero(power_m2.max(axis=0) > max(self._weak_m2, 0.0))
         # One layout and type, or Numba would compile for each that comes.
@@ -154,6 +164,8 @@ class Sources:
             samples = np.zeros((radar.n_tx, radar.n_rx, len(power)), np.complex64)
             capture.room.clutter.add(samples, np.arange(radar.n_tx))
             windows = capture.processing.window_functions
+            # The room is the same in every cycle: its power in a bin lies about zero Doppler as the
+            # window spreads it.
             spectra = range_spectrum(samples, radar, window_functions=windows)
             by_range = (np.abs(spectra.astype(np.complex128)) ** 2).sum(axis=(0, 1))
             power += by_range[:, None] * np.fft.fftshift(np.abs(np.fft.fft(self._doppler)) ** 2)
@@ -167,8 +179,11 @@ def _spread(window: WindowName, n: int) -> tuple[NDArray[np.float32], int]:
     about the middle of the sweep, whose frequency range rates are measured at.
     """
     steps = np.arange(_FINE * n)
+    # A spectrum with zeros padded is known at fractions of a bin. Its phase about the middle of the
+    # chirp is taken out, which leaves it real for a symmetric window.
     spectrum = np.fft.fft(weights(window, n), _FINE * n) * np.exp(1j * np.pi * steps / _FINE)
     half = spectrum.real[: min(_FINE * n // 2, _FINE * _FARTHEST + 1)]
+    # Whole bins up to the last side lobe that is high enough to count.
     reach = int(np.flatnonzero(half**2 > _LEAST)[-1]) // _FINE + 1
     half = np.append(half[: _FINE * reach], 0.0)
     return np.concatenate([half[:0:-1], half]).astype(np.float32), reach

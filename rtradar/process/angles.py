@@ -132,14 +132,18 @@ def angle_spectra(
     # back by its Tx's own carrier.
     turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
     turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
+    # The same conjugate phase for all Rx of a Tx: they receive the same chirp.
     samples = cells.astype(np.complex64, copy=False)
     still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
+    # Under BPM the chirps of a cycle hold all Tx with signs. Only with the motion between chirps
+    # taken out are they told apart.
     if radar.multiplexing == "bpm":
         turned = np.moveaxis(samples * still[:, None], 1, -1)
         parted = tell_apart(turned.reshape(len(cells), radar.n_tx, radar.n_rx, -1), radar)
         samples = np.moveaxis(parted.reshape(turned.shape), -1, 1).copy()
         still = np.ones_like(still)
 
+    # Antennas anywhere have no lines; the beam is steered in both sines at once.
     if not radar.is_cross:
         known_bins = bins if focus else None
         cuts = cuts_through_highest(
@@ -152,6 +156,8 @@ def angle_spectra(
         if line is None:
             return None
         result = np.empty((len(cells), len(sine_grid(radar))), dtype=np.float32)
+        # Weights are found by the range bin: one set for all bins in the far field; all bins, kept,
+        # for the taper that runs use; and else only the bins that occur.
         if not focus:
             known, place = steering(radar, axis, None, taper), np.zeros_like(bins)
         elif taper == "taylor":
@@ -235,11 +241,13 @@ def angle(
     spectra = range_spectrum(np.asarray(x), radar, window_functions=window_functions)
     n_cycles = whole_cycles("angle", spectra, radar)
     last = radar.samples_per_chirp - 1
+    # The cell that is meant, as bins of range and of Doppler.
     row = _nearest("range_m", range_m, radar.range_bin_m, 0, last)
     step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
     column = _nearest("velocity", velocity, step, -n_cycles / 2, n_cycles / 2)
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
     cell = [row], [(column + n_cycles // 2) % n_cycles]
+    # The strongest direction on each line; the azimuth follows with that elevation.
     values = cell_spectra(cube, radar, *cell, window_functions=window_functions)
     at = [row * radar.range_bin_m], [column * step]
     found = angle_spectra(values, radar, *at, focus=focus, taper="uniform")
@@ -334,6 +342,8 @@ def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     InputError
         Where the radar has no y-line.
     """
+    # A direction at elevation e has u = sin(azimuth) cos(e), so that azimuths are read at shorter
+    # sines.
     w = 0.0 if spectra.z is None else spectra.sines[spectra.z.argmax(axis=1), None]
     return _map(spectra, "y", np.sqrt(1 - w**2) * np.sin(angle_grid(radar)), radar)
 
@@ -368,7 +378,7 @@ def _map(spectra: AngleSpectra, line: str, sines: _Reals, radar: Radar) -> _Real
             f"line of at least 2 channels along {line}; give it one"
         )
     total = np.zeros((radar.samples_per_chirp, sines.shape[-1]))
-    # What may not be written to is another type to Numba, for which it would compile all again.
+    # A read-only array is another type to Numba, which would compile everything again for it.
     own = np.array(np.broadcast_to(sines, (len(power), sines.shape[-1])), order="C")
     bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
     grid = spectra.sines

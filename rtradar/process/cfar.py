@@ -4,9 +4,9 @@ The training cells of a cell are the square ring of half-width ``guard + train``
 of half-width ``guard`` around it. At the edges of the map only those that exist count, with the
 rank and the multiplier of their number.
 
-Multipliers follow the laws :eq:`os-cfar-looks` and :eq:`ca-cfar`, for training cells that are
-independent of each other. In windowed maps neighbouring cells are correlated, and the rate is
-higher than asked; validation/closed_forms/cfar.py measures by how much.
+Multipliers follow the laws :eq:`os-cfar-looks` and :eq:`ca-cfar`, which hold where training cells
+are independent of each other. In windowed maps neighbouring cells are correlated, and the rate is
+higher than the one that is asked for; validation/closed_forms/cfar.py measures by how much.
 """
 
 from __future__ import annotations
@@ -75,6 +75,8 @@ def os_cfar(
     [(20, 30)]
     """
     _check_quantile(quantile)
+    # The k-th smallest is below x / alpha exactly where at least k of the ring are: counting needs
+    # no sorting.
     cells, law = _checked(power, _Options(guard, train, quantile, pfa, looks, scale))
     thresholds = cells / law.scales.astype(cells.dtype)
     return np.asarray(_count_below(cells, thresholds, guard, guard + train) >= law.ranks)
@@ -106,6 +108,8 @@ def ca_cfar(
         Where `os_cfar` raises it.
     """
     cells, law = _checked(power, _Options(guard, train, None, pfa, looks, scale))
+    # A cell exceeds scale times the mean where the sum of its ring is below count / scale times the
+    # cell.
     sums_wanted = cells * (law.counts / law.scales).astype(cells.dtype)
     inner = np.zeros(2 * (guard + train) + 1)
     inner[train : train + 2 * guard + 1] = 1
@@ -146,6 +150,7 @@ def _law(shape: tuple[int, ...], options: _Options) -> _Law:
     guard, train, quantile, pfa, looks, scale = options
 
     def square(half: int) -> NDArray[np.int32]:
+        # How many cells of the square are inside the map, row by row and column by column.
         rows, columns = (
             np.minimum(np.arange(n) + half, n - 1) - np.maximum(np.arange(n) - half, 0) + 1
             for n in shape
@@ -202,6 +207,8 @@ def _count_below(
     """Number of training cells that lie below the threshold of each cell (range, velocity)."""
     rows, columns = cells.shape
     count = np.zeros(cells.shape, dtype=np.min_scalar_type((2 * outer + 1) ** 2))
+    # Beyond the edges there is infinity, which is below no threshold. The map is shifted as a whole
+    # to each place of the ring.
     below, padded = np.empty(cells.shape, np.bool_), np.pad(cells, outer, constant_values=np.inf)
     for down, right in np.ndindex(2 * outer + 1, 2 * outer + 1):
         if max(abs(down - outer), abs(right - outer)) > guard:
@@ -312,10 +319,13 @@ def _os_scale(n_train: int, rank: int, pfa: float, looks: int) -> float:
 
     def excess(log_alpha: float) -> float:
         alpha = math.exp(log_alpha)
+        # For one look the product in closed form, in logarithms, which do not underflow at small
+        # rates.
         if looks == 1:
             return -float(np.log1p(alpha / index).sum()) - goal
         return _log_os_pfa(alpha, n_train, rank, looks) - goal
 
+    # The rate falls with the multiplier: an interval that holds the root, and then the root.
     low, high = -1.0, 1.0
     while excess(low) < 0:
         low -= 2.0
@@ -333,6 +343,8 @@ def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
 
     def log_integrand(t: NDArray[np.float64]) -> NDArray[np.float64]:
         z = np.exp(t)
+        # Density of the k-th smallest of N at z, over t = log z: (k - 1) below it, the others
+        # above, and the alarm above alpha z.
         below = _log_or(gammainc(looks, z), looks * t - z - gammaln(looks + 1))
         above = _log_upper(looks, z)
         alarm = _log_upper(looks, alpha * z)
@@ -343,6 +355,7 @@ def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
     )
     t = np.linspace(*_support(log_integrand, looks), _NODES)
     values = log_integrand(t)
+    # Relative to its peak, so that the integral does not underflow.
     peak = values.max()
     return float(peak + np.log(np.exp(values - peak).sum() * (t[1] - t[0])))
 

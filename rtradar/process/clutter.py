@@ -9,8 +9,8 @@ what is constant there from cycle to cycle is removed. T is the cycle, f the Dop
 ``mean``
     The mean over each frame is removed; in the spectrogram that over each of its own windows, in
     the range-time map that over one frame about each step (`rtradar.process.SlidingRangeTime`).
-    Doppler bins -1, 0 and 1 of a Hann window change; the others keep their values, for a constant
-    has no part in them. A slow echo is removed with the clutter: of one of d bins of Doppler the
+    Doppler bins -1, 0 and 1 of a Hann window change; the others keep their values, because a
+    constant has no part in them. A slow echo is removed with the clutter: of one of d bins the
     fraction sinc(d) counts as static. That is all of a person who does not move in that frame, and
     more than half of the highest peak below 0.6 bins (0.06 m/s for the paper's radar at 12 GHz,
     0.011 m/s at 77 GHz). A fast echo loses nothing, but leaves up to 1 / (pi d) of its amplitude in
@@ -122,6 +122,7 @@ class ClutterRemoval:
                 f"before {self._next}; give the chirps without a gap, or begin anew with "
                 "another removal"
             )
+        # The state of a stream is only right if no chirp is left out and none comes twice.
         self._next = first_chirp + len(chirps)
         cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])
         if self._room is not None:
@@ -216,6 +217,7 @@ class _Exponential(ClutterRemoval):
                 "and finite"
             )
         self._time_constant_s = time_constant_s
+        # With gaps between frames the mean time from cycle to cycle counts.
         apart_s = radar.cycle_duration_s
         if radar.frame_period_s is not None:
             apart_s = radar.frame_period_s / radar.cycles_per_frame
@@ -231,11 +233,14 @@ class _Exponential(ClutterRemoval):
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.empty_like(cycles)
         for cycle, left in zip(cycles, out, strict=True):
+            # The background starts as the first cycle, and is the mean of all until its own weight
+            # is larger.
             if self._count == 0:
                 self._background[...] = cycle
             self._count += 1
             step = cycle - self._background
             left[...] = step
+            # As pairs of real numbers, which a real weight multiplies faster.
             parts = step.view(np.float64)
             parts *= max(self._weight, 1 / self._count)
             self._background += step
@@ -335,6 +340,7 @@ def clutter_removal(
             f"clutter removal '{method}': under multiplexing = 'ddm' what does not move has a "
             "Doppler of its own for each Tx, which this would leave in; choose 'none', or TDM"
         )
+    # A setting of another method would have no effect, and is refused.
     make, setting = _METHODS[method]
     given = {"time_constant_s": time_constant_s, "pulses": pulses}
     own: dict[str, Any] = {name: value for name, value in given.items() if value is not None}

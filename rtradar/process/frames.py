@@ -88,12 +88,15 @@ class SlidingWindows:
 
     def _frames(self, block: NDArray[np.generic]) -> Iterator[_Frame]:
         taken = 0
+        # A block may be longer than the buffer: some of it is taken, then all frames that are whole
+        # are given, and so on.
         while taken < len(block):
             taken += self._take(block[taken:])
             while (start := self._next_start()) is not None:
                 offset = start * self._radar.n_tx - self._first
                 view = self._buffer[offset : offset + self._radar.chirps_per_frame]
                 cube = view.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *view.shape[1:])
+                # Frames overlap in the buffer: who wrote into one would change the next.
                 cube.flags.writeable = False
                 index = self._index
                 self._index += 1
@@ -106,6 +109,7 @@ class SlidingWindows:
         wanted = self._start_of(self._candidate) * self._radar.n_tx
         gone = min(max(wanted - self._first, 0), self._held)
         room = len(self._buffer) - self._held
+        # Nothing that is held is needed any more: the buffer begins anew.
         if self._held == gone:
             self._first, self._held = self._first + gone, 0
             # A hop longer than the frame leaves chirps unused.
@@ -114,9 +118,10 @@ class SlidingWindows:
                 self._first += skip
                 self.n_chirps += skip
                 return skip
+        # The buffer is full: what is still needed moves to its front.
         elif room == 0:
             kept = self._held - gone
-            # At most as many at once as it moves, for NumPy copies overlapping arrays twice.
+            # At most as many at once as it moves, because NumPy copies overlapping arrays twice.
             for begin in range(0, kept, gone):
                 end = min(begin + gone, kept)
                 _copy(self._buffer[begin + gone : end + gone], self._buffer[begin:end])
@@ -132,6 +137,7 @@ class SlidingWindows:
 
     def _next_start(self) -> int | None:
         """First cycle of the next frame if its last chirp is there, as in `Radar.window_starts`."""
+        # Starts are multiples of the hop, rounded to whole cycles.
         last = self.n_chirps // self._radar.n_tx - self._radar.cycles_per_frame
         newest = math.floor((last + 0.5) / self._radar.hop_cycles)
         while self._candidate <= newest and (start := self._start_of(self._candidate)) <= last:
@@ -194,6 +200,8 @@ def range_time(
             f"(chirp, {radar.n_rx}, range)"
         )
     together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
+    # Each step is a task of its own. Under DDM each row holds the sum of all Tx, so the mean is
+    # that of so many of them.
     bounds, times = _steps(len(chirps), radar, first_chirp, step_s)
     power = thread_map(
         lambda step: _mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds))
@@ -287,6 +295,8 @@ class SlidingRangeTime:
         slow_time : (slow_time,) float64
             Centre of each step since the start of the capture [s].
         """
+        # Where clutter was removed from the stream itself, steps are averaged at once; removal
+        # frame by frame waits for the frame about a step.
         if not self._by_frames:
             return range_time(spectra, self._radar, first_chirp=first_chirp, step_s=self._step_s)
         chirps, radar = np.asarray(spectra), self._radar
@@ -298,6 +308,8 @@ class SlidingRangeTime:
             return _Step(float(times[number]), len(own), mean, _mean_power(own - mean))
 
         ready = []
+        # The steps of one frame, with a running sum of their means: the oldest goes as the next one
+        # comes.
         for one in thread_map(step, range(len(bounds))):
             if len(self._frame) == self._steps:
                 oldest = self._frame.popleft()

@@ -67,6 +67,7 @@ def power_map(
     InputError
         Where the shape does not fit the radar, or there is no such channel.
     """
+    # One row for each virtual channel, in which the Doppler transform runs over cycles.
     cube = checked_frame("power_map", spectra, radar)
     if channel is not None:
         check_channel("power_map", channel, radar)
@@ -82,6 +83,7 @@ def power_map(
     power = doppler_power(channels, chosen, scale, radar.n_rx)
     if divided:
         power = without_copies(power, radar, radar.n_rx, window_functions)
+    # Zero velocity to the middle, and range first.
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
 
@@ -141,14 +143,19 @@ def without_copies(
     from scipy.ndimage import maximum_filter  # here, because SciPy is slow to import
     from scipy.special import gammainccinv, gammaincinv
 
+    # The Doppler axis as bands, and for each band the power of the block of n_tx bands that begins
+    # there: an echo at its own place fills such a block.
     power = band_power.reshape(bands, -1, band_power.shape[1])
     filled = _block_sums(power, n_tx)
     spread = window_functions.main_lobe_bins
     # The block of bands with most power in and about each cell, and its power in the cell.
     begin = _block_sums(_about(band_power, spread).reshape(power.shape), n_tx).argmax(axis=0)
     strongest = np.take_along_axis(filled, begin[None], axis=0)[0]
+    # What the bands outside of the block hold is noise.
     empty = (power.sum(axis=0) - strongest) / (bands - n_tx)
     usual = np.median(filled, axis=(0, 1))
+    # An echo stands out of the median by more than noise does, which has a Gamma law of so many
+    # looks.
     looks = n_tx * receivers
     place = (np.arange(bands)[:, None, None] - begin) % bands
     echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))

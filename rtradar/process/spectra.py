@@ -91,9 +91,12 @@ def range_doppler(
     slow = weights(window_functions.doppler, n_cycles)
     kind = complex_kind(samples)
     cube = samples[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_channels, samples.shape[2])
+    # Both windows at once, then the transform over fast time, to range, and over slow time, to
+    # Doppler.
     weighted = cube * fast.astype(kind) * slow.astype(kind)[:, None, None]
     spectra = scipy.fft.fft(weighted, axis=2, overwrite_x=True, workers=-1)
     spectra = scipy.fft.fft(spectra, axis=0, overwrite_x=True, workers=-1)
+    # Zero velocity to the middle, and axes in the order of maps.
     values = np.fft.fftshift(spectra, axes=0).transpose(2, 0, 1)
     return RangeDoppler(np.ascontiguousarray(values), radar.range_m, radar.velocity_mps(n_cycles))
 
@@ -242,6 +245,7 @@ def cell_spectra(
     if cube.dtype.kind != "c":
         raise InputError(f"cell_spectra: spectra are of type {cube.dtype}; they must be complex")
     n_cycles, n_range = cube.shape[0], cube.shape[3]
+    # The cells, as bins of range and velocity in the map.
     rows = _indices(range_bins, n_range, "range_bins")
     columns = _indices(velocity_bins, n_cycles, "velocity_bins")
     if rows.shape != columns.shape:
@@ -249,6 +253,8 @@ def cell_spectra(
             f"cell_spectra: {len(rows)} range_bins and {len(columns)} velocity_bins; give one of "
             "each for a cell"
         )
+    # The range bins about each cell; the range axis is a DFT, and goes on from its end to its
+    # beginning.
     walk = range_walk(radar)
     steps = (rows[:, None] + np.arange(-walk, walk + 1)) % n_range
     # Index 0 of the map is the DFT bin of the most negative velocity.
@@ -257,6 +263,7 @@ def cell_spectra(
     scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     dft = prime_factor_dft(n_cycles) if cube.dtype == np.complex64 else None
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
+    # Cells share range bins. Each bin that occurs is transformed once.
     used, place = np.unique(steps, return_inverse=True)
     place = place.reshape(steps.shape)
     if dft is not None:

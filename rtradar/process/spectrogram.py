@@ -8,7 +8,7 @@ spectrum differ in phase by half a turn, so their signals cancel (over all bins,
 person who walks goes through bins. By Parseval's theorem the sum does not depend on where in a bin
 an echo lies.
 
-The transform is written out, on SciPy's FFT, for it has to run column by column on a stream;
+The transform is written out, on SciPy's FFT, because it runs column by column on a stream;
 `scipy.signal.ShortTimeFFT`, with which the tests compare it, gives the same columns.
 """
 
@@ -53,6 +53,8 @@ def window_cycles(radar: Radar, window_s: float | None = None) -> int:
     InputError
         Where a window would hold fewer than two cycles, or more than a frame before a gap.
     """
+    # The paper's window in cycles of TDM; where all Tx transmit at once cycles are shorter by their
+    # number.
     cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
     if radar.in_frames:
         cycles = min(cycles, radar.cycles_per_frame)
@@ -133,6 +135,7 @@ def spectrogram(
         Where the shape or type is wrong, a value is not finite, there are fewer cycles than one
         window takes, or ``tx``, ``window`` or ``overlap`` have no meaning.
     """
+    # All windows of the whole signal, none of which passes a removal of clutter.
     hop = _hop(radar, tx, window, overlap)
     values = np.asarray(signals)
     if values.ndim != 2 or values.shape[1] < 1 or values.dtype.kind not in "fc":
@@ -222,13 +225,15 @@ class SlidingSpectrogram:
         """
         radar = self._radar
         block = checked_chirps("SlidingSpectrogram: spectra", spectra, radar)
+        # Every n_tx-th chirp is of this Tx; where it comes first depends on how many chirps were
+        # before.
         new = block[(self._tx - self._chirps) % radar.n_tx :: radar.n_tx, self._rx]
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = _starts(self._start, len(cycles), self._window, self._hop, radar)
         power = _columns(cycles, starts, self._window, radar, *self._own)
         times = _times(self._start + starts, radar, self._tx, self._window)
-        # The hop is at most the window, so no more goes than is here.
+        # What no later window needs goes. The hop is at most the window, so it is all here.
         gone = len(starts) * self._hop
         if radar.in_frames:
             gone = max(0, len(cycles) - self._window + 1)

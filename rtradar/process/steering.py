@@ -78,6 +78,8 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
 
 
 def _line(radar: Radar, axis: int) -> Line | None:
+    # A channel is on the line if its Tx and its Rx are. Tx are numbered in the order in which they
+    # transmit, and lines by the fields.
     order = range(radar.n_tx) if radar.tx_order is None else radar.tx_order
     tx_there, rx_there = np.array(order) < radar.tx_y, np.arange(len(radar.rx)) < radar.rx_y
     if axis == 2:
@@ -95,6 +97,8 @@ def sine_grid(radar: Radar) -> NDArray[np.float64]:
 
     An `InputError` is raised where there is no line, or one so long that they would be too many.
     """
+    # A beam is about the inverse of the aperture wide in sines, and so fine that a parabola finds
+    # its peak between them.
     largest = np.sin(np.radians(radar.max_angle_deg))
     lines = [line for line in virtual_lines(radar) if line is not None]
     places = [line.tx_m + line.rx_m for line in lines] or list(radar.virtual_m[:, 1:].T)
@@ -115,6 +119,7 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
     """Weights of the elements (element,), sum 1, by their positions on the virtual line."""
     if taper == "uniform":
         return np.full(len(line.channels), 1 / len(line.channels))
+    # A Taylor window by the places of the virtual elements.
     places, count = line.tx_m + line.rx_m, len(line.channels)
     window = taylor(count, _TAYLOR_EQUAL_LOBES, SIDE_LOBE_DB)
     # A line without gaps gets the window itself.
@@ -126,6 +131,7 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
 def range_walk(radar: Radar) -> int:
     """Range bins on either side of a cell in which some elements receive its echo from the side."""
     lines = [line for line in virtual_lines(radar) if line is not None]
+    # Antennas anywhere: as far as both are from the origin together, whatever the direction.
     if not radar.is_cross:
         farthest = (
             np.linalg.norm(radar.tx_m, axis=1).max() + np.linalg.norm(radar.rx_m, axis=1).max()
@@ -150,6 +156,8 @@ def steering(
             f"angle: radar '{radar.name}' has no line of at least 2 channels along "
             f"{'xyz'[axis]}; give it one"
         )
+    # At each range the phases of all elements and sines, with the taper, and in which bin each is
+    # read.
     walk, sines, own = range_walk(radar), sine_grid(radar), taper_weights(line, taper)
     count = 1 if range_bins is None else len(range_bins)
     weights = np.empty((count, len(line.channels), len(sines)), dtype=np.complex64)
@@ -161,6 +169,8 @@ def steering(
             line.excess_m(sines, range_m), carrier, radar, 0 if range_m is None else walk
         )
         weights[place] = (phases * own).T
+        # Along the sines an element is read in the same bin for a while; the kernel goes from run
+        # to run.
         runs.append(_runs(offsets.T + walk))
     return Steering(weights, np.concatenate(runs), np.cumsum([0, *map(len, runs)]))
 
@@ -204,6 +214,7 @@ def _lines_are_alike(radar: Radar) -> bool:
 
 def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     """Runs of sines along which an element is read at the same offset (element, sine)."""
+    # A run begins with each element, and where its offset changes; it ends where the next begins.
     fresh = np.ones(offsets.shape, dtype=np.bool_)
     fresh[:, 1:] = np.diff(offsets, axis=1) != 0
     element, first = np.nonzero(fresh)
@@ -228,6 +239,7 @@ def cuts_through_highest(
     range bins; without them waves are plane. A sine that the array does not measure gives None, and
     is taken to be 0.
     """
+    # The grid over both sines, whose highest beam is looked for in each cell.
     limits = np.sin(np.radians([radar.max_azimuth_deg, radar.max_elevation_deg]))
     y, z = (_grid(radar, axis, limit) for axis, limit in enumerate(limits.tolist()))
     if len(y) * len(z) > _MOST_BEAMS:
@@ -239,6 +251,8 @@ def cuts_through_highest(
     at = _highest(cells, range_m, radar, (y, z), walk)
 
     def cut(axis: int) -> NDArray[np.float32]:
+        # One sine over the grid, the other as in the highest beam. Beyond the unambiguous angle
+        # nothing is shown.
         toward = np.repeat(at[:, None], len(sines), axis=1)
         toward[..., axis] = sines
         power = _powers(cells, toward, range_m, radar, walk)
@@ -267,6 +281,7 @@ def _highest(
     the grid apart and then a quarter of it. An array that is no rectangle has tilted beams, where
     what one sine shifts the other does, too.
     """
+    # All beams of the grid, for cells of one range together, because these share their phases.
     grid = np.stack([own.ravel() for own in np.meshgrid(*axes, indexing="ij")], axis=1)
     at = np.empty((len(cells), 2))
     at_once = max(1, _WEIGHTS_AT_ONCE // (thread_count() * len(grid) * radar.n_tx))
@@ -283,6 +298,7 @@ def _highest(
         at[some] = grid[_power(cells[some], grid[None], own, radar, walk).argmax(axis=1)]
 
     thread_map(find, range(len(pieces)))
+    # Twice refined by a paraboloid through nine beams about the highest.
     largest = np.array([own[-1] for own in axes])
     steps = np.array([np.ptp(own[:2]) for own in axes])
     nine = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(9, 2)
@@ -299,18 +315,23 @@ def _vertices(power: _Reals) -> _Reals:
     They stay in the middle along an axis beside which there is no power.
     """
     least = np.finfo(np.float32).tiny
+    # Logarithms of the power, along both axes and in the corners.
     height = np.log(np.maximum(power, least))
     middle = height[:, 1, 1, None]
     before = np.stack([height[:, 0, 1], height[:, 1, 0]], axis=1)
     after = np.stack([height[:, 2, 1], height[:, 1, 2]], axis=1)
     corners = height[:, ::2, ::2]
+    # Second derivative along each axis; where it is no maximum, or the power is 0 beside it, the
+    # vertex stays.
     bend = before - 2 * middle + after
     inside = (bend < 0) & (np.minimum(before, after) > math.log(least) + 1)
     bend = np.where(inside, bend, -1.0)
     slope = np.where(inside, (after - before) / 2, 0.0)
+    # The mixed derivative of tilted beams, used where the Hessian stays that of a maximum.
     twist = (corners[:, 0, 0] + corners[:, 1, 1] - corners[:, 0, 1] - corners[:, 1, 0]) / 4
     whole = inside.all(axis=1) & (corners.min(axis=(1, 2)) > math.log(least) + 1)
     twist = np.where(whole & (twist**2 < bend.prod(axis=1)), twist, 0.0)[:, None]
+    # One step of Newton's method: minus the inverse of the Hessian times the gradient.
     shift = (twist * slope[:, ::-1] - bend[:, ::-1] * slope) / (
         bend.prod(axis=1, keepdims=True) - twist**2
     )
@@ -342,9 +363,12 @@ def _power(
     together are no direction.
     """
     tx, which, rx, carrier, carrier_back = _phased(radar)
+    # The direction by its two sines; the third component is what is left, and imaginary where there
+    # is no direction.
     ahead = 1 - (sines**2).sum(axis=2)
     direction = np.concatenate([np.sqrt(np.maximum(ahead, 0))[..., None], sines], axis=2)
     away = None if range_m is None else range_m[:, None, None]
+    # The phasor of a channel is the product of one of its Tx and one of its receiver.
     there, back = (_excess_m(direction, places, away) for places in (radar.tx_m, rx))
     of_tx, of_rx = _phasors(there, carrier), _phasors(back, carrier_back)
     values = np.zeros((len(cells), radar.n_tx, len(rx)), np.complex64)
@@ -355,6 +379,7 @@ def _power(
     part = part.reshape(len(cells), radar.n_tx, -1)
     beams = (part * of_tx.swapaxes(1, 2)).sum(axis=1)
     farthest = np.abs(there).max(axis=2) + np.abs(back).max(axis=2)
+    # Where no element's path leaves the range bin, the product above is all there is to do.
     far = farthest.max(axis=0) > radar.range_bin_m
     if walk and range_m is not None and far.any():
         # Elements whose path ends in another range bin are read there. From one range bin to the
@@ -403,6 +428,7 @@ def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | float | Non
 
 def _phasors(excess_m: _Reals, carrier_hz: _Reals) -> NDArray[np.complex64]:
     """Phases (..., place) that bring places into step, each at its carrier."""
+    # Whole turns are taken out in float64 before the angle goes to float32.
     turns = excess_m * (carrier_hz / SPEED_OF_LIGHT_MPS)
     angle = (-2 * np.pi * (turns - np.rint(turns))).astype(np.float32)
     return np.asarray(np.cos(angle) + np.complex64(1j) * np.sin(angle))
@@ -423,6 +449,7 @@ def refine(
         np.log(np.maximum(np.take_along_axis(power, at, axis=1), least, dtype=np.float64))
         for at in around
     )
+    # The vertex of a parabola through three points a step apart.
     bend = left - 2 * middle + right
     inside = (bend < 0) & (index > 0) & (index < last)
     # Beside what is no direction, where power is 0, a peak stays where it is, too.

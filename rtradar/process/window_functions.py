@@ -67,7 +67,7 @@ def weights(window: WindowName, n: int) -> NDArray[np.float64]:
     if window == "hann":
         values = hann(n)
     else:
-        from scipy.signal import get_window  # here, for scipy.signal is slow to import
+        from scipy.signal import get_window  # here, because scipy.signal is slow to import
 
         values = np.asarray(get_window(window, n, fftbins=True), dtype=np.float64)
     values = values / values.sum()
@@ -87,6 +87,8 @@ def taylor(n: int, equal_lobes: int, side_lobe_db: float) -> NDArray[np.float64]
 
     It is the mean 1 plus cosines, so not of height 1; `scipy.signal` is slow to import.
     """
+    # The inner zeros are those of the ideal pattern, dilated so that they join the zeros of a
+    # uniform line; the coefficients of the cosines follow from them.
     a = np.arccosh(10 ** (side_lobe_db / 20)) / np.pi
     dilated = equal_lobes**2 / (a**2 + (equal_lobes - 0.5) ** 2)
     orders = np.arange(1, equal_lobes)
@@ -177,6 +179,8 @@ class RangeSideLobes:
 
     def add(self, power: NDArray[np.floating], mask: NDArray[np.bool_]) -> None:
         """Count the detections ``mask`` of a map ``power``, both (range, velocity)."""
+        # How far each detection is after the strongest cell of its velocity, around the axis, and
+        # what a side lobe would have there.
         rows, columns = np.nonzero(mask)
         n = len(self._falls)
         apart = (rows - power.argmax(axis=0)[columns]) % n
@@ -189,6 +193,8 @@ class RangeSideLobes:
         """Return where detections are; None where there are none but side lobes."""
         if not self._apart.any():
             return None
+        # The ranges between which all but a hundredth at either end lie; side lobes between them do
+        # not matter.
         passed = np.cumsum(self._apart) / self._apart.sum()
         first, last = (int(np.searchsorted(passed, part / 100)) for part in _CENTRAL_PERCENT)
         outside = self._lobes[:first].sum() + self._lobes[last + 1 :].sum()
@@ -203,6 +209,8 @@ def _envelope(window: WindowName, n: int) -> NDArray[np.float64]:
     It is 0 in the main lobe.
     """
     spectrum = np.abs(np.fft.fft(weights(window, n), _STEPS * n)) ** 2
+    # A tone may lie anywhere within half a bin of its strongest bin: the largest of these cases
+    # counts.
     away = _STEPS * np.arange(n)
     offsets = np.arange(-_STEPS // 2, _STEPS // 2 + 1)
     levels = spectrum[(away - offsets[:, None]) % (_STEPS * n)] / spectrum[offsets][:, None]

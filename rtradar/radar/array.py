@@ -81,6 +81,8 @@ class Array(Waveform):
         """Length of the rx axis: the number of receivers that are kept in one chirp."""
         if self.rx_positions_m is not None:
             return len(self.rx_positions_m)
+        # Under `pairs` both lines have as many Rx; a radar with one line of Tx has the Rx of that
+        # line.
         one_line = self.rx_y if self.tx_y else self.rx_z
         return one_line if self._pairs else self.rx_y + self.rx_z
 
@@ -129,6 +131,7 @@ class Array(Waveform):
         """Straight, evenly spaced lines of Tx, each as indices into `tx` from end to end."""
         if self.tx_positions_m is not None:
             return _runs(self.tx_m)
+        # Where in the order of transmission each Tx of the fields is.
         place = np.argsort(self._order)
         return [line for line in (place[: self.tx_y], place[self.tx_y :]) if len(line)]
 
@@ -145,6 +148,7 @@ class Array(Waveform):
     ) -> NDArray[np.float64]:
         if listed is not None:
             return np.array(listed, dtype=np.float64)
+        # The y-line first, then the z-line, both about the middle of the array.
         spacing_m = spacing_wavelengths * self.start_wavelength_m
         positions = np.zeros((n_y + n_z, 3))
         positions[:n_y, 1] = (np.arange(n_y) - (n_y - 1) / 2) * spacing_m
@@ -200,6 +204,7 @@ class Array(Waveform):
         rx : (time, rx, 3) float64
             Positions of the receivers, world, each as `rx` is [m].
         """
+        # A radar at rest has one place for all times, which is not copied.
         axes, positions = self.poses_at(times)
         if not self.is_moving:
             count = len(positions)
@@ -230,6 +235,8 @@ class Array(Waveform):
         positions, angles = np.empty((2, len(at), 3))
         positions[:] = self.position_m
         angles[:] = self.yaw_deg, self.pitch_deg, self.roll_deg
+        # The path is added to where the radar is and how it is turned. NumPy holds the ends before
+        # and after.
         for values, path in ((positions, self.path_m), (angles, self.path_angles_deg)):
             for axis, along in enumerate(() if path is None else zip(*path, strict=True)):
                 values[:, axis] += np.interp(at, self.path_times_s or (), along)
@@ -248,6 +255,7 @@ class Array(Waveform):
         """Indices into `rx` of the receivers kept while each Tx transmits, (tx, rx)."""
         if not self._pairs:
             return np.tile(np.arange(self.n_rx), (self.n_tx, 1))
+        # Rx are numbered along y first, so those of the z-line begin after them.
         first = np.repeat([0, self.rx_y], [self.tx_y, self.tx_z])[self._order]
         return np.asarray(first[:, None] + np.arange(self.n_rx))
 
@@ -256,18 +264,20 @@ class Array(Waveform):
     @cached_property
     def virtual_m(self) -> NDArray[np.float64]:
         """Virtual elements (channel, 3), Tx plus Rx of each channel in the radar's axes [m]."""
+        # Far away the path over a Tx and an Rx changes with direction as their places together do.
         return np.asarray((self.tx_m[:, None] + self.rx_m[self.rx_of_tx]).reshape(-1, 3))
 
     @cached_property
     def patterns(self) -> tuple[LinePattern, LinePattern]:
         """Far field of all virtual elements over the sines of azimuth and of elevation.
 
-        Each line of a cross is taken for one without gaps, whose angles are those of
-        (:eq:`angle-axis`), and both for the longer one.
+        Each line of a cross is taken for a line without gaps, so that its angles follow
+        (:eq:`angle-axis`), and both get the beam width of the longer one.
         """
         if not self.is_cross:
             y, z = (LinePattern.of(self.virtual_m[:, axis] / self.wavelength_m) for axis in (1, 2))
             return y, z
+        # Spacings belong to the start of the sweep, and phases to its centre.
         spacing = self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
         counts = self.tx_y * self.rx_y, self.tx_z * self.rx_z
         width = min(180.0, math.degrees(0.886 / (max(*counts, 1) * spacing)))
@@ -294,6 +304,7 @@ class Array(Waveform):
     @property
     def max_angle_deg(self) -> float:
         """Unambiguous angle, the larger of those of azimuth and elevation [deg]."""
+        # The limit of an axis that is not measured does not count.
         measured = [one.max_angle_deg for one in self.patterns if one.wide]
         return max(measured, default=self.max_azimuth_deg)
 
@@ -327,6 +338,7 @@ class Array(Waveform):
 def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:
     """Antennas (antenna, 3) that follow each other in even steps, and those that stand alone."""
     runs, begin = [], 0
+    # As many as follow each other by the first step; two steps at least make a line.
     while begin < len(places):
         end = begin + 1
         steps = np.diff(places[begin:], axis=0)
@@ -346,6 +358,7 @@ def _rotation(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
     (cy, cp, cr), (sy, sp, sr) = (
         np.moveaxis(part(np.radians(angles_deg)), -1, 0) for part in (np.cos, np.sin)
     )
+    # Columns of Rz(yaw) Ry(-pitch) Rx(roll), written out.
     boresight = [cp * cy, cp * sy, sp]
     left = [-cr * sy - sr * sp * cy, cr * cy - sr * sp * sy, sr * cp]
     up = [sr * sy - cr * sp * cy, -sr * cy - cr * sp * sy, cr * cp]
@@ -382,12 +395,15 @@ class LinePattern:
     @classmethod
     def of(cls, places: NDArray[np.float64]) -> LinePattern:
         """Pattern of elements at these places (element,) along the line, in wavelengths."""
+        # A beam at sine s shows an echo at another sine by the difference of both, from 0 to 2.
+        # Steps are a fraction of the finest ripple.
         aperture = float(np.ptp(places))
         if aperture < _LEAST:
             return cls(False, 2.0, -math.inf, 180.0)
         count = min(_MOST_POINTS, math.ceil(2 * _PER_WAVELENGTH * max(1.0, aperture)))
         sines = np.linspace(0.0, 2.0, count + 1)
         power = pattern(places, sines)
+        # The half-power width, by a line between the two points about it.
         half = np.flatnonzero(power < 0.5)
         width = 180.0
         if len(half):
@@ -401,10 +417,12 @@ class LinePattern:
             return cls(True, 2.0, -math.inf, width)
         beyond = power[rising[0] :]
         peaks = np.flatnonzero((beyond[1:-1] >= beyond[:-2]) & (beyond[1:-1] > beyond[2:])) + 1
+        # Lobes from -3 dB on count as grating lobes; the first of them limits the angle.
         high = peaks[beyond[peaks] > 10 ** (GRATING_DB / 10)]
         if not len(high):
             return cls(True, 2.0, -math.inf, width)
         first = rising[0] + high[0]
+        # Between the steps the lobe is where a parabola through three points has its vertex.
         left, middle, right = power[first - 1 : first + 2]
         shift = 0.5 * (left - right) / (left - 2 * middle + right)
         sine = sines[first] + shift * sines[1]
@@ -414,6 +432,7 @@ class LinePattern:
 
 def pattern(places: NDArray[np.float64], sines: NDArray[np.float64]) -> NDArray[np.float64]:
     """Power (sine,) of a beam of all elements (element,) [wavelengths], 1 at sine 0."""
+    # Virtual elements often coincide: each place is summed once.
     distinct, count = np.unique(np.round(places, 9), return_counts=True)
     field = np.zeros(len(sines), dtype=np.complex128)
     for place, number in zip(distinct - distinct[0], count, strict=True):

@@ -29,6 +29,7 @@ _ANGLES = ("azimuth", "elevation")
 
 def brief_rows(radar: Radar) -> dict[str, str]:
     """Return the rows of a radar's ``repr``."""
+    # The most important rows of the two tables of a card.
     settings, limits = settings_rows(radar), limit_rows(radar)
     rows = {label.lower(): settings[label] for label in ("Sweep", "Chirp", "Channels", "Frame")}
     rows["position"] = settings["Position"]
@@ -45,6 +46,7 @@ def brief_rows(radar: Radar) -> dict[str, str]:
 def settings_rows(radar: Radar) -> dict[str, str]:
     """Return what was set, as texts with units by their labels."""
     stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
+    # What is not set is not shown as 0.
     powers = []
     if radar.transmit_power_dbm is not None:
         powers.append(f"transmitted {radar.transmit_power_dbm:g} dBm")
@@ -77,6 +79,7 @@ def settings_rows(radar: Radar) -> dict[str, str]:
 def limit_rows(radar: Radar) -> dict[str, str]:
     """Return the limits that follow from the settings, as texts with units by their labels."""
     measured = [(name, one) for name, one in zip(_ANGLES, radar.patterns, strict=True) if one.wide]
+    # Angles with the same limit share one entry, as those of the paper's cross do.
     most: dict[str, list[str]] = {}
     for name, one in measured:
         most.setdefault(f"±{one.max_angle_deg:.3g}°", []).append(name)
@@ -154,6 +157,7 @@ def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
     if ax is not None:
         _draw_array(radar, ax, f"{radar.name}: array, seen from behind")
         return ax
+    # On a figure of one's own there is room for the limits as well.
     figure = figure_for(4.3)
     array, limits = figure.subplots(1, 2)
     write_heading(figure, f"Radar {radar.name}")
@@ -165,6 +169,7 @@ def plot_radar(radar: Radar, ax: Axes | None) -> Axes:
 def _draw_array(radar: Radar, axes: Axes, title: str) -> None:
     theme = theme_of(axes)
     tx, rx = (1e3 * places[:, 1:] for places in (radar.tx_m, radar.rx_m))
+    # Only receivers that are kept with some Tx are shown.
     kept = np.unique(radar.rx_of_tx)
     virtual = (tx[:, None] + rx[radar.rx_of_tx]).reshape(-1, 2)
     blue, orange = theme.cycle[:2]
@@ -191,6 +196,7 @@ def _draw_limits(radar: Radar, axes: Axes) -> None:
     from matplotlib.patches import Rectangle  # slow to import
 
     theme, rows = theme_of(axes), limit_rows(radar)
+    # A rectangle of all unambiguous velocities and ranges, with the figures in it.
     fastest, farthest = radar.max_velocity_mps, radar.max_range_m
     colour = theme.cycle[0]
     size: dict[str, Any] = {"width": 2 * fastest, "height": farthest}

@@ -155,11 +155,16 @@ class Radar(Schedule):
     receiver: Receiver | None = None
 
     def __post_init__(self) -> None:
+        # The number of chirps either is given or follows from the duration of a frame. One that
+        # follows is marked by its type, so that a copy with another duration finds its own.
         given: object = self.chirps_per_frame
         if given is None:
             object.__setattr__(self, "chirps_per_frame", FollowingCount(1))
         check_fields(self, f"radar {brief(self.name)}: ")
         check_rules(self)
+        # Fields that follow from others are written into the radar, for whoever reads them: chirps
+        # by the duration, the duration by chirps that were given, and the hop by the period of
+        # frames.
         following: dict[str, float] = {}
         whole = self.cycles_per_frame * self.n_tx
         if isinstance(self.chirps_per_frame, FollowingCount):
@@ -231,6 +236,7 @@ class Radar(Schedule):
         """
         if isinstance(source, Mapping):
             return cls._of_table(source, Path(), board)
+        # A TOML file, a file of TI's SDK, or else a name.
         table = radar_table(source)
         path = Path(source)
         if table is not None:
@@ -263,6 +269,7 @@ class Radar(Schedule):
                 if not counts & other and any(fields.get(key) for key in own):
                     fields |= dict.fromkeys(other, 0)
             return cls(**fields)
+        # The radar that these keys change: a preset, or a file beside this one.
         if base is None or base in RADARS:
             under = cls.load(base or board, board=board if base else None)
         else:
@@ -336,6 +343,8 @@ class Radar(Schedule):
         """
         power_dbm = self._stated("transmit_power_dbm", "powers in watts are not known")
         antennas = (self.tx_antenna, self.rx_antenna)
+        # Patterns are normalised to their peak, so the peak gains are constants of the radar
+        # equation.
         gains = math.prod(antenna.peak_gain for antenna in antennas if antenna is not None)
         power_w = 1e-3 * 10 ** (power_dbm / 10)
         return float(power_w * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
@@ -349,6 +358,7 @@ class Radar(Schedule):
         radar does not state its noise figure.
         """
         figure_db = self._stated("noise_figure_db", "its noise is not known")
+        # The noise that the receiver adds, as the temperature of a source that makes as much.
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (figure_db / 10) - 1)
         noise_k = self.noise_temperature_k + receiver_k
         return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
@@ -376,6 +386,7 @@ class Radar(Schedule):
         (angles,), (place,) = self.path_at([time_s])
         # It may have turned more than once.
         pose = dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), (angles % 360).tolist(), strict=True))
+        # Without its path the radar rests in this pose.
         still: dict[str, Any] = dict.fromkeys(("path_times_s", "path_m", "path_angles_deg"))
         return dataclasses.replace(self, position_m=tuple(place.tolist()), **pose, **still)
 
@@ -386,7 +397,7 @@ def _refusing_other_words(made: Callable[..., None]) -> Callable[..., None]:
     @wraps(made)
     def checked(self: Radar, **fields: Any) -> None:
         known = Radar.__dataclass_fields__
-        if not fields.keys() <= known.keys():  # quick, for a radar that moves is made for each pose
+        if not fields.keys() <= known.keys():  # quick: a moving radar is made for each pose
             check_keys("Radar: ", fields, (), tuple(known))
         made(self, **fields)
 

@@ -77,6 +77,8 @@ class Schedule(Array):
     @cached_property
     def tx_signs(self) -> NDArray[np.int64]:
         """Sign of each Tx in each chirp of a cycle under BPM, (chirp, tx) (:eq:`bpm`)."""
+        # A Hadamard matrix: the sign is that of the parity of the digits that both numbers have in
+        # common.
         numbers = range(self.n_tx)
         return np.array([[(-1) ** (chirp & tx).bit_count() for tx in numbers] for chirp in numbers])
 
@@ -85,6 +87,7 @@ class Schedule(Array):
         """Height of the sweep of each Tx above `start_frequency_hz`, (tx,) [Hz]; the mean is 0."""
         if self.multiplexing != "fdm":
             return np.zeros(self.n_tx)
+        # Bands as wide as the IF is sampled, about the sweep of the radar.
         step = self.sample_rate_hz if self.carrier_step_hz is None else self.carrier_step_hz
         return np.asarray((np.arange(self.n_tx) - (self.n_tx - 1) / 2) * step)
 
@@ -117,6 +120,7 @@ class Schedule(Array):
     @property
     def cycles_in_frame_duration(self) -> int:
         """Number of whole cycles that ``frame_duration_s`` holds."""
+        # A whole number of cycles but for rounding counts as that.
         cycles = math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
         return cycles - cycles % self.n_doppler_bands
 
@@ -161,6 +165,8 @@ class Schedule(Array):
         (velocity,) float64
             Velocity [m/s].
         """
+        # The order of a shifted DFT: zero is in the middle, and of an even number the first is the
+        # most negative.
         bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
         return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))
 
@@ -207,6 +213,8 @@ class Schedule(Array):
         (chirp,) float64
             Time since the start of the capture [s].
         """
+        # Chirps that are transmitted at once share a slot of time. The centre is that of the
+        # samples, which may begin late in the chirp and end early.
         frame_s, numbers = self._in_frame(np.asarray(chirps, dtype=np.int64))
         slots = numbers // self.n_tx if self.at_once else numbers
         middle = (self.adc_start_s + self.sampled_duration_s / 2) / self.chirp_period_s
@@ -279,6 +287,7 @@ class Schedule(Array):
         """
         if self.frame_period_s is None:
             return math.floor(duration_s / self.cycle_duration_s * (1 + 1e-12)) * self.n_tx
+        # With gaps the last frame counts if its chirps are over, whatever of its gap is left.
         active_s = self.cycles_per_frame * self.cycle_duration_s
         frames = math.floor((duration_s * (1 + 1e-12) - active_s) / self.frame_period_s) + 1
         return max(0, frames) * self.cycles_per_frame * self.n_tx
@@ -298,6 +307,7 @@ class Schedule(Array):
         """
         if self.frame_period_s is None:
             return n_chirps * self.chirp_interval_s
+        # Up to the end of the last chirp: the gap after the last frame does not count.
         frames, more = divmod(max(n_chirps - 1, 0), self.chirps_per_frame)
         return frames * self.frame_period_s + (more + 1) * self.chirp_interval_s
 
@@ -317,6 +327,8 @@ class Schedule(Array):
         (window,) int64
             Numbers of cycles; empty where the capture is shorter than one frame.
         """
+        # Multiples of the hop up to the last cycle at which a whole frame can begin; half a cycle
+        # beyond it may round down to it.
         last = n_chirps // self.n_tx - self.cycles_per_frame
         candidates = np.arange(max(0, math.floor((last + 0.5) / self.hop_cycles) + 1))
         starts = np.rint(candidates * self.hop_cycles).astype(np.int64)

@@ -62,6 +62,7 @@ class Waveform:
     @property
     def sampled_bandwidth_hz(self) -> float:
         """Part of the bandwidth that is swept while the IF is sampled [Hz]."""
+        # The whole sweep, without the rounding of a product.
         if self.adc_rate_hz is None and self.adc_start_s == 0:
             return self.bandwidth_hz
         return self.slope_hz_per_s * self.sampled_duration_s

@@ -73,6 +73,7 @@ class FieldUnit:
 
     def level(self, power_m2: ArrayLike) -> NDArray[np.float64]:
         """Convert powers [m^2] to levels in this unit [dB], about -380 dB for a power of 0."""
+        # 0 has no logarithm; the least float32 stands for it.
         linear = np.asarray(power_m2, dtype=np.float64) * self.scale
         return np.asarray(10 * np.log10(np.maximum(linear, np.finfo(np.float32).tiny)))
 
@@ -115,6 +116,7 @@ def add_colour_bar(image: Any, axes: Sequence[Axes], label: str, **options: Any)
 
     figure: Any = axes[0].get_figure(root=True)
     options = {"extend": "min" if isinstance(image, AxesImage) else "neither"} | options
+    # The label is fitted to the height of the axes, which the bar is as high as.
     bounds = [one.get_position(original=True) for one in axes]
     height = max(one.y1 for one in bounds) - min(one.y0 for one in bounds)
     height_pt = 72 * height * figure.get_size_inches()[1]
@@ -143,10 +145,11 @@ def angle_view(
     """Return the limits of angle and range that show what is detected, and ghosts.
 
     ``power`` (range, angle) is zero in ranges without a detection. Angles are fitted to where each
-    range is strongest, for sidelobes of the array fill all angles. ``ghosts`` are their angles and
-    ranges.
+    range is strongest, because sidelobes of the array fill all angles. ``ghosts`` are their angles
+    and ranges.
     """
     detected: NDArray[np.bool_] = np.asarray(power.any(axis=1))
+    # Within 6 dB of the strongest angle of each range with detections.
     near = detected[:, None] & (power > power.max(axis=1, keepdims=True) / 4)
     counts = near.sum(axis=0)
     wide = fitted_limits(
@@ -230,7 +233,7 @@ _MASKED = 0.1  # fraction of the strongest cells
 _FRACTION = 1e-3
 _FLOOR, _BELOW_PEAK = 4.0, 1e-5  # 6 dB above the median, 50 dB below the peak
 _MARGIN, _LEAST_BINS = 0.15, 8
-_ASTRAY = 5e-3  # fraction of spatial points whose angle is that of noise
+_ASTRAY = 5e-3  # fraction of spatial points whose angle noise has set
 _CENTRAL_PERCENT = 98
 
 
@@ -271,11 +274,13 @@ def fitted_limits(
     total = number.sum()
     if total == 0:
         return first, last
+    # From either end, bins are passed until more than what may lie outside is behind.
     outside = min(max(_FRACTION * total, handful), total / 20)
     passed = np.cumsum(number)
     begin = int(np.argmax(passed > outside))
     end = len(number) - 1 - int(np.argmax(np.cumsum(number[::-1]) > outside))
     shown = [float(centres[begin]) - step / 2, float(centres[end]) + step / 2]
+    # What must be shown widens the limits, if it is on the axis at all.
     shown += [float(value) for value in np.ravel(include) if first <= value <= last]
     low, high = min(shown), max(shown)
     margin = max(_MARGIN * (high - low), (_LEAST_BINS * step - (high - low)) / 2)
@@ -299,6 +304,7 @@ def place_limits(values: NDArray[np.float64], own: float) -> tuple[float, float]
     """
     if not len(values):
         return own - 1, own + 1
+    # Points have no bins: a fine histogram over all of them and the radar makes some.
     low, high = min(float(values.min()), own), max(float(values.max()), own)
     margin = 0.2 * (high - low) + 0.05
     edges = np.linspace(low - margin, high + margin, 601)
@@ -358,6 +364,7 @@ def masking_note(power: NDArray[np.floating], mask: NDArray[np.bool_]) -> str:
         Sentence, which is empty if nine in ten are detected.
     """
     count = int(np.count_nonzero(mask))
+    # A detector without masking would mark as many of the strongest cells as it detects.
     strongest = np.argsort(power, axis=None)[mask.size - count :]
     missed = int(np.count_nonzero(~mask.ravel()[strongest]))
     if missed <= _MASKED * count:

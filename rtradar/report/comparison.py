@@ -33,6 +33,7 @@ def draw_power_over_time(
     """Draw the echo power [m^2] of each model over time [s], and differences to the reference."""
     figure = new_figure(5.2)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    # Both axes begin the cycle of colours anew, so that a model has one colour in both.
     for axes in (above, below):
         axes.set_prop_cycle(color=LIGHT.cycle)
     for name, values in power.items():
@@ -64,6 +65,7 @@ def draw_part_power(
     for axes in (left, right):
         axes.set_prop_cycle(color=LIGHT.cycle)
     places, height = np.arange(len(parts)), 0.8 / len(power)
+    # Models have places beside each other at each part; a part that returns nothing has no point.
     for number, name in enumerate(power):
         seen = power[name] > 0
         level = unit.level(power[name])
@@ -95,8 +97,10 @@ def draw_maps(
         ends = np.array([one.limits for one in maps.values()])
         limits_of = np.stack([ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)], axis=1)
     else:
+        # All in the unit of the reference, so that colours mean the same.
         unit, limits_of = maps[reference].unit, np.array(maps[reference].limits)
         levels = {name: level + 10 * np.log10(unit.scale) for name, level in levels.items()}
+    # One panel for each, with common axes and one colour bar; what all have in common is said once.
     figure = new_figure(1.0 + 2.6 * len(maps))
     panels = figure.subplots(len(maps), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     limits = colour_limits(np.concatenate([np.ravel(level) for level in levels.values()]))
@@ -116,6 +120,7 @@ def draw_maps(
 def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title: str) -> None:
     """Draw RDT clouds (point, 3), time [s], range [m] and velocity [m/s], on the same axes."""
     figure = new_figure(0.6 + 3.6 * len(clouds))
+    # Common limits and colours, so that clouds can be compared by eye.
     every = np.concatenate(list(clouds.values()))
     largest = float(np.abs(every[:, 2]).max(initial=1e-9))
     for number, (name, points) in enumerate(clouds.items(), start=1):
@@ -146,6 +151,7 @@ def write_comparison(
     side by side with one slider.
     """
     values = {"summary": summary, "rows": rows, "pictures": pictures, "unit": unit}
+    # Folders that were compared: a table of the settings in which their runs differ.
     if views is None:
         folders = summary["folders"]
         differ = [
@@ -171,11 +177,15 @@ def comparison_data(views: Mapping[str, RunView]) -> dict[str, Any]:
     maps = {name: view.range_doppler for name, view in thinned.items()}
     low = max(levels.low_db for levels in maps.values())
     high = max(levels.high_db for levels in maps.values())
+    # A frame that holds what any of the models shows.
     boxes = np.array([view.shown_box() for view in thinned.values()])
+    # Levels below the highest floor count as that floor, because below it one of the models shows
+    # nothing.
     decibels = [np.maximum(one.low_db + one.step_db * one.level, low) for one in maps.values()]
     most = max(_spread(one, decibels[-1], low + 20) for one in decibels[:-1])
     snapshots = next(iter(thinned.values())).snapshots
     radar = next(iter(thinned.values())).radar
+    # The body moves alike in all models, and is sent once.
     parts = snapshots.part_names.tolist()
     return {
         "figure": posed_figure(parts, snapshots.times, snapshots.poses, radar, alone=True),

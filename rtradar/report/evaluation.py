@@ -68,6 +68,8 @@ def write_evaluation(
     named = list(zip(titles, studies, strict=True))
     groups: list[Group] = [(title, study.outcomes) for title, study in named]
     groups += baselines.items()
+    # A table of accuracies over all, then of each study what it confuses, how it learnt, and how it
+    # transfers.
     blocks = [scores.accuracy_table(_rows(studies, titles, baselines))]
     for number, (title, study) in enumerate(named, start=1):
         counts = scores.confusion(study.outcomes, len(classes))
@@ -81,6 +83,7 @@ def write_evaluation(
             transfer = scores.transfer(study.outcomes)
             blocks.append(scores.transfer_table(*transfer))
             draw_transfer(out / f"transfer-{number}.png", *transfer, title)
+    # Scores by person need the answers themselves, which only some trainings have kept.
     if judged := [(title, found) for title, each in groups if (found := together(each))]:
         blocks.append(score_table(judged))
     rows = [(title, _accuracies(outcomes)) for title, outcomes in groups]
@@ -91,6 +94,7 @@ def write_evaluation(
         "groups": [_numbers(title, outcomes, len(classes)) for title, outcomes in groups],
         "plans": [study.plan for study in studies],
     }
+    # Everything as files; the JSON file is the last, because it lists the others.
     (out / "table.txt").write_text(text + "\n", encoding="utf-8")
     _write_csv(out, groups)
     content["files"] = EVALUATION_FILES.list_of(out)
@@ -228,6 +232,7 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> 
     axes = figure.subplots()
     percent = [100 * np.asarray(fractions) for _, fractions in rows]
     axes.boxplot(percent, widths=0.5, showfliers=False, medianprops={"color": LIGHT.cycle[1]})
+    # Every training is a dot, spread sideways so that equal ones do not cover each other.
     for place, values in enumerate(percent, start=1):
         offsets = np.linspace(-0.12, 0.12, len(values)) if len(values) > 1 else np.zeros(1)
         axes.plot(place + offsets, values, ".", color=LIGHT.cycle[0], alpha=0.6)
@@ -280,6 +285,7 @@ def draw_learning(path: Path, histories: Sequence[Sequence[dict[str, float]]], t
         (right, "accuracy", "Accuracy [%]", 100),
     ):
         for side, colour in zip(("train", "test"), LIGHT.cycle, strict=False):
+            # Curves are cut to the shortest training, over which a mean is known.
             curves = [[factor * row[f"{side}_{name}"] for row in history] for history in histories]
             epochs = np.arange(1, min(map(len, curves)) + 1)
             curves = [curve[: len(epochs)] for curve in curves]
@@ -308,6 +314,7 @@ def _draw_matrix(
     image = axes.imshow(percent, cmap="Blues", vmin=0, vmax=100)
     for row, line in enumerate(cells):
         for column, text in enumerate(line):
+            # Dark cells have white text.
             tint = "white" if percent[row, column] > 55 else "black"
             axes.text(
                 column, row, text, ha="center", va="center", color=tint, fontsize=STYLE["font.size"]

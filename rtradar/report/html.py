@@ -60,6 +60,7 @@ def write_page(
     """
     given: dict[str, Any] = {"style": _asset("page.css"), "code": "", "digests": []}
     if scripts:
+        # The policy of the page runs scripts of these digests alone: the library and its own code.
         given["plotly"], digest = _plotly()
         given["code"] = f'(() => {{\n"use strict";\n{"".join(map(_asset, scripts))}}})();\n'
         own = _text_of(hashlib.sha256(given["code"].encode()))
@@ -192,6 +193,7 @@ def quantity(name: str, value: object) -> tuple[str, str]:
     """
     words = name.split("_")
     units = _words()["units"]
+    # A suffix such as `_hz` is the unit, and is no word of the label.
     unit = units.get(words[-1], "") if len(words) > 1 else ""
     if unit:
         words = words[:-1]

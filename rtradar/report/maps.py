@@ -132,6 +132,7 @@ class ShownMap:
         """Return what is in view as plain values for JSON."""
         up, across = self._inside()
         level = self.level_db[np.ix_(up, across)]
+        # A page needs no more cells than a screen has pixels.
         together = [math.ceil(count / _MOST_CELLS) for count in level.shape]
         shown = strongest(level, *together)
         low, high = self.limits_db
@@ -176,10 +177,12 @@ def range_doppler_map(
     those of the ``mask``, and all ghosts. Others are fields of `ShownMap`.
     """
     velocity, distance = radar.velocity_mps(mask.shape[1]), radar.range_m
+    # Detections as points, and limits that show them, the ghosts, and velocity 0.
     rows, columns = np.nonzero(mask)
     places = np.column_stack([velocity[columns], distance[rows]])
     found = mask if counts is None else counts
     across, ahead = np.concatenate([np.empty((0, 2)), *(one.xy for one in ghosts)]).T
+    # The power is a sum over the channels, and the map shows their mean.
     fields: dict[str, Any] = {
         "labels": (VELOCITY_LABEL, "Range [m]"),
         "level_db": unit.level(power / radar.n_channels),
@@ -253,6 +256,7 @@ class Levels:
     ) -> Levels:
         """Quantise so many maps of rows and columns, ``shape``, between these limits [dB]."""
         low, high = limits_db
+        # Values beyond the limits take the outermost levels.
         step = (high - low) / MOST_LEVEL
         level = np.empty(shape, np.uint8)
         for one, quantised in zip(maps_db, level, strict=True):
@@ -295,6 +299,7 @@ def strongest(values: NDArray[np.floating], rows: int, columns: int) -> NDArray[
 
 def spaced(values: NDArray[np.float64], together: int = 1) -> tuple[float, float]:
     """Return the first of evenly spaced centres and their step, of so many bins taken together."""
+    # The centre of bins that are taken together is half-way between the first and the last.
     width = float(values[1] - values[0]) if len(values) > 1 else 1.0
     return float(values[0]) + width * (together - 1) / 2, width * together
 

@@ -110,6 +110,7 @@ class Plots:
             left, right = ax, None
         image = shown.draw(left)
         axes = [left]
+        # Detections have a panel of their own, because they would cover the map.
         if right is not None:
             style: dict[str, Any] = {"s": 3, "color": theme_of(right).detection, "linewidths": 0}
             right.scatter(*shown.over[0].xy.T, **style)
@@ -213,6 +214,7 @@ class Plots:
         axes: Any = self._axes(ax, 4.7, projection="3d")
         points = self.points
         (low, high), (slow, fast) = self._range_limits, self._velocity_limits
+        # Points beyond the limits would be drawn outside of the axes in 3D.
         shown = (points[:, 1] >= low) & (points[:, 1] <= high)
         shown &= (points[:, 2] >= slow) & (points[:, 2] <= fast)
         dots = rdt_points(axes, points[shown], fastest=max(abs(slow), abs(fast)), s=4)
@@ -249,6 +251,7 @@ class Plots:
         _, ax = axes_given(None, ax)
         ups = [1 if name == "azimuth" else 2 for name in self._measured("spatial")]
         cloud = self._strongest
+        # Large clouds are thinned for drawing.
         every = math.ceil(max(len(cloud.points), 1) / _DOTS)
         points, velocity = cloud.points[::every], cloud.velocity[::every]
         slow, fast = self._velocity_limits
@@ -259,6 +262,7 @@ class Plots:
         if len(points) < len(self.spatial_cloud.points):
             part = f"one in {every} of those" if every > 1 else "those"
             heading += f" ({len(points)} drawn: {part} at most 40 dB below the strongest)"
+        # The same limits along x in both views, and equal scales.
         place = self.radar.position_m
         limits = [place_limits(points[:, axis], place[axis]) for axis in range(3)]
         width = limits[0][1] - limits[0][0]
@@ -282,6 +286,7 @@ class Plots:
             figure = self.new_figure(min(high, 10.0) + 1.9)
             figure.set_layout_engine("compressed")  # for the colour bar
             panels = list(figure.subplots(**options).flat)
+        # Points and the radar, in one view after the other.
         for axes, up in zip(panels, ups, strict=True):
             dots = axes.scatter(points[:, 0], points[:, up], s=2.5, linewidths=0, **colours)
             own: dict[str, Any] = {"color": theme_of(axes).radar, "label": "radar"}
@@ -294,6 +299,7 @@ class Plots:
         panels[0].legend(loc="best")
         for axes in panels[1:]:
             dress(axes)
+        # The title may be as wide as all panels that stand beside the first.
         lowest = [axes.get_position(original=True).y0 for axes in panels]
         beside = len(panels) if lowest[0] == lowest[-1] else 1
         title = self._title(heading, how_made(self.maps["range_doppler"]))
@@ -390,6 +396,7 @@ class Plots:
         window = self._parameters.get("range_window", "hann")
         power, times = spectrogram_power(self.maps, self.radar, window)
         unit = self._unit(strongest_m2=float(power.max()))
+        # Limits by what stands out of the floor, and by what was detected on maps.
         fitted = fitted_limits(above_floor(power).sum(axis=0), velocity, include=0.0)
         seen = self._velocity_limits if self._found.by_velocity.any() else fitted
         return ShownMap(
@@ -517,6 +524,7 @@ class Plots:
     @cached_property
     def _range_limits(self) -> tuple[float, float]:
         counts = self._found.by_range
+        # Without any detection, what stands out of the floor of the map over time.
         if not counts.any():
             times = self._axis("slow_time")
             counts = above_floor(thinned(self.maps["range_time"], times)[0]).sum(axis=0)

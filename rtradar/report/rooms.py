@@ -105,6 +105,7 @@ def draw_room_plan(path: Path, room: ShownRoom, title: str) -> None:
     for number, corners in paths.items():
         seen.setdefault(np.round(corners[:, :2], 2)[[1, -2]].tobytes(), []).append(number)
     labels = []
+    # One line and one label for all ghosts that look alike, on its longest leg.
     for turn, numbers in enumerate(seen.values()):
         corners, colour = paths[numbers[0]][:, :2], theme.cycle[turn % len(theme.cycle)]
         axes.plot(*corners.T, color=colour, linewidth=1.2)
@@ -118,6 +119,7 @@ def draw_room_plan(path: Path, room: ShownRoom, title: str) -> None:
         axes.plot(*track.T, color=theme.person, linewidth=2.5)
         x, y = track[len(track) // 2].tolist()
         labels.append(Label(name, around((x, y), 12.0), theme.person))
+    # Labels keep off the tracks of people, of which some points stand for all.
     square = np.array([[-0.03], [0.03]])
     every = len(walked) // (20 * max(1, len(room.tracks))) + 1
     avoided = [point + square for point in walked[::every]]
@@ -137,6 +139,7 @@ def before_after(
     ``maps`` are, by what was done with them, power summed over all channels [m^2] and detections,
     (range, velocity); ``ghosts`` are marked over velocity [m/s]. All have the colours of the first.
     """
+    # Limits and colours are common, so that what was removed can be seen.
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     counts = np.sum([mask for _, mask in maps.values()], axis=0)
     shown: list[ShownMap] = []
@@ -163,6 +166,8 @@ def azimuth_and_walls(
     ``window_functions`` are those of the transforms that gave the power.
     """
     power, azimuth = found
+    # Walls and furniture from the place of the radar, in polar coordinates, in which straight lines
+    # bend.
     place = np.asarray(radar.position_m)[:2]
     yaw = np.radians(radar.yaw_deg)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
@@ -187,6 +192,7 @@ def draw_room_maps(
 ) -> None:
     """Draw maps one above another with what lies over them; ``key`` names the walls of ghosts."""
     figure = new_figure(1.2 + 4.4 * len(shown))
+    # What lies over a map is drawn first; names find their places when everything else is there.
     for axes, one in zip(figure.subplots(len(shown), squeeze=False).flat, shown, strict=True):
         image = one.draw(axes)
         labels = [label for line in one.over for label in _overlaid(axes, line)]
@@ -214,6 +220,7 @@ def _overlaid(axes: Axes, over: Overlay) -> list[Label]:
     # Maps are dark on every page.
     style = {"color": getattr(DARK, over.kind), "linestyle": "--" if over.kind == "wall" else "-"}
     axes.plot(x, y, linewidth=1.2, **style)
+    # A name stands at some point of the line that is in view.
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     points = over.xy[(x > left) & (x < right) & (y > low) & (y < high)]
     if not len(points):
@@ -229,6 +236,7 @@ def _outline(piece: Furniture) -> NDArray[np.float64]:
         corners = points[ConvexHull(points).vertices]
     except QhullError:  # an upright plate is a line
         corners = points[np.lexsort(points.T)][[0, -1]]
+    # Sides with many points, because they bend on a map over angle and range.
     steps = np.linspace(0, 1, 20)[:, None]
     sides = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     return np.concatenate([first + steps * (last - first) for first, last in sides])

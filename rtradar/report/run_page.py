@@ -56,6 +56,7 @@ def write_report(
         If the points of the cloud are not finite.
     """
     radar, summary, points = plots.radar, plots.summary, plots.points
+    # Data of the script: both clouds, and all maps.
     parameters = dict(summary.get("parameters", {}))
     data: dict[str, Any] = {"rdt": rdt_data(points)}
     data["spatial"] = spatial_data(plots.spatial_cloud, radar)
@@ -67,10 +68,12 @@ def write_report(
     data["maps"] = [*shown_maps, *of_room]
     values |= {"maps": shown_maps, "room_maps": of_room}
     scripts = ["plots.js"]
+    # With a moving body the page has the script of the linked views.
     if run_view is not None:
         data |= view_data(run_view) | {"name": Path(path).stem}
         scripts += ["figure.js", "linked.js"]
         values |= linked_views(run_view)
+    # Sections in their order, each where there is something to show.
     shown = {
         "figure": ("The moving body, its echoes and its maps", run_view),
         "rdt": ("Range-Doppler-time cloud", run_view is None),
@@ -81,6 +84,7 @@ def write_report(
         "parameters": ("Radar and settings", True),
         "cost": ("Cost", values["costs"] or values["stages"] or values["versions"]),
     }
+    # What the head of the page says.
     fidelity, scene = (str(summary.get("fidelity", "")), str(parameters.get("scene", "")))
     told = (f"radar {radar.name}", fidelity and f"fidelity {fidelity}", scene)
     values |= {
@@ -138,10 +142,12 @@ def _room(room: Mapping[str, Any] | None, radar: Radar) -> dict[str, Any]:
     """Return what the page tells about a room."""
     if not room:
         return {"room": None}
+    # The strongest ghosts first, with their levels.
     ghosts = sorted(room.get("ghosts", {}).get("paths", ()), key=lambda one: -one["power_m2"])
     unit = field_unit(radar, range_m=np.array([ghost["range_m"] for ghost in ghosts]))
     levels = unit.level([ghost["power_m2"] for ghost in ghosts])
     clutter = room.get("clutter", {})
+    # Paths, pieces and faces that were left out, each with the reason.
     left_out: list[tuple[Any, ...]] = []
     for path in room.get("paths", ()):
         if lacking := len(path["dropped"]):

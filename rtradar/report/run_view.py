@@ -148,6 +148,8 @@ class RunView:
             (first, step), count = axis, levels.level.shape[column]
             least, most = first - step / 2, first + step * (count - 0.5)
             points = self.rdt_points[:, column]
+            # Echoes and points that are on the axis set the limits; without any, the whole axis is
+            # shown.
             if len(points):
                 points = central_limits(points)
             inside = np.concatenate([values[self.seen], points])
@@ -168,6 +170,8 @@ class RunView:
     def rdt_group(self) -> NDArray[np.int64]:
         """Return the group of body parts of each point (point,), that of the nearest echo."""
         snapshots, radar = self.snapshots, self.radar
+        # The echo nearest to a point, in bins, among those that are seen in the snapshot nearest in
+        # time.
         steps = np.abs(self.rdt_points[:, :1] - snapshots.times).argmin(axis=1)
         groups = np.array(group_of_parts(snapshots.part_names.tolist()))[snapshots.echo_part]
         seen, velocity = self.seen, self.shown_velocity()
@@ -187,8 +191,8 @@ class RunView:
 def linked_views(run_view: RunView, colour: str | None = None, layout: str = "") -> dict[str, Any]:
     """Return the values of the template ``linked.html``, the linked views with their controls.
 
-    Colours show ``colour``, one of `COLOURS`, until the reader chooses another, by default that of
-    the view; ``layout`` is another class of the element for the page's style sheet.
+    Colours show ``colour``, one of `COLOURS`, until the reader chooses another; by default the view
+    has one. ``layout`` is another class of the element for the page's style sheet.
     """
     return {
         "view": run_view,
@@ -224,10 +228,13 @@ def write_view(
 def view_data(run_view: RunView) -> dict[str, Any]:
     """Return the data of the page's script as plain values for JSON."""
     snapshots, radar = run_view.snapshots, run_view.radar
+    # The body, whose parts are drawn unless a mesh stands for them, with room for everything around
+    # it.
     figure = posed_figure(snapshots.part_names.tolist(), snapshots.times, snapshots.poses, radar)
     figure["drawn"] = snapshots.drawn_parts.tolist()
     moments = snapshots.times if radar.is_moving else np.zeros(1)
     figure["ranges"] = _with_room(figure["ranges"], snapshots)
+    # Colours of the points that are left after thinning.
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
     points = {
@@ -296,6 +303,7 @@ def _with_room(ranges: list[list[float]], snapshots: Snapshots) -> list[list[flo
     steps = range(0, len(snapshots.times), max(len(snapshots.times) // _LOOKED_AT, 1))
     moving = np.concatenate([snapshots.mesh_vertices(step) for step in steps])
     places = np.concatenate([walls, furniture, moving, np.array(ranges).T])
+    # A floor a little below 0 is still the floor z = 0.
     low = np.floor(2 * places.min(axis=0) - 1e-6) / 2
     high = np.ceil(2 * places.max(axis=0) + 1e-6) / 2
     low[2] = 0.0 if low[2] > -0.6 else low[2]

@@ -200,7 +200,7 @@ def save_snapshots(path: str | Path, snapshots: Snapshots) -> None:
 def load_snapshots(path: str | Path) -> Snapshots:
     """Read snapshots; InputError if the file is missing, damaged or of another kind.
 
-    Files of version 0.1 have one person, whose place is then that of the lower torso.
+    Files of version 0.1 have one person, whose place is taken from the lower torso.
     """
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)
@@ -235,6 +235,7 @@ _LATER = {
 def _of_one_person(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Return what files of the first format lack: one person, at the lower torso, and no meshes."""
     times, parts = arrays["times"], arrays["part_names"].tolist()
+    # Of what such a file has, the centre of the lower torso is nearest to the root.
     place = arrays["poses"][:, parts.index("lower torso"), 0].astype(np.float64)
     moved = np.gradient(place, times, axis=0) if len(times) > 1 else np.zeros_like(place)
     found = {

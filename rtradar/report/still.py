@@ -38,6 +38,7 @@ def draw_still(
     ``colour`` is the quantity that colours show, one of `COLOURS`, by default that of the view.
     InputError if the PNG file cannot be written.
     """
+    # The four views: 3D ones in the left column, maps in the right one.
     figure = new_figure(8.2, width_in=13)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
     time = f"{run_view.snapshots.times[step]:.2f} s"
@@ -88,6 +89,7 @@ def _tints(run_view: RunView, colour: str, step: int) -> _Tints:
         table = to_rgba_array([tint for _, tint in names])  # the last is that of nobody
         parts = table[of_part]
         return _Tints(parts[snapshots.echo_part], parts, table[of_point], sources, names)
+    # A scale of colours: by the power of an echo, or by its range rate.
     if colour == "power":
         label, limits = run_view.power_unit.label("of an echo"), run_view.power_range_db
         values, cloud = run_view.power_db[step], run_view.rdt_power_db
@@ -125,12 +127,14 @@ def _draw_body(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     radar = run_view.radar.at(float(snapshots.times[step]))
     vertices, faces = drawn_sphere()
     poses = snapshots.poses[step].astype(np.float64)
+    # Each part is a sphere, stretched along its semi-axes.
     for part in np.flatnonzero(snapshots.drawn_parts):
         centre, *semi_axes = poses[part]
         corners = (centre + vertices @ np.array(semi_axes))[faces]
         style = {"facecolors": tints.parts[part, :3], "shade": True, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(corners, **style))
     moving, of_face = snapshots.mesh_vertices(step), snapshots.mesh_faces[:, 0]
+    # Meshes have the colours of the parts of people, or of the object.
     if len(of_face):
         own = snapshots.mesh_part[of_face]
         source = snapshots.mesh_source[snapshots.mesh_of_vertex[of_face]]
@@ -138,6 +142,7 @@ def _draw_body(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
         rgba[own >= 0] = tints.parts[own[own >= 0]]
         style = {"facecolors": rgba[:, :3], "shade": True, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(moving[snapshots.mesh_faces], **style))
+    # The room: outlines of walls, and furniture that can be seen through.
     outlines = [np.concatenate([corners, corners[:1]]) for corners in snapshots.walls]
     if outlines:
         axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
@@ -145,6 +150,7 @@ def _draw_body(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
         triangles = snapshots.furniture_vertices[snapshots.furniture_faces].astype(np.float64)
         style = {"facecolors": "#b08d57", "alpha": 0.18, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(triangles, **style))
+    # Paths from the radar over all points of reflection and back, direct ones stronger.
     place = np.array(radar.position_m)
     for echo in np.flatnonzero(run_view.seen[step]):
         corners = snapshots.corners[step, echo].astype(np.float64)
@@ -155,6 +161,7 @@ def _draw_body(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
             axes.plot(*line.T, color=tints.echoes[echo], linewidth=width, alpha=alpha)
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
+    # The box holds the body at all times and everything around it, in equal scales.
     centres, walls = snapshots.poses[:, :, 0].reshape(-1, 3), snapshots.walls.reshape(-1, 3)
     furniture = snapshots.furniture_vertices
     everything = np.concatenate([centres, walls, furniture, moving, radar.tx, radar.rx])
@@ -174,6 +181,7 @@ def _draw_map(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     snapshots = run_view.snapshots
     image = draw_levels(axes, *run_view.range_doppler.drawn(step), cmap="Greys")
     velocity = run_view.shown_velocity()[step]
+    # Direct echoes are drawn last, over the ghosts.
     for direct in (False, True):
         own = np.flatnonzero(run_view.seen[step] & (snapshots.direct == direct))
         style: dict[str, Any] = {"marker": "D", "s": 14, "facecolors": "none"}
@@ -195,6 +203,7 @@ def _draw_cloud(axes: Any, run_view: RunView, step: int, tints: _Tints) -> None:
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
         return
+    # Points of the frame now are larger, in a frame of their own.
     own = np.abs(points[:, 0] - time) <= run_view.radar.frame_duration_s / 2
     axes.scatter(*points[~own].T, c=tints.cloud[~own], s=1.5, alpha=0.35, depthshade=False)
     axes.scatter(*points[own].T, c=tints.cloud[own], s=12, depthshade=False)

@@ -35,6 +35,7 @@ def drawn_sphere() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         indexing="ij",
     )
     places = np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)
+    # Two triangles for each field of the grid, but one where a pole is a corner of both.
     at = np.arange(polar.size).reshape(polar.shape)
     east = np.roll(at, -1, axis=1)
     lower = np.stack([at[:-1], at[1:], east[1:]], axis=-1)[:-1]  # none at the south pole
@@ -71,6 +72,7 @@ def posed_figure(
     # semi-axes' components.
     extent = np.sqrt((axes**2).sum(axis=2))
     places = [(centres - extent).reshape(-1, 3), (centres + extent).reshape(-1, 3)]
+    # A radar at rest is sent once.
     radars = [radar.at(time) for time in times.tolist()] if radar.is_moving else [radar]
     tx, rx = np.array([own.tx for own in radars]), np.array([own.rx for own in radars])
     antennas = np.concatenate([tx, rx], axis=1).reshape(-1, 3)

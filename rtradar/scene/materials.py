@@ -57,6 +57,7 @@ class PowerLaw:
 
     def eta(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
+        # Lossy conduction is the imaginary part, sigma over omega eps_0.
         ghz = frequency_hz / 1e9
         conductivity = self.c * ghz**self.d
         loss = conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
@@ -168,6 +169,7 @@ class Material:
         if (outside := frequency[~self.holds(frequency)]).size:
             self._refuse(float(outside[0]))
         eta = np.empty(frequency.shape, dtype=np.complex128)
+        # The first band that holds a frequency counts, so it is written last.
         for band in reversed(self.bands):
             inside = _inside(band, frequency)
             eta[inside] = band.eta(frequency[inside])

@@ -91,6 +91,7 @@ class Triangles:
         -------
         (...) bool
         """
+        # Only points inside of the box of the mesh are looked at closely.
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = np.asarray(self.closed & ((points >= low) & (points <= high)).all(axis=-1))
         corners = self.corners
@@ -140,6 +141,7 @@ def read_mesh(path: Path) -> Triangles:
 
 @lru_cache(maxsize=32)
 def _read(path: Path, changed_ns: int, size: int) -> Triangles:
+    # Kept by the time and the size of the file, so that a file that changes is read anew.
     where, ending = f"mesh '{path}'", path.suffix.lower()
     try:
         content = _in_ascii(read_bytes(path, MOST_BYTES), ending)
@@ -168,6 +170,7 @@ def _check_ply_header(where: str, content: bytes) -> None:
 def _check_glb_header(where: str, content: bytes) -> None:
     """Refuse a glb file that promises more numbers than `MOST_FACES` faces could need."""
     broken = f"{where} is broken or is no glb file"
+    # A glb begins with a header of 12 bytes, and the length and the kind of its JSON.
     length = struct.unpack("<I", content[12:16])[0] if len(content) >= 20 else 0
     if not 0 < length <= _MOST_GLB_HEADER:
         raise InputError(
@@ -265,6 +268,7 @@ def checked_triangles(where: str, vertices: NDArray[Any], faces: NDArray[Any]) -
             f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, "
             "counted from 0"
         )
+    # Equal vertices are one, and -0 is 0; triangles without an area have no normal.
     places, which = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = which.reshape(-1)[faces]
     a, b, c = (places[faces[:, k]] for k in range(3))
@@ -273,6 +277,7 @@ def checked_triangles(where: str, vertices: NDArray[Any], faces: NDArray[Any]) -
         raise InputError(f"{where} has no triangle with an area; give a surface")
     if len(faces) > MOST_FACES:
         raise InputError(f"{where} has {len(faces)} triangles; {MOST_FACES} are allowed")
+    # Closed is a mesh in which each edge has two triangles; these must agree which side is outside.
     mesh = trimesh.Trimesh(places, faces, process=False)
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
@@ -282,6 +287,7 @@ def checked_triangles(where: str, vertices: NDArray[Any], faces: NDArray[Any]) -
         )
     if closed:
         faces = _outward(where, mesh)
+    # Vertices that no triangle is left with go.
     used, faces = np.unique(faces, return_inverse=True)
     places = np.ascontiguousarray(places[used])
     faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64)
@@ -296,11 +302,13 @@ def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
 
     faces, corners = np.array(mesh.faces), np.asarray(mesh.triangles - mesh.vertices.mean(axis=0))
     label: Any = graph.connected_component_labels  # has no types
+    # Each connected part by itself: its signed volume is negative where it is wound inward.
     part = label(mesh.face_adjacency, node_count=len(faces))
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     volume = np.bincount(part, volumes)
     if volume.sum() < 0:
         faces, corners, volume = faces[:, ::-1], corners[:, ::-1], -volume
+    # A part that is wound inward and lies in another is a cavity, and stays.
     inward = np.flatnonzero(volume < 0)
     if len(inward) > _MOST_INWARD:
         raise InputError(

@@ -119,6 +119,7 @@ class Turning(_AboutAxis):
     rate_hz: _Rate = 1.0
 
     def _angle_rad(self, times: Array) -> Array:
+        # Whole turns are taken out, so that the angle is precise however long it turns.
         turns = self.rate_hz * times + self.phase_deg / 360
         return np.asarray(2 * np.pi * (turns - np.rint(turns)))
 
@@ -181,6 +182,7 @@ class FollowingPath(RigidMotion):
     def __post_init__(self) -> None:
         where = "motion FollowingPath: "
         check_fields(self, where)
+        # A velocity, or points with times, but not both.
         given = [own is not None for own in (self.velocity_mps, self.points_m, self.times_s)]
         if given not in ([True, False, False], [False, True, True]):
             raise InputError(f"{where}give velocity_mps, or points_m with times_s")
@@ -220,6 +222,7 @@ def motion_of(table: object) -> RigidMotion:
         raise InputError(
             f"motion = {brief(table)}; it must be a table with kind = {' or '.join(_KINDS)}"
         )
+    # Unknown keys are refused in one line, before the constructor would.
     motion, needed = _KINDS[table["kind"]]
     check_keys("motion: ", table, ("kind", *needed), keys_of(motion)[1])
     return motion(**{key: value for key, value in table.items() if key != "kind"})
@@ -307,6 +310,7 @@ class Object(Furniture):
         place : (time, 3) float64
             Place of the pivot, world [m].
         """
+        # The yaw turns the object with the axis of its motion.
         at = np.atleast_1d(np.asarray(times, dtype=np.float64))
         rotation, shift = (self.motion or RigidMotion()).pose(at)
         return self.axes @ rotation, np.array(self.position_m) + shift

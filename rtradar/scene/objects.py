@@ -141,6 +141,7 @@ class Wall(Surface):
                     f"metres; it must lie in the wall of {width:g} by {height:g} m, and measure "
                     f"{_SHORTEST_M} m or more"
                 )
+            # Two rectangles overlap if they do along both edges.
             for a, b, c, d in self.openings[:number]:
                 if u < a + c and a < u + wide and v < b + d and b < v + high:
                     raise InputError(
@@ -184,6 +185,7 @@ class Wall(Surface):
             Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle and in an
             opening.
         """
+        # Beside the rectangle and in an opening there is no slab.
         away, across = self._across(points)
         inside = ((across >= 0) & (across <= 1)).all(axis=-1) & ~self.in_opening(points)
         return np.where(inside, -(away @ self.normal), np.nan)
@@ -256,6 +258,7 @@ def room_walls(
     """
     x, y = read_value(_Corner, "room: ", "corner_m", corner_m)
     a, b, h = read_value(_Size, "room: ", "size_m", size_m)
+    # A corner and two edges of each side, whose cross product points into the room.
     faces: dict[str, tuple[Vector, Vector, Vector]] = {
         "near": ((x, y, 0.0), (0.0, b, 0.0), (0.0, 0.0, h)),
         "far": ((x + a, y + b, 0.0), (0.0, -b, 0.0), (0.0, 0.0, h)),
@@ -324,6 +327,8 @@ class Furniture:
             raise InputError(
                 f"{mesh} is unknown; allowed: {', '.join(mesh_names())}, or a file of {endings}"
             )
+        # A mesh that is shipped, a box and one in memory are in metres; only a file needs to be
+        # told its unit.
         if self._settled:
             if self.metres_per_unit is not None or self.sheet:
                 raise InputError(
@@ -388,6 +393,8 @@ class Furniture:
 
     def _own_triangles(self) -> Triangles:
         """Mesh in its own axes, scaled to metres, once it is checked."""
+        # An open mesh has no inside: it can only be a thin sheet, through which nothing passes if
+        # it conducts.
         where, read = self._where, self._read()
         if not (read.closed or self.sheet or self._settled):
             raise InputError(

@@ -55,6 +55,8 @@ def feet_of_walls(scene: Scene) -> list[Foot]:
     """Find the feet of the upright walls."""
     found = []
     for wall in filter(_is_upright, scene.walls):
+        # Seen from above an upright rectangle is a line, between the two corners that are farthest
+        # apart.
         corners = wall.corners[:, :2]
         gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1)
         one, other = np.unravel_index(int(gaps.argmax()), gaps.shape)
@@ -67,11 +69,13 @@ def _between_openings(foot: Foot) -> list[NDArray[np.float64]]:
     wall, way = foot.wall, foot.last - foot.first
     edges = np.array([wall.edge_u_m, wall.edge_v_m])[:, :2]
     gaps = []
+    # Each opening as a gap along the foot, whatever its height.
     for u, v, wide, high in wall.openings:
         corners = np.array([(u, v), (u + wide, v), (u, v + high), (u + wide, v + high)])
         points = wall.corner_m[:2] + corners / wall.size_m @ edges
         along = ((points - foot.first) @ way / (way @ way)).tolist()
         gaps.append((min(along), max(along)))
+    # What is left between gaps, which may overlap.
     start, left = 0.0, []
     for low, high in [*sorted(gaps), (1.0, 1.0)]:
         if low > start:
@@ -93,6 +97,7 @@ def plot_scene(
     radar, ax = axes_given(radar, ax)
     if not isinstance(radar, Radar | None):
         raise InputError(f"plot: radar = {brief(radar)}; it must be a Radar, such as a preset")
+    # Where the radar will stand, and what must be inside of the picture.
     x, y = scene.radar_place(Radar() if radar is None else radar)[:2]
     # Who are there, whoever may come.
     people = {
@@ -106,6 +111,7 @@ def plot_scene(
     draw_radar(axes, (x, y), radar)
     for place in people.values():
         axes.plot(*place, "o", color=theme.person, markersize=7)
+    # Names last, when the limits are final.
     title = printable(f"{scene.name}: {scene.description}")
     dress(axes, title=title, note=plan_note(scene))
     others = [
@@ -134,6 +140,7 @@ def plan_limits(scene: Scene, points: ArrayLike) -> NDArray[np.float64]:
     corners += [piece.triangles().vertices[:, :2] for piece in (*scene.furniture, *scene.objects)]
     every = np.concatenate(corners)
     low, high = every.min(axis=0), every.max(axis=0)
+    # A margin for names, and more across a narrow plan.
     span = high - low
     margin = 0.3 + 0.08 * span.max() + np.maximum(0, 0.4 * span.max() - span) / 2
     return np.stack([low - margin, high + margin], axis=1)
@@ -168,6 +175,7 @@ def draw_plan(axes: Axes, scene: Scene, limits: NDArray[np.float64]) -> None:
         style: dict[str, Any] = {"color": tuple(pale.tolist()), "linewidth": 0.5}
         if faces:
             axes.add_collection(PolyCollection(faces, **style), autolim=False)
+    # Walls lie behind their front faces, which are drawn as lines.
     for foot in feet_of_walls(scene):
         behind = foot.wall.thickness_m * foot.wall.normal[:2]
         for first, last in _between_openings(foot):
@@ -197,6 +205,7 @@ def name_parts(
     (2, 2) [m] that none of them covers. Limits of the axes must be final.
     """
     theme = theme_of(axes)
+    # Closed pieces are named in their middle, sheets, which are small, beside it.
     feet, pieces = feet_of_walls(scene), []
     for piece in (*scene.furniture, *scene.objects):
         triangles = piece.triangles()
@@ -206,6 +215,7 @@ def name_parts(
         places = around((x, y), 0.0 if closed else 12.0)
         colour = theme.furniture if closed else theme.reflector
         pieces.append((closed, -area, Label(piece.name, places, colour)))
+    # Sheets first, then the largest, because names that find no place are left out.
     pieces.sort(key=lambda piece: piece[:2])
     lines = [_square(point) for foot in feet for point in foot.at(np.linspace(0, 1, 100))]
     labels = [*first, *(_wall_label(foot, theme.wall) for foot in feet)]
@@ -239,9 +249,11 @@ def _square(point: ArrayLike) -> NDArray[np.float64]:
 def _wall_label(foot: Foot, colour: str) -> Label:
     """Make a label that stands outside its wall, along it."""
     wall, (x, y) = foot.wall, foot.last - foot.first
+    # Along the wall, and never upside down.
     rotation = (float(np.degrees(np.arctan2(y, x))) + 89.9) % 180 - 89.9
     outward = -wall.normal[:2] / np.linalg.norm(wall.normal[:2])
     places = []
+    # Places to try: outside near and far, then inside, each at some points along the wall.
     for distance, depth in ((9, wall.thickness_m), (25, wall.thickness_m), (-10, 0), (-25, 0)):
         for x, y in (foot.at([0.5, 0.3, 0.7, 0.15, 0.85]) + depth * outward).tolist():
             places.append(((x, y), (distance * outward[0], distance * outward[1])))

@@ -104,6 +104,7 @@ class Scene:
             raise InputError(
                 f"{where}furniture must be a tuple of Furniture; what moves is of objects"
             )
+        # Whatever is said of a piece names it.
         for key in ("walls", "furniture", "objects"):
             names = [piece.name for piece in getattr(self, key)]
             twice = sorted({name for name in names if names.count(name) > 1})
@@ -292,6 +293,7 @@ class Scene:
             Where a material is not known over the sweep of the radar, or the radar is inside a wall
             or nearer than 0.3 m to furniture.
         """
+        # The radar at its place. A place of its own may be outside of the room by mistake.
         place, placed = self.radar_place(radar), self.turn(radar)
         if place is not radar.position_m:
             placed = replace(placed, position_m=place)
@@ -302,12 +304,15 @@ class Scene:
                 ValidityWarning,
                 stacklevel=2,
             )
+        # Materials must be known over the whole sweep.
         start = placed.start_frequency_hz
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
         for part in self._parts:
             with prefixed(f"scene '{self.name}', {part.name}: "):
                 part.material.eta(sweep)
+        # No antenna may be inside of a wall, or so near to a mesh that the echo models have no
+        # meaning.
         for wall in self.walls:
             if wall.holds(antennas).any():
                 raise InputError(

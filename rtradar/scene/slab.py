@@ -90,6 +90,8 @@ def slab(
     for key, values in (("thickness_m", thickness_m), ("frequency_hz", frequency_hz)):
         if not np.all((np.asarray(values) > 0) & np.isfinite(values)):
             raise InputError(f"slab: {key} must be positive and finite")
+    # The reflection at one face, and the factor of one pass; the loop sums all passes as a
+    # geometric series.
     face, inner = _face(eta, cosine, polarization)
     through = _through(inner, thickness_m, frequency_hz)
     loop = 1 - (face * through) ** 2
@@ -130,6 +132,7 @@ def slab_passes(
         loop = 1 - (face * through) ** 2
         # Exactly grazing, nothing enters.
         term = np.where(loop == 0, 0.0, term / np.where(loop == 0, 1.0, loop))
+    # At once reflected, by the face itself, and with `rest` all even passes.
     if passes == 0:
         return np.where(conducts, _perfect(polarization), face + (term if rest else 0 * term))
     return np.where(conducts, 0.0, term)
@@ -161,6 +164,7 @@ def _face(eta: Field, cosine: Array, polarization: Polarization) -> tuple[Field,
 
     The latter is sqrt(eta - sin^2), the decaying root; ``cosine`` is that outside.
     """
+    # The normal wave number behind the face, the root whose wave decays.
     root = np.sqrt((eta - 1) + cosine**2)
     inner = np.where(root.imag > 0, -root, root)
     outer = cosine if polarization == "te" else eta * cosine

@@ -143,6 +143,7 @@ def fields_of(table: Table) -> dict[str, Any]:
     texts = KEYS["top"][1]
     tables = ("radar", "person", "materials", "room", "walls", "furniture", "objects", "people")
     check_keys("", table, (), (*texts, *tables))
+    # Materials first, because everything else names them.
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
     room = _room(table_at("room", table), materials) if "room" in table else ()
     fields: dict[str, Any] = {
@@ -152,6 +153,7 @@ def fields_of(table: Table) -> dict[str, Any]:
         "objects": _pieces("objects", Object, table, materials),
         "people": people_of(table),
     }
+    # Places of radar and person, under the names of the fields.
     for kind in ("radar", "person"):
         own = table_at(kind, table)
         # A table of the radar says where it is.
@@ -176,6 +178,7 @@ def _own_materials(table: Table) -> dict[str, Material]:
 def _room(table: Table, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     check_keys("[room] ", table, KEYS["[room]"][0], ("walls", *ROOM_SIDES))
     surfaces = {}
+    # The four walls may share a table; floor and ceiling have their own.
     for side in ROOM_SIDES:
         key = side if side in table or side in ("floor", "ceiling") else "walls"
         if key not in table:
@@ -197,6 +200,7 @@ def _pieces(
         own = dict(entry)
         with prefixed(where):
             check_keys("", own, *KEYS[f"[[{key}]]"])
+            # A mesh by name or file, or the sizes of a box.
             if kind is not Wall:
                 given = [name for name in _SHAPES if name in own]
                 if len(given) != 1:
@@ -249,6 +253,7 @@ def _motion(entry: Table, folder: Path) -> Motion:
     if isinstance(entry["motion"], Motion):
         return entry["motion"]
     name = read_value(str, "person: ", "motion", entry["motion"])
+    # A recording has no traits, and an actor no file.
     acted = name.startswith(SYNTHETIC)
     for key in ("skeleton", *SAID) if acted else _OF_ACTORS:
         if key in entry:
@@ -266,6 +271,7 @@ def _motion(entry: Table, folder: Path) -> Motion:
     given = said_of("people", entry)
     if "skeleton" in entry:
         given["skeleton"] = folder / read_value(str, "people: ", "skeleton", entry["skeleton"])
+    # A duration ends a recording early; the run file keeps it, so that the same is made again.
     recording = load_motion(folder / name, **given)
     if "duration_s" not in entry:
         return recording
@@ -319,11 +325,14 @@ def random_room(table: Table) -> dict[str, Any]:
         rough_m = between(1e-4, 5e-4, digits=5)
         return {"material": material, "thickness_m": thickness_m, "roughness_m": rough_m}
 
+    # The size of the room, the radar, and where the room is: the near wall is just behind the
+    # radar.
     size = [between(*own) for own in (ranges.length_m, ranges.width_m, ranges.height_m)]
     radar = [-between(2.6, 3.2), between(-0.5, 0.5), between(0.9, 1.5)]
     low = np.array([radar[0] - between(0.3, 0.4), between(-0.1, 0.1) - size[1] / 2])
     low = np.round(low, 2)
     high = np.round(low + size[:2], 2)
+    # Half of the rooms have a window, a pane of glass before the left wall.
     walls = []
     if draw.random() < 0.5:
         wide, sill = between(0.8, 2.0), between(0.7, 1.0)
@@ -333,6 +342,8 @@ def random_room(table: Table) -> dict[str, Any]:
         up = min(between(0.9, 1.4), round(size[2] - sill - 0.2, 2))
         edges = {"corner_m": corner, "edge_u_m": [wide, 0.0, 0.0], "edge_v_m": [0.0, 0.0, up]}
         walls.append({"name": "window", **edges, "material": "glass", "thickness_m": 0.006})
+    # Pieces along the walls, each tried at some places until it is clear of all others; one that
+    # never is is left out.
     least, most = ranges.furniture
     furniture = []
     taken = [_FREE_M, np.stack([np.subtract(radar[:2], _RADAR_M), np.add(radar[:2], _RADAR_M)], 1)]
@@ -345,6 +356,7 @@ def random_room(table: Table) -> dict[str, Any]:
                 piece = {"name": f"{mesh} {number}", "mesh": mesh, "material": _PIECES[mesh]}
                 furniture.append({**piece, "position_m": [*place, 0.0], "yaw_deg": _SIDES[at]})
                 break
+    # Materials and thicknesses of all sides.
     sides = {name: side(_WALLS) for name in _SIDES}
     sides |= {"floor": side(_FLOORS), "ceiling": side(_CEILINGS)}
     found = {
@@ -358,9 +370,11 @@ def random_room(table: Table) -> dict[str, Any]:
 def _against(mesh: str, side: str, low: Any, high: Any, along: float) -> tuple[list[float], Any]:
     """Put a piece with its back to a wall: its place [x, y] and the box (2, 2) it covers [m]."""
     vertices = read_mesh(shipped_folder("meshes") / f"{mesh}.ply").vertices[:, :2]
+    # Turned to look into the room, and the box that it covers about its own origin.
     turn = np.radians(_SIDES[side])
     vertices = vertices @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     own = np.stack([vertices.min(axis=0), vertices.max(axis=0)], axis=1)
+    # Along its wall anywhere that is inside, and 2 cm before it.
     axis, first = (0 if side in ("near", "far") else 1), side in ("near", "right")
     place = low - own[:, 0] + along * (high - low - (own[:, 1] - own[:, 0]))
     place[axis] = (low - own[:, 0] + 0.02)[axis] if first else (high - own[:, 1] - 0.02)[axis]

@@ -49,7 +49,7 @@ _KEPT_ROOMS = 2
 
 
 class _Group(NamedTuple):
-    """Objects whose amplitudes are given at the same frequencies, for one sum over all of them.
+    """Objects whose amplitudes are given at the same frequencies, so that one sum takes them all.
 
     ``member (object,)`` says which belong to it, ``first (object,)`` where their echoes begin.
     """
@@ -117,11 +117,12 @@ def _synthesized(echoes: Echoes, radar: Radar) -> _Samples:
 class RoomIf:
     """IF samples of a room.
 
-    The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes the IF
-    of what the body occludes is computed. Between them a cubic goes through the samples, for the
-    sum over echoes is linear in what each has lost. ``objects`` are the echoes of each object for
-    one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes of them, a
-    `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly still.
+    The room is computed for one TDM cycle, because its IF is the same in every cycle. At keyframes
+    the IF of what the body occludes is computed. Between them a cubic goes through the samples,
+    because the sum over echoes is linear in what each has lost. ``objects`` are the echoes of each
+    object for one cycle, as `Clutter.cycle` yields them; the ``shadow`` is what the body occludes
+    of them, a `rtradar.scatter.clutter.body_shadow.ClutterShadow`. Without one the room is exactly
+    still.
     """
 
     def __init__(self, radar: Radar, objects: Iterable[Echoes], shadow: Any = None) -> None:
@@ -129,6 +130,8 @@ class RoomIf:
         self._shadow: Any = shadow if still else None
         mirrors = tuple(shadow.mirrors) if shadow else ()
         self._groups, self._whole, self._mirrors = _at_rest(radar, still, mirrors)
+        # What a body takes from a wall that mirrors changes over the sweep; weights take it from
+        # the nodes of the shadow to every sample.
         if shadow:
             frequency = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
             frequency = radar.sampled_start_hz + radar.slope_hz_per_s * frequency
@@ -164,6 +167,8 @@ class RoomIf:
             samples += self._whole[tx]
             return
         self.begin(chirps)
+        # The IF is the whole less what is lost, by a cubic through the four keyframes about each
+        # chirp.
         found = self._waited_for()
         keyframes, rest = keyframe_before(self._radar, chirps, self._shadow.step)
         weights = cubic_weights(rest / self._shadow.step).astype(np.float32)
@@ -211,9 +216,13 @@ class RoomIf:
     def _find(self, keyframe: int) -> _Samples:
         """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""
         shadow, now = self._shadow, self._shadow.at(keyframe)
+        # What is lost of points on furniture and walls.
         lost = self._of_points(now.echo, now.fraction)
+        # A mirror loses a fraction of its samples that depends on the frequency, and so on the
+        # sample.
         for number, of_mirror in zip(now.mirror.tolist(), now.of_mirror, strict=True):
             lost += self._mirrors[number] * (of_mirror @ self._sweep.T)
+        # Weak points have keyframes farther apart, between which they are interpolated as well.
         if shadow.slower:
             before, rest = divmod(keyframe, shadow.slower)
             weights = cubic_weights([rest / shadow.slower])[0].astype(np.float32)
@@ -229,6 +238,8 @@ class RoomIf:
     def _of_points(self, echo: NDArray[np.int64], fraction: NDArray[np.complex128]) -> _Samples:
         starts, nodes = self._shadow.starts, self._shadow.point_frequency
         lost = np.zeros(self._whole.shape, dtype=np.complex64)
+        # Points are numbered through all objects: which object each is of, and its echo in the
+        # group of that.
         own = np.searchsorted(starts, echo, side="right") - 1
         for group in self._groups:
             chosen = np.flatnonzero(group.member[own])
@@ -236,6 +247,8 @@ class RoomIf:
                 continue
             which = group.first[own[chosen]] + echo[chosen] - starts[own[chosen]]
             some = take(group.echoes, which)
+            # Amplitudes are taken at few frequencies; where the fraction that is lost changes over
+            # the sweep, at those of the fraction, so that both can be multiplied.
             few = len(some.frequency) <= _SHADOW_NODES
             frequency = some.frequency if few else sweep_nodes(self._radar, _SHADOW_NODES)
             frequency = nodes if len(fraction) > 1 else frequency
@@ -275,12 +288,14 @@ class MovingRoomIf(RoomIf):
         chirps = np.asarray(chirps, dtype=np.int64)
         times = self._radar.centres_of(chirps)
         last = max(len(self.times) - 2, 0)
+        # Between which two keyframes each chirp is, and how far on the way.
         before = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, last)
         for keyframe in np.unique(before).tolist():
             inside = np.flatnonzero(before == keyframe)
             some = slice(int(inside[0]), int(inside[-1]) + 1)
             steps = self.times[keyframe : keyframe + 2]
             later = np.interp(times[some], steps, np.arange(len(steps)))
+            # The echoes of one keyframe fade out as those of the next fade in.
             for number, weight in enumerate((1 - later, later)[: len(steps)]):
                 self._add_set(samples[some], chirps[some], weight, keyframe + number)
 
@@ -292,6 +307,7 @@ class MovingRoomIf(RoomIf):
         found = self._kept.get(keyframe, lambda: self._keyframe(keyframe))
         times, tx = radar.centres_of(chirps), radar.tx_of_chirp(chirps)
         at_tx, at_rx = antennas_in_use(radar, times, tx)
+        # Some chirps at a time, because every channel has all echoes of the room.
         for own, rest in found:
             at_once = max(1, _MOST_TERMS // (radar.n_rx * own.n_echoes))
             for first in range(0, len(chirps), at_once):
@@ -307,6 +323,8 @@ class MovingRoomIf(RoomIf):
                 samples[some] += synthesize(echoes, radar, times[some], dtype=np.complex64)
 
     def _keyframe(self, keyframe: int) -> list[tuple[Any, _Array]]:
+        # What the way from antenna to point does not explain of a length, it keeps while the radar
+        # moves.
         radar = self._radar.at(float(self.times[keyframe]))
         objects, rx = self._trace(radar).objects, radar.rx[radar.rx_of_tx]
         return [(own, own.length - _ways(own, radar.tx, rx)) for own in objects]
@@ -318,6 +336,8 @@ def keyframe_times(radar: Radar, duration_s: float) -> _Array:
     knots = np.unique(knots)
     # Its angles change evenly between the knots, as its place does.
     angles, places = radar.path_at(knots)
+    # Between two knots of the path the radar goes straight and evenly: as many keyframes as its way
+    # and its turn ask for.
     way, turn = (np.linalg.norm(np.diff(values, axis=0), axis=1) for values in (places, angles))
     counts = np.ceil(np.maximum(way / (SPACING * radar.wavelength_m), turn / TURN_DEG))
     pieces = [
@@ -329,6 +349,8 @@ def keyframe_times(radar: Radar, duration_s: float) -> _Array:
 
 def _ways(own: Any, tx: _Array, rx: _Array) -> _Array:
     """Ways (chirp, rx, echo) from Tx (chirp, 3) to Rx (chirp, rx, 3), over walls or points [m]."""
+    # Over walls the path is straight from the image of the Tx, which moves as the Tx does,
+    # mirrored.
     if own.image is not None:
         turn, shift = own.image
         way = np.linalg.norm((tx @ turn.T + shift)[:, None] - rx, axis=-1)

@@ -64,8 +64,8 @@ are not seen, and are the same ones at every chirp."""
 class GhostIf:
     """The IF samples of ghosts by anchors ``apart`` cycles from each other.
 
-    The capture has a number of cycles; ``order (ghost,)`` is that of the ghosts, of which the last
-    ``changing`` change over the sweep. ``cycles (anchor,)`` are the cycles of the anchors.
+    ``order (ghost,)`` sorts the ghosts so that the last ``changing`` of them change over the sweep.
+    ``cycles (anchor,)`` are the cycles of the anchors.
     """
 
     def __init__(
@@ -79,6 +79,7 @@ class GhostIf:
     ) -> None:
         self._ghosts, self._radar = ghosts, radar
         self._order, self._changing = order, changing
+        # Evenly over the capture, with enough anchors for a cubic.
         gaps = max(ANCHORS - 1, math.ceil((n_cycles - 1) / apart))
         self.cycles = np.unique(np.rint(np.linspace(0, n_cycles - 1, gaps + 1)).astype(np.int64))
         # The anchors that are held, from the first on.
@@ -94,9 +95,11 @@ class GhostIf:
             return
         radar = self._radar
         self.compute(chirps)
+        # The four anchors about each chirp, and their weights in the cubic at its cycle.
         cycle, tx = chirps // radar.n_tx, radar.tx_of_chirp(chirps)
         first = self._first_anchor(cycle)
         weight = _cubic_weights(self.cycles[first[:, None] + np.arange(ANCHORS)], cycle)
+        # Under FDM each Tx has a carrier of its own.
         carrier = radar.sampled_start_hz + radar.tx_offset_hz[tx]
         carrier, slope = carrier.astype(np.float64), float(radar.slope_hz_per_s)
         between = BetweenAnchors(
@@ -111,6 +114,8 @@ class GhostIf:
         held = self._first + len(self._held.length)
         if self._first <= begin and end <= held:
             return
+        # Blocks come in order: anchors that are still needed stay, and only those after them are
+        # computed.
         kept = slice(begin - self._first if self._first <= begin < held else held, None)
         start = held if kept.start < held else begin
         new = self._found(self.cycles[start : end + ahead])
@@ -132,6 +137,7 @@ class GhostIf:
         chirps = (cycles[:, None] * len(each) + each).ravel()
         echoes = self._ghosts(chirps)
         warn_of_motion_in_chirp(echoes, self._radar, self._radar.centres_of(chirps))
+        # The rows of each cycle in the order of the Tx.
         order = len(each) * np.arange(len(cycles))[:, None] + np.argsort(echoes.tx[: len(each)])
         weights = _legendre_weights(echoes, self._radar).astype(np.float32)
         found = _empty_anchors(
@@ -175,6 +181,8 @@ def ghosts_within(
         What was approximated, for JSON: the number of ghosts and of those that change over the
         sweep, the distance between anchors [s], and the error's power [m^2].
     """
+    # Some chirps over the whole capture say how strong each ghost is, and how much it changes over
+    # the sweep.
     spread = np.unique(np.linspace(0, n_chirps - 1, _POWER_CHIRPS).astype(np.int64))
     some = ghosts(spread)
     said = {"ghosts": len(some.part), "changing": 0}
@@ -188,11 +196,15 @@ def ghosts_within(
     )
     # Times the mean squares of the polynomials over the sweep.
     changes = ~weakest(tilt / 3 + curve / 5, power_m2 * _OF_CHANGES)
+    # Ghosts that do not change first, those that do last, each group in an order that suits the
+    # kernel.
     length = some.length.mean(axis=(0, 1))
     groups = [np.flatnonzero(~changes), np.flatnonzero(changes)]
     order = np.concatenate([_apart(own, length) for own in groups])
     said |= {"changing": len(groups[1])}
     n_cycles = n_chirps // radar.n_tx
+    # The longest distance whose error, measured against the exact sum, keeps the tolerance. Anchors
+    # closer than two cycles would save nothing.
     for apart_s in APART_S:
         apart = min(round(apart_s / radar.cycle_duration_s), (n_cycles - 1) // (ANCHORS - 1))
         if apart < 2:
@@ -213,6 +225,7 @@ def _error(found: GhostIf, ghosts: GhostEchoes, radar: Radar) -> float:
     each = np.arange(radar.n_tx)
     chirps = (cycles[:, None] * radar.n_tx + each).ravel()
     times = radar.centres_of(chirps)
+    # The approximation less the exact sum, cycle by cycle.
     error = -synthesize(ghosts(chirps), radar, times, dtype=np.complex64)
     for first in range(0, len(chirps), radar.n_tx):
         own = slice(first, first + radar.n_tx)

@@ -1,7 +1,7 @@
 """What each receiver gets of several Tx that transmit at once, and how it is separated again.
 
 Samples have a row for each chirp of each Tx, ``(chirp, rx, sample)``, in all that makes and all
-that processes them. Under TDM and FDM these rows are what is received, for filters separate the
+that processes them. Under TDM and FDM these rows are what is received, because filters separate the
 bands of FDM. Under DDM (Doppler division; Sun, Petropulu and Poor, IEEE Signal Processing Magazine
 37(4), 2020) a receiver gets the sum of all Tx, each rotated by its code from chirp to chirp;
 `separate` rotates the sum back by the code of one Tx after the other. In the row of a Tx its own
@@ -58,6 +58,7 @@ def receive(
     """
     if radar.multiplexing != "ddm":
         return samples
+    # All Tx of a cycle, each turned by its code, arrive as one sum.
     cube = samples.reshape(-1, radar.n_tx, *samples.shape[1:])
     coded = np.einsum("ct,ctrs->crs", codes(radar, first_chirp, len(samples)), cube, optimize=False)
     return np.asarray(coded, dtype=samples.dtype)
@@ -85,6 +86,7 @@ def separate(
         return np.asarray(received / math.sqrt(radar.n_tx), dtype=received.dtype)
     if radar.multiplexing != "ddm":
         return received
+    # Turned back by the code of each Tx in turn: the same sum as often as there are Tx.
     back = codes(radar, first_chirp, len(received) * radar.n_tx).conj()
     rows = back[:, :, None, None] * received[:, None]
     return np.asarray(rows.reshape(-1, *received.shape[1:]), dtype=received.dtype)

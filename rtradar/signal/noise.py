@@ -2,12 +2,12 @@
 
 Noise of the receiver is white, complex and Gaussian, of a power that follows from the asked SNR.
 
-Of the oscillator's phase noise the IF has what is left where both ways of it cancel in part. An
-echo of delay tau is mixed with the noise phi(t) - phi(t - tau), whose spectrum is that of the
-oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
-x + j (phi(t) - phi(t - tau)) x. Of what is still, (phi(t) - phi(t - tau)) / tau is interpolated
-between some delays, and echoes are summed once for each. Of what moves all echoes have the mean
-delay of their power, cycle by cycle.
+The phase noise of the oscillator is in the echo and in the signal with which it is mixed, so part
+of it cancels. In an echo of delay tau the IF keeps phi(t) - phi(t - tau), whose spectrum is that of
+the oscillator times 4 sin^2(pi f tau) (:eq:`range-correlation`). It is small, so an echo x becomes
+x + j (phi(t) - phi(t - tau)) x. For still echoes (phi(t) - phi(t - tau)) / tau is interpolated
+between some delays, and the echoes are summed once for each of them. All moving echoes share one
+delay, their mean weighted by power, cycle by cycle.
 """
 
 from __future__ import annotations
@@ -104,8 +104,11 @@ class Noise:
             )
         if self.power == 0:
             return
+        # As many rows a cycle as are received: the noise of a cycle depends on its number and not
+        # on the block.
         rows = 1 if radar.multiplexing == "ddm" else radar.n_tx
         first_cycle = first_chirp // radar.n_tx
+        # Half the power in each of the two parts of a complex sample.
         sigma = np.float32(math.sqrt(self.power / 2))
 
         def fill(first: int) -> None:
@@ -167,11 +170,13 @@ class PhaseNoise:
     ) -> None:
         self._radar, self._seed = radar, seed
         self._rows = 1 if radar.at_once else radar.n_tx
+        # The density at the frequencies of an FFT over one chirp, and the amplitude of its bins.
         n, rate = radar.samples_per_chirp, radar.sample_rate_hz
         self._frequency: _Array = np.arange(n // 2 + 1, dtype=np.float64) * (rate / n)
         self._density = density_of(receiver, self._frequency)
         self._scale = np.sqrt(n * rate * self._density / 2).astype(np.float32)
         self._still = still
+        # The longest delay has the most residual noise. More than this would no longer be small.
         longest = max((one.length.max() for one in still if one.length.size), default=0.0)
         self._longest_s = longest / SPEED_OF_LIGHT_MPS
         most_s = max(self._longest_s, moving_s)
@@ -190,6 +195,8 @@ class PhaseNoise:
 
     def _nodes(self) -> _Array:
         """Chebyshev nodes from 0 to the longest delay, as many as the tolerance asks for."""
+        # The bound of the error of interpolation at Chebyshev nodes, for a phase that turns with
+        # the delay at half the sample rate.
         half, count = math.pi * self._radar.sample_rate_hz * self._longest_s / 2, 1
         while 2 * (half / 2) ** count / math.factorial(count) > _TOLERANCE:
             count += 1
@@ -201,6 +208,9 @@ class PhaseNoise:
         radar, nodes = self._radar, self._nodes_s
         shape = radar.n_tx, radar.n_rx, len(nodes), radar.samples_per_chirp
         found, times = np.zeros(shape, np.complex64), radar.chirp_times(radar.n_tx)
+        # Each still echo is shared among the nodes by Lagrange's polynomials in its delay, which is
+        # what interpolating its phase noise amounts to; the factor delay / node is there because
+        # the phase over the delay is interpolated.
         for echoes in self._still:
             delay = echoes.length / SPEED_OF_LIGHT_MPS
             for number, node in enumerate(nodes):
@@ -213,6 +223,7 @@ class PhaseNoise:
     def level_m2(self, moving_m2: float, moving_s: float) -> float:
         """Power per sample of white noise as dense as the residual noise is where it is densest."""
         total = self._filter(moving_s) * moving_m2
+        # Still echoes are added up by their delay, because the filter depends on nothing else.
         for echoes in self._still:
             power = (np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1))
             delay = echoes.length.mean(axis=(0, 1)) / SPEED_OF_LIGHT_MPS
@@ -233,6 +244,8 @@ class PhaseNoise:
         radar, n = self._radar, self._radar.samples_per_chirp
         n_tx, n_nodes = radar.n_tx, len(self._nodes_s)
         out = np.empty((len(moving_s) // n_tx, n_tx, 1 + n_nodes, n), np.float32)
+        # The filter 1 - exp(-j 2 pi f tau): once for the moving echoes, with the mean delay of each
+        # cycle, and once for each node.
         half_turn = (np.pi * self._frequency).astype(np.float32)
         at_nodes = _residue(half_turn * self._nodes_s[:, None].astype(np.float32))
         of_moving = moving_s.reshape(-1, n_tx).mean(axis=1).astype(np.float32)
@@ -244,6 +257,8 @@ class PhaseNoise:
             filters = np.empty((cycles, 1, 1 + n_nodes, bins), np.complex64)
             filters[:, 0, 0] = _residue(of_moving[own, None] * half_turn)
             filters[:, 0, 1:] = at_nodes
+            # One spectrum of white noise a row, shaped by the oscillator's density, which all
+            # delays share.
             random = np.zeros((cycles * self._rows, 1, bins), np.complex64)
             add_noise(states[own], self._rows, np.float32(1), random)
             random *= self._scale

@@ -29,6 +29,9 @@ def complex_of_real(samples: NDArray[Any]) -> NDArray[np.complex64]:
     """
     from scipy import fft  # slow to import
 
+    # The half spectrum of a real signal, without its last bin. The inverse transform of half as
+    # many samples divides by half as much, which gives the positive frequencies their double
+    # amplitude; the mean has no partner and is halved.
     spectrum = fft.rfft(np.asarray(samples, dtype=np.float64), axis=-1)[..., :-1]
     spectrum[..., 0] /= 2
     return np.asarray(fft.ifft(spectrum, axis=-1), dtype=np.complex64)
@@ -49,6 +52,7 @@ def real_of_complex(samples: NDArray[np.complexfloating]) -> NDArray[np.float64]
     """
     from scipy import fft  # slow to import
 
+    # The inverse steps: the mean doubled again, and an empty last bin.
     spectrum = fft.fft(np.asarray(samples, dtype=np.complex128), axis=-1)
     spectrum[..., 0] *= 2
     beyond = np.zeros((*spectrum.shape[:-1], 1))

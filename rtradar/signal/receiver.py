@@ -94,15 +94,18 @@ class ReceiverStage:
         self._radar, self._receiver, self._expected = radar, radar.receiver, expected
         self._keep_all = keep_all
         self.effects: tuple[Effect, ...] = ()
+        # Nothing is added until an effect is found to matter.
         shape = radar.n_tx, radar.n_rx, radar.samples_per_chirp
         self._still, self._gain = np.zeros(shape, np.complex64), np.ones(shape[:2], np.complex64)
         self._fields = np.zeros((*shape[:2], 0, shape[2]), np.complex64)
         self._noise: PhaseNoise | None = None
+        # What is still, the leakage and the room, has the strongest cells that the other effects
+        # are judged by.
         still = self._add_leakage()
         of_room = room.clutter_if(np.arange(radar.n_tx)) if room else np.zeros(shape, np.complex64)
         around = of_room + self._still
         profiles = _profiles(around)
-        # The strongest cell, of what is still or of what moves.
+        # The strongest cell may be still or may move.
         strongest = max(mover.power_m2 for mover in expected.movers)
         self._peak_m2 = max(float((np.abs(profiles) ** 2).max()), strongest)
         if self._receiver.phase_noise_hz:
@@ -118,6 +121,7 @@ class ReceiverStage:
 
     def _keep(self, name: str, power_m2: float, noise_m2: float, note: str) -> bool:
         """Note an effect of this power against this noise [m^2]; return whether it is modelled."""
+        # Without noise, or where an effect never occurs, there is no ratio.
         level_db = None
         if power_m2 > 0 and noise_m2 > 0:
             level_db = 10 * math.log10(power_m2) - 10 * math.log10(noise_m2)
@@ -136,6 +140,7 @@ class ReceiverStage:
         # Received power of an echo of 1 m^2 over the power of the Tx.
         of_1_m2 = gains * radar.wavelength_m**2 / (4 * math.pi) ** 3
         power = 10 ** (receiver.leakage_db / 10 - math.log10(of_1_m2))
+        # It goes straight from each Tx to each Rx, and some way on the board.
         apart = radar.tx_m[:, None] - radar.rx_m[radar.rx_of_tx]
         length = np.linalg.norm(apart, axis=-1)[..., None] + receiver.leakage_length_m
         echoes = Echoes(
@@ -170,6 +175,8 @@ class ReceiverStage:
         given = receiver.channel_gain_db, receiver.channel_phase_deg
         if given == (0.0, 0.0):
             return
+        # A deviation is drawn for each Tx and each Rx, and adds up over both; figures that are
+        # given hold channel by channel.
         random = np.random.default_rng(stream(receiver.seed))
         errors = []
         for one in given:
@@ -178,6 +185,7 @@ class ReceiverStage:
                 errors.append(one * (of_tx[:, None] + of_rx[radar.rx_of_tx]) / math.sqrt(2))
             else:
                 errors.append(np.reshape(one, (radar.n_tx, radar.n_rx)))
+        # Judged by what they change of the strongest echo.
         gain = 10 ** (errors[0] / 20) * np.exp(1j * np.radians(errors[1]))
         wrong = float((np.abs(gain - 1) ** 2).mean()) * self._peak_m2
         note = "what errors of gain and phase change of the strongest echo"
@@ -186,12 +194,14 @@ class ReceiverStage:
 
     def _set_interferer(self, other: Interferer, n_chirps: int) -> None:
         radar = self._radar
+        # A plane wave: each Rx gets it with the phase of its place along the direction of arrival.
         azimuth, elevation = math.radians(other.azimuth_deg), math.radians(other.elevation_deg)
         across = math.cos(elevation)
         direction = across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)
         turns = (radar.rx_m[radar.rx_of_tx] @ np.array(direction)) / radar.wavelength_m
         power = self._in_m2(other.power_dbm)
         self._steering = (math.sqrt(power) * np.exp(-2j * np.pi * turns)).astype(np.complex64)
+        # How often its ramps cross the band of the IF is found in some rows over the capture.
         n_rows = n_chirps // chirps_together(radar)
         rows = np.unique(np.linspace(0, n_rows - 1, min(n_rows, _ROWS_LOOKED_AT)).astype(np.int64))
         samples = np.zeros((len(rows), radar.n_rx, radar.samples_per_chirp), np.complex64)
@@ -213,6 +223,7 @@ class ReceiverStage:
         """
         receiver, e = self._receiver, self._expected
         keep = self._keep
+        # The two branches of the mixer: what stays of the signal, and its image.
         if receiver.iq_gain_db or receiver.iq_phase_deg:
             turned = 10 ** (receiver.iq_gain_db / 20) * np.exp(
                 1j * np.radians(receiver.iq_phase_deg)
@@ -223,6 +234,7 @@ class ReceiverStage:
                 self._image = np.complex64(own), np.complex64(image)
         rate = self._radar.sample_rate_hz
         self._corners = np.zeros(0, np.float32)
+        # What the filters take, of still echoes by range and of each mover at its delay.
         if receiver.highpass_hz:
             beat = np.arange(profiles.shape[-1]) * rate / profiles.shape[-1]
             moving_hz = [self._radar.slope_hz_per_s * mover.delay_s for mover in e.movers]
@@ -234,6 +246,7 @@ class ReceiverStage:
             if keep("highpass", float(lost), e.cell_m2, "what it takes from the strongest echo"):
                 corners = np.pi * np.array(receiver.highpass_hz) / rate
                 self._corners = corners.astype(np.float32)
+        # The offset is shared evenly by both branches.
         self._dc = np.complex64(0)
         if receiver.dc_dbm is not None:
             power = self._in_m2(receiver.dc_dbm)
@@ -248,10 +261,12 @@ class ReceiverStage:
         if receiver.adc_full_scale_dbm is None:
             return
         full = math.sqrt(self._in_m2(receiver.adc_full_scale_dbm))
+        # Rounding by up to half a step in each branch: step^2 / 12 twice.
         if receiver.adc_bits is not None:
             step = full / 2 ** (receiver.adc_bits - 1)
             if self._keep("quantisation", step**2 / 6, e.noise_m2, "white noise of rounding"):
                 self._step = np.float32(step)
+        # The largest sample, if everything were in phase for a moment.
         moving = sum(math.sqrt(mover.peak_m2) for mover in e.movers)
         other = float(np.abs(self._steering).max())
         most = float(abs(self._dc)) + most + other + moving + 4 * math.sqrt(e.noise_m2)
@@ -295,6 +310,7 @@ class ReceiverStage:
 
         They begin with chirp ``first``.
         """
+        # In the order of the signal: another radar, then the mixer, the filters and the converter.
         rows = first // chirps_together(self._radar) + np.arange(len(received))
         if self._steering.any():
             self._add_ramps(rows, received)
@@ -313,6 +329,8 @@ class ReceiverStage:
     def _add_ramps(self, rows: NDArray[np.int64], samples: _Samples) -> None:
         radar, other = self._radar, self._receiver.interferer
         assert other is not None
+        # When and at which frequency the sampling of each row begins, because the other radar has a
+        # clock of its own.
         chirps = rows * chirps_together(radar)
         starts = radar.centres_of(chirps) - radar.samples_per_chirp / radar.sample_rate_hz / 2
         tx = radar.tx_of_chirp(chirps)

@@ -116,11 +116,15 @@ def synthesize(
             f"synthesize: times has shape {times.shape}; with these echoes it must be "
             f"{echoes.length.shape[:1]}"
         )
+    # A chirp is a moment: an echo that moves inside of one is off, and a Tx with a carrier of its
+    # own turns its echoes by it.
     warn_of_motion_in_chirp(echoes, radar, times)
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
     shape = (*echoes.length.shape[:2], radar.samples_per_chirp)
     out = array_to_fill("synthesize", out, shape, dtype)
+    # Many echoes go through the NUFFT, few are summed tone by tone, in float32 where that is
+    # precise enough.
     if _are_many(echoes, radar, out.dtype):
         sum_by_nufft(_tones(echoes, echoes.amplitude, radar, legvander), out)
         return out
@@ -128,6 +132,7 @@ def synthesize(
     tones = _tones(echoes, amplitude, radar, polyvander)
     in_float32 = out.dtype == np.complex64 and len(echoes.frequency) <= _MOST_POWERS
     tables = tone_tables(np.float32 if in_float32 else np.float64)
+    # Two tasks for each thread, none of them too small.
     at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
 
     def fill(begin: int) -> None:
@@ -167,6 +172,7 @@ def weights_of_nodes(
 
     The basis gives its polynomials (node, term) at x (node,) up to a degree; Legendre's by default.
     """
+    # Coefficients over the sweep, from -1 to 1 about its middle sample.
     middle = radar.samples_per_chirp // 2 / radar.samples_per_chirp
     x = 2 * ((frequency - radar.sampled_start_hz) / radar.sampled_bandwidth_hz - middle)
     return np.asarray(np.linalg.inv(basis(x, len(x) - 1)), dtype=np.float64)
@@ -178,7 +184,7 @@ def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.floa
     same = np.flatnonzero(echoes.tx == echoes.tx[0]) if len(times) else np.zeros(0, dtype=np.int64)
     if len(same) < 2:
         return
-    # Neighbours, for what is fast soon leaves the band; the last two among them.
+    # Neighbours, because what is fast soon leaves the band; the last two among them.
     step = max(1, (len(same) - 1) // _INSTANTS)
     before, after = same[-2::-step], same[:0:-step]
     # The ends of the line of receivers: those in between see no other speed.
@@ -188,6 +194,7 @@ def warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.floa
     bins_of_rate = radar.sampled_duration_s / (2 * radar.range_bin_m)
     if rate.max(initial=0.0) * bins_of_rate <= MAX_BINS_IN_CHIRP:
         return
+    # An echo that is occluded or out of the band has no samples that could be wrong.
     for chirps, length in zip((before, after), lengths, strict=True):
         visible = (echoes.amplitude[:, chirps, ends] != 0).any(axis=0)
         rate[~(visible & _in_band(length, radar))] = 0.0

@@ -40,5 +40,6 @@ class Moment(NamedTuple):
         """Read both clocks."""
         with _lock:
             now_s = time.perf_counter()
+            # What was warmed up before, and what is being warmed up at this moment.
             warm_up_s = _before + (now_s - _since if _inside else 0.0)
         return cls(now_s - warm_up_s, warm_up_s)

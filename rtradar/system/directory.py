@@ -71,6 +71,7 @@ class Directory:
         """Open the directory that holds a file of a relative name; make it if asked."""
         with ExitStack() as stack:
             here = self
+            # Folder by folder, each relative to the one before: a link on the way is refused.
             for part in name.split("/")[:-1]:
                 if make and not here.mode(part):
                     os.mkdir(here._name(part), dir_fd=here._descriptor)
@@ -82,6 +83,8 @@ class Directory:
         flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(
             os, "O_BINARY", 0
         )
+        # No link is followed, and a pipe is not waited for; what is no regular file is closed
+        # again.
         flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(self._name(name), flags, 0o666, dir_fd=self._descriptor)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):

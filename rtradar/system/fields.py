@@ -105,6 +105,8 @@ def rules_of(kind: type) -> Mapping[str, Rule]:
 def annotations_of(kind: type) -> dict[str, Any]:
     """Return the annotations of a class, with what is in ``Annotated``."""
     unknown: dict[str, Any] = {}
+    # Each class that is not there at run time is taken for anything, one by one, until all names
+    # are known.
     while True:
         try:
             return hints_of(kind, localns=unknown, include_extras=True)
@@ -148,6 +150,7 @@ def read_range(where: str, key: str, value: Any, least: float, most: float) -> t
 
 def found_in(hint: Any, what: type[_Thing]) -> _Thing | None:
     """Return what an annotation has of a class in ``Annotated``, such as its `Limits`."""
+    # What stands at this level goes before what stands deeper, as in a union or a tuple.
     given = [one for one in get_args(hint) if isinstance(one, what)]
     below = (found_in(one, what) for one in get_args(hint))
     return next((one for one in (*given, *below) if one is not None), None)
@@ -171,11 +174,13 @@ def read_table(kind: type[_Thing], where: str, table: Table) -> _Thing:
 def _rule(hint: Any, limits: Limits | None = None) -> Rule:
     """Make the rule of a type."""
     own, args = get_origin(hint) or hint, get_args(hint)
+    # The limits belong to the type that they annotate, and to the types inside of it.
     if own is Annotated:
         given = [one for one in args[1:] if isinstance(one, Limits)]
         return _rule(args[0], given[0] if given else limits)
     bounds = limits or Limits()
     allowed = args if own is Literal else bounds.allowed
+    # What reads the value, by the kind of the type.
     if own in (Union, UnionType):
         found = _any_of(
             [_rule(one, limits) for one in args if one is not NoneType], NoneType in args
@@ -257,6 +262,7 @@ def _any_of(rules: Sequence[Rule], or_none: bool) -> Rule:
                 continue
         return rules[-1].read(value)
 
+    # What is allowed, in one sentence for all kinds.
     first, *others = (rule.wanted for rule in rules)
     return Rule(read, " or ".join([first, *(one.removeprefix("it must be ") for one in others)]))
 
@@ -268,6 +274,7 @@ def _list_of(args: tuple[Any, ...], limits: Limits | None) -> Rule:
     least, most = (limits or Limits()).counts if even else (len(args), len(args))
 
     def read(value: Any) -> Any:
+        # Arrays and any sequences or iterators of values become tuples; a text is none of them.
         own = value.tolist() if hasattr(value, "tolist") else value  # an array of NumPy
         if not isinstance(own, Sequence | Iterator) or isinstance(own, str | bytes):
             raise ValueError

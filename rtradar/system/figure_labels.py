@@ -75,7 +75,7 @@ def place_labels(
 ) -> list[str]:
     """Write each label at the first of its places where it covers no other and is inside the axes.
 
-    The limits of the axes must be final, for places are compared on the screen.
+    The limits of the axes must be final, because places are compared on the screen.
 
     Parameters
     ----------
@@ -91,6 +91,7 @@ def place_labels(
     list of str
         Texts for which there was no place.
     """
+    # Everything is compared in pixels, for which the layout of the figure must be settled.
     figure: Any = axes.get_figure(root=True)
     figure.draw_without_rendering()  # settles where the axes are
     theme, inside, pixels = theme_of(axes), axes.get_window_extent(), figure.dpi / 72
@@ -102,6 +103,7 @@ def place_labels(
     words: dict[str, Any] = {"fontsize": STYLE["font.size"], "bbox": box, "parse_math": False}
     words |= {"ha": "center", "va": "center", "zorder": 10, **style}
     left_out = []
+    # Labels are placed one by one; each is an obstacle for those after it.
     for label in labels:
         turned: dict[str, Any] = {"rotation": label.rotation, "color": label.colour}
         text = axes.annotate(label.text, label.places[0][0], (0, 0), **words, **turned)
@@ -113,6 +115,7 @@ def place_labels(
             if (low >= inside.min).all() and (high <= inside.max).all() and not np.any(covered):
                 lows, highs = [*lows, low], [*highs, high]
                 text.xy, text.xyann = point, offset
+                # A label that stands far from its point needs a line to it.
                 if math.hypot(*offset) > _LEADER_PT and not label.rotation:
                     line: dict[str, Any] = {
                         "arrowstyle": "-",

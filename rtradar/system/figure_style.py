@@ -1,6 +1,6 @@
 """The one style of all pictures: size, fonts, grid and colours, in a light and a dark variant.
 
-Nothing here changes Matplotlib's global settings, for pictures of a run may be drawn in several
+Nothing here changes Matplotlib's global settings, because pictures of a run may be drawn in several
 threads, and the user's own figures keep their style. A picture is drawn on axes in the colours of
 `theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
 
@@ -250,6 +250,7 @@ def dress(
         Width of title and note, as a multiple of the width of the axes: their number where the axes
         are the first of several side by side.
     """
+    # Texts are broken to the width that the axes have on the page.
     theme = theme_of(axes)
     is_3d = axes.name == "3d"
     figure: Any = axes.get_figure(root=True)
@@ -264,6 +265,8 @@ def dress(
         size = STYLE["xtick.labelsize"]
         axis.set_tick_params(labelsize=size, color=theme.text, labelcolor=theme.text)
         axis.get_offset_text().set_color(theme.text)
+    # Frame, background and grid in the colours of the theme. A map covers its background and has no
+    # grid.
     for spine in axes.spines.values():
         spine.set_edgecolor(theme.faint)
     if is_3d or not axes.images:
@@ -277,12 +280,14 @@ def dress(
         style = {"linewidth": STYLE["grid.linewidth"], "alpha": STYLE["grid.alpha"]}
         axes.grid(True, color=theme.faint, **style)
         axes.set_axisbelow(True)
+    # A legend that lies over the picture lets it shine through.
     if (legend := axes.get_legend()) is not None:
         legend.get_frame().set(facecolor=theme.page, edgecolor=theme.faint, alpha=0.85)
         for text in legend.get_texts():
             text.set(color=theme.text, fontsize=STYLE["legend.fontsize"], parse_math=False)
     if note:
         size = STYLE["font.size"]
+        # The note begins below ticks and label.
         lines = 1 + axes.get_xlabel().count("\n")
         below = 22 + 1.3 * STYLE["axes.labelsize"] * lines
         style = {"fontsize": size, "parse_math": False, "va": "top", "annotation_clip": False}
@@ -319,6 +324,7 @@ def fit(text: str, width_pt: float, size_pt: float) -> str:
     lines = []
     for paragraph in text.split("\n"):
         line = ""
+        # Words fill a line until one does not fit, which begins the next.
         for word in paragraph.split():
             joined = f"{line} {word}" if line else word
             if _width_pt(joined, size_pt) <= width_pt:
@@ -327,6 +333,7 @@ def fit(text: str, width_pt: float, size_pt: float) -> str:
             if line:
                 lines.append(line)
             line = ""
+            # A word that is too long by itself goes on in pieces.
             for piece in re.findall(r"[^-_/.]*[-_/.]|[^-_/.]+", word):
                 for part in (piece,) if _width_pt(piece, size_pt) <= width_pt else piece:
                     if line and _width_pt(line + part, size_pt) > width_pt:
@@ -340,6 +347,7 @@ def fit(text: str, width_pt: float, size_pt: float) -> str:
 def _width_pt(text: str, size_pt: float) -> float:
     from matplotlib.font_manager import FontProperties, findfont, get_font
 
+    # Widths are measured in the font itself, in 64ths of a point.
     font = get_font(findfont(FontProperties()))  # one for each thread
     font.set_size(size_pt, 72)
     font.set_text(text.strip())

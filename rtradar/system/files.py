@@ -67,6 +67,8 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             )
     # Not by the process alone: on a shared disk another machine may write the same file.
     beside = target.with_name(f".{target.name}.{os.urandom(_TOKEN_BYTES).hex()}.part")
+    # The file grows under a name of its own and takes its place in one step; whatever fails, the
+    # part is removed.
     with cleanup_on_exit(lambda: beside.unlink(missing_ok=True)):
         try:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
@@ -124,6 +126,7 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
     """Write plain values as JSON, whole or not at all; InputError, for ``--json``, if it fails."""
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     try:
+        # Streams and pipes are written to; only a file can be replaced as a whole.
         if (stream := _standard_stream(path)) is not None:
             stream.write(text)
             stream.flush()
@@ -179,6 +182,7 @@ def read_arrays(
     import numpy as np  # the command line refuses input before it takes that long
 
     found = {}
+    # Every size is checked before memory is reserved for it, because a header may claim anything.
     with _archive(path, most_bytes, comment) as archive:
         for entry in archive.infolist():
             name = entry.filename.removesuffix(".npy")
@@ -207,6 +211,7 @@ def _archive(path: Path, most_bytes: int, comment: int | None) -> Iterator[zipfi
     """Open an archive; OSError, or ValueError if it is none, is damaged or larger than that."""
     with open_regular(path) as file:
         try:
+            # An archive without compression cannot hold more than its file has.
             if comment is not None:
                 most_bytes = min(most_bytes, os.fstat(file.fileno()).st_size)
             with zipfile.ZipFile(file) as archive:
@@ -296,7 +301,8 @@ def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
     """Open a regular file for reading; OSError if it is a folder, pipe, socket or device.
 
     Links are followed. Opening a pipe would wait for somebody to write to it, and opening a device
-    may move it, so the kind is checked before; and after, for the name may have changed its file.
+    may move it, so the kind is checked before; and after, because the name may have changed its
+    file.
     """
     try:
         _check_regular(path, os.stat(path))

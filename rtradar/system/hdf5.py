@@ -85,6 +85,7 @@ def stored(file: Any, name: str, *, compressed: bool = False) -> Any:
     """
     import h5py
 
+    # Each group on the way is looked at, so that no link leads out of the file.
     data = file
     for step in name.split("/"):
         # Asked before it is followed: a link to another file would have that opened.
@@ -96,6 +97,7 @@ def stored(file: Any, name: str, *, compressed: bool = False) -> Any:
         data = data[step]
     if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
         raise ValueError(f"{name} is not in this file")
+    # A dataset that claims more than the file can hold would take memory for nothing.
     most = file.id.get_filesize() * (_MOST_COMPRESSION if compressed else 1)
     if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > most:
         raise ValueError(f"{name} claims more than there is")

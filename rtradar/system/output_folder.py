@@ -98,6 +98,8 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
     """
     with ExitStack() as stack:
         try:
+            # Folders that are made here go again after an error; files of others under names of
+            # ours are refused before the work.
             made = [folder for folder in (out, *out.parents) if not folder.exists()]
             out.mkdir(parents=True, exist_ok=True)
             place = stack.enter_context(Directory.at(out))
@@ -112,6 +114,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
         def abandon() -> None:
             if moving:
                 return  # what is moved and what is not belong together
+            # The work folder goes, and folders that were made for it if nothing else is in them.
             _discard(place, work)
             for folder in made if place.is_in_place() else ():
                 with suppress(OSError):
@@ -130,6 +133,8 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                     # Files that a killed command had still to move are replaced now.
                     _remove_leftovers(place)
             except BaseException as error:
+                # Once files have begun to move nothing can be undone: the user is told where the
+                # rest is.
                 if moving and isinstance(error, OSError):
                     raise InputError(
                         f"cannot move the files of '{work.path}' into '{out}': {error.strerror}; "
@@ -164,6 +169,7 @@ def new_folder(out: Path) -> Iterator[Path]:
             place = stack.enter_context(Directory.at(out.parent))
             _remove_leftovers(place, prefix=_NEW_PREFIX)
             work = stack.enter_context(_new_work_folder(place, _NEW_PREFIX))
+            # At the end, or if a signal ends the process, whatever is left of the work folder goes.
             stack.callback(_discard, place, work)
             stack.enter_context(cleanup_on_exit(lambda: _discard(place, work)))
             made = work.path / "made"
@@ -237,6 +243,8 @@ def _existing(directory: Directory, kind: OutputFiles, prefix: str = "") -> dict
     """Return the mode of each entry under a name of the command's files and folders."""
     found: dict[str, int] = {}
     names = directory.names()
+    # Only names that this command gives to its files are looked at; all others are not its
+    # business.
     for name in sorted(names):
         path, own = prefix + name, name.lower()
         if kind.is_file(path) or kind.is_folder(path):
@@ -299,6 +307,7 @@ def _held(place: Directory, kind: OutputFiles) -> tuple[dict[str, int], set[str]
 def _refuse_foreign(place: Directory, kind: OutputFiles, overwrite: bool) -> None:
     found, owned = _held(place, kind)
     foreign = sorted(found.keys() - owned)
+    # Even with `overwrite` only files and links are replaced, never folders or devices.
     odd = [
         name
         for name in foreign
@@ -334,11 +343,13 @@ def _check_made(work: Directory, kind: OutputFiles) -> None:
 
 def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
     """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
+    # From here on the folder says that it is unfinished, with the names of old and new files.
     made, owned = list(_all_files(work)), _held(place, kind)[1]
     said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
     with work.open_file(_UNFINISHED, write=True) as file:
         file.write((json.dumps(said, indent=1) + "\n").encode())
     work.move(_UNFINISHED, place, kind.listing)
+    # Old files that have no successor go, then new ones come, then folders that are empty now go.
     for name in sorted(owned - {*made, kind.listing}):
         with place.parent_of(name) as folder:
             folder.remove(name.rpartition("/")[2])
@@ -383,6 +394,7 @@ def _remove_leftovers(place: Directory, but: object = None, *, prefix: str = _PR
     for name in place.names():
         if not re.fullmatch(re.escape(prefix) + _DIGITS, name) or name == but:
             continue
+        # Ours, of this user, and of a command that lives no more: a living one holds the lock.
         with suppress(OSError), place.open(name) as folder:
             status = folder.status()
             with folder.open_file(_MARKER) as file:

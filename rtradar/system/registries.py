@@ -111,6 +111,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
             raise InputError(f"{self.noun} '{name}' is gone; {self.gone[name]}")
 
     def __getitem__(self, name: str) -> Any:
+        # A name must lead to one thing, whoever brings it.
         installed = self._installed.get(name, [])
         if len(installed) + (name in self.built_in) + (name in self._registered) > 1:
             owners = ["rtradar"] * (name in self.built_in) + [
@@ -122,12 +123,14 @@ class Registry(Mapping[str, Callable[..., Any]]):
             )
         if name in self._registered:
             return self._registered[name]
+        # What comes with rtradar is imported when it is asked for.
         if name in self.built_in:
             module, _, attribute = self.built_in[name].partition(":")
             made: Callable[..., Any] = getattr(import_module(module), attribute)
             return made
         if not installed:
             raise KeyError(name)
+        # What another package brings may fail as it is loaded.
         with self.guarded(name):
             made = installed[0].load()
         if not callable(made):
@@ -320,6 +323,7 @@ def scene_table(source: str | Path) -> tuple[Path, Table]:
         Where the file cannot be read or is not TOML, or no scene has the name.
     """
     path, known = check_path("scene", source, or_name=True), scene_files()
+    # A seed, a name, or the path of a file.
     if (seed := str(source).removeprefix(RANDOM_SCENE)) != str(source):
         if not (seed.isascii() and seed.isdecimal()):
             raise InputError(f"scene {brief(str(source))}: give a seed, as in {RANDOM_SCENE}7")

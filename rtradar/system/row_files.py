@@ -27,7 +27,7 @@ _MOST_IN_MEMORY = 1_000_000
 """Bytes: about 10 s of a recording at 120 Hz."""
 
 _MOST_FILES = 64
-"""At once, for a process may open only so many (256 on macOS); arrays beyond stay in memory."""
+"""At once, because a process may open only so many (256 on macOS); arrays beyond stay in memory."""
 
 _ROWS_AT_ONCE = 1024
 
@@ -50,6 +50,7 @@ class FileBackedRows:
         InputError
             Where the folder for temporary files has no room for them.
         """
+        # Few rows stay in memory; many go into a file, as long as there may be one more.
         self._waiting.append(np.ascontiguousarray(rows, dtype=np.float64))
         self._bytes += rows.size * 8
         if self._bytes <= _MOST_IN_MEMORY or (self._file is None and len(_mapped) >= _MOST_FILES):
@@ -78,6 +79,7 @@ class FileBackedRows:
         if self._file is None:
             return self._waiting[0] if len(self._waiting) == 1 else np.concatenate(self._waiting)
         try:
+            # The file is mapped and closed: it goes when nobody holds the array any more.
             mapping = mmap.mmap(self._file.fileno(), 0, access=mmap.ACCESS_READ)
             _mapped.add(mapping)
             flat = np.frombuffer(mapping, dtype=np.float64)
@@ -116,6 +118,7 @@ def column(array: NDArray[np.float64], number: int | list[int]) -> NDArray[np.fl
 def release_pages(*arrays: NDArray[np.float64]) -> None:
     """Release the pages of arrays that are kept in a file; others stay as they are."""
     for array in arrays:
+        # The mapping is at the bottom of all views of an array.
         owner: Any = array
         while isinstance(owner, np.ndarray):
             owner = owner.base

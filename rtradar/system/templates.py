@@ -52,6 +52,7 @@ def aligned(text: str) -> str:
         Text with padded cells.
     """
     lines: list[str] = []
+    # Each run of lines that begin with a bar is a table; other lines stay.
     for is_table, block in groupby(text.split("\n"), lambda line: line.startswith("|")):
         if not is_table:
             lines += block

@@ -16,7 +16,7 @@ from rtradar.system.checks import brief
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, for workers that share cores."""
 
-_CORES = os.cpu_count() or 1  # once, for the system reads a file to tell
+_CORES = os.cpu_count() or 1  # once, because the system reads a file to tell
 
 _PARTS = 4
 """Parts of its work that each thread gets, so that a slower one has fewer."""
@@ -59,6 +59,7 @@ def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
     NumPy, the FFT and compiled loops release the interpreter lock, so threads pay. The caller works
     too, because waking up takes as long as many an item.
     """
+    # All threads take from one iterator, so that a slow item keeps only one of them busy.
     results: list[Any] = [None] * len(items)
     failed: dict[int, BaseException] = {}
     left = iter(enumerate(items))

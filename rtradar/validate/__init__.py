@@ -119,6 +119,7 @@ def choose(found: Sequence[Claim], only: str | None) -> list[tuple[Claim, str | 
         )
     if only is None:
         return [(claim, None) for claim in found]
+    # The name of a script stands for all of its claims, a key for one of them.
     by_name = [claim for claim in found if claim.name == only.removesuffix(".py")]
     by_key = [claim for claim in found if only in claim.keys and claim not in by_name]
     if not by_name and not by_key:
@@ -141,14 +142,18 @@ def run_claim(
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        # Files, for a process that outlives the script would keep pipes open.
+        # Files, because a process that outlives the script would keep pipes open.
         errors = folder / "stderr"
         with errors.open("wb") as stderr:
             done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=stderr, check=False)
         text = errors.read_text(encoding="utf-8", errors="replace")
+        # The last line of an error says what went wrong; for a script that hung it is the
+        # traceback.
         said = text.strip().splitlines() or ["nothing on stderr"]
         hung = [place for place, line in enumerate(said) if line.startswith("Timeout (")]
         last = " ".join(said[hung[0] :][:_FRAMES]) if hung else said[-1]
+        # A script that left its rows has done its work. Its status then only tells whether all of
+        # them are within their limits.
         rows, trouble = [], f"ended with status {done.returncode} and left no rows: {last}"
         cpu_seconds, left_out = 0.0, tuple[str, ...]()
         with suppress(OSError, ValueError, KeyError, TypeError):
@@ -242,6 +247,7 @@ def validate(
     InputError
         If ``only`` names nothing, or a file cannot be written; nothing has run then.
     """
+    # Places that cannot be written are refused before anything runs.
     check_place(json_path)
     if readme is not None:
         if quick or only is not None:
@@ -256,6 +262,7 @@ def validate(
         except OSError as error:
             raise InputError(f"--figure {figures}: {error.strerror}; name a folder") from None
         figures = figures.resolve()
+    # Each script gets its line as soon as it ends.
     outcomes = []
     tqdm.write(_HEAD)
     with tqdm(total=len(chosen), unit="script", disable=None) as bar:
@@ -265,6 +272,7 @@ def validate(
             bar.update()
             tqdm.write(_text("outcome.txt", outcome=outcome, worst=worst))
             sys.stdout.flush()
+    # The exit status is that of all rows together.
     outcomes.sort(key=lambda outcome: outcome.claim.name)
     rows = [row for outcome in outcomes for row in outcome.rows]
     judged = [row for row in rows if row.tolerance is not None]
@@ -315,6 +323,7 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
     """Table for docs/validation.md: a line for each claim, with the worst of its judged rows."""
+    # Rows with the same words and the same limit share a line, which shows the worst of them.
     groups: dict[tuple[str, str, str, str, str], list[Row]] = {}
     for outcome in outcomes:
         for row in outcome.rows:

@@ -67,6 +67,8 @@ def used_up(error: float, tolerance: float) -> float:
     """Fraction of a limit that a figure uses; for a level below zero, the limit over the level."""
     if not math.isfinite(error):
         return math.inf
+    # A level below 0 dB should be as low as possible: a floor of -119 dB uses 80/119 of a limit of
+    # -80 dB.
     if tolerance > 0:
         return max(error, 0.0) / tolerance
     if tolerance < 0:
@@ -85,6 +87,7 @@ def judged(
 ) -> Row:
     """Make a row whose error, |ours - reference| or else ours, must not exceed its tolerance."""
     row = reported(claim, quantity, unit, ours, **details)
+    # Without a reference, the figure itself is the error.
     error = row.error if row.reference is None else abs(row.error)
     limit = float(tolerance)
     return replace(row, error=error, tolerance=limit, passed=row.passed and error <= limit)

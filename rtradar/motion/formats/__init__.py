@@ -76,6 +76,8 @@ def load_motion(
         "up": check_up(where, up),
         "rate_hz": check_rate(where, rate_hz),
     }
+    # Readers differ in what they need to be told; what one does not take is refused if it was
+    # given.
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters
         for option, value in given.items():
@@ -85,6 +87,8 @@ def load_motion(
         motion = read(file, **{option: value for option, value in given.items() if option in taken})
     if not isinstance(motion, Motion):
         raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")
+    # What a run file needs to read the same again: the keys of a person, and the digests of all
+    # files that were read, with the user's own names of joints if there are any.
     keys: dict[str, Any] = {"motion": str(file.absolute())}
     if skeleton is not None:
         keys["skeleton"] = str(Path(skeleton).absolute())

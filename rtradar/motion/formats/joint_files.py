@@ -111,6 +111,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
                 continue
             if len(cells) != len(header):
                 raise text.fail(f"{len(cells)} cells where the header has {len(header)} columns")
+            # The axis is text among numbers, so it is taken out before the cells are converted.
             if "up" in columns:
                 own, cells[columns["up"]] = cells[columns["up"]], ""
                 if rows and own != up:
@@ -122,6 +123,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
                 was = f"{rows[-1][rate]:g}, and was {rows[0][rate]:g}"
                 raise text.fail(f"rate_hz is {was}; it must not change, give time_s")
             text.check_size(len(joints), len(rows))
+    # The table in the form of an archive, so that both are checked alike.
     values = np.array(rows).reshape(len(rows), len(header))
     places = values[:, list(joints.values())]
     arrays = {"joints": np.array(list(joints)), "positions": places, "up": np.array(up)}
@@ -133,6 +135,7 @@ def read_csv(path: Path, rate_hz: float | None = None) -> JointRecording:
 def _columns(text: TextFile, header: list[str]) -> tuple[dict[str, int], dict[str, list[int]]]:
     """Columns of what is not a coordinate, and three of each joint."""
     others, joints = dict[str, int](), dict[str, dict[str, int]]()
+    # A column is a coordinate of a joint by its ending, or one of the few known names.
     for k, cell in enumerate(header):
         found = re.fullmatch(r"(.+)[_. ]([xyz])", cell, re.IGNORECASE)
         if found:
@@ -159,6 +162,7 @@ def checked(
     path: Path, arrays: Mapping[str, NDArray[Any]], rate_hz: float | None
 ) -> JointRecording:
     """Make a recording of what a file holds; a rate that is given counts in place of the file's."""
+    # The user's rate also takes the place of times.
     if rate_hz is not None:
         arrays = {name: array for name, array in arrays.items() if name != "time_s"}
         arrays["rate_hz"] = np.array(rate_hz)
@@ -174,6 +178,7 @@ def checked(
             f"{LEAST_FRAMES} frames, and at most {_MOST_JOINTS} joints and {_MOST_PLACES} places "
             "of joints: cut it into shorter ones"
         )
+    # Names that differ in case or namespace alone would be one node later.
     names = tuple(map(str, named))
     known = [plain(name) for name in names]
     for name in names:
@@ -183,6 +188,7 @@ def checked(
     up = str(arrays["up"]).strip().lower() if "up" in arrays else ""
     if up and up not in UPWARD:
         raise InputError(f"{path}: up is {brief(up)}; it must be one of {', '.join(UPWARD)}")
+    # Frames hardly a moment after another are left out, because a spline would swing between them.
     times = _times(path, arrays, len(given))
     kept = _apart(times)
     return JointRecording(path, names, positions[kept], times[kept], up, len(times) - kept.sum())
@@ -215,6 +221,7 @@ def _apart(times: Array) -> NDArray[np.bool_]:
     """Which frames (frame,) are to be kept: those a step after the last one that is kept."""
     least = _LEAST_STEP * float(np.median(np.diff(times)))
     kept, last = np.ones(len(times), dtype=bool), times[0]
+    # Against the last frame that was kept, so that a row of tiny steps is not kept whole.
     for frame in range(1, len(times)):
         kept[frame] = times[frame] - last >= least
         last = times[frame] if kept[frame] else last
@@ -248,7 +255,7 @@ def _times(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array
 def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     """Positions (frame, joint, 3) of the joints, in the axes of the file [m], and the rate.
 
-    Under the keys that an archive of joint positions has.
+    They have the keys of an archive of joint positions.
     """
     person = _mean_person()
     joints = person["joints"]
@@ -260,8 +267,10 @@ def _as_positions(path: Path, arrays: Mapping[str, NDArray[Any]]) -> dict[str, N
     for name, values in (("trans", trans), ("rotations", turned)):
         for frame in np.flatnonzero(~np.isfinite(values).all(axis=1)):
             raise InputError(f"{path}: {name} are not finite in frame {frame + 1}; mend them")
+    # The rest pose of SMPL-X has its pelvis elsewhere.
     kind = "smplx" if "x" in str(arrays.get("surface_model_type", "")) else "others"
     places, world = dict[str, Array](), dict[str, Rotation]()
+    # Forward kinematics down the tree: the rotation of a joint carries the offsets of its children.
     for number, (joint, own) in enumerate(joints.items()):
         local, above = Rotation.from_rotvec(turned[:, 3 * number : 3 * number + 3]), own["parent"]
         if above:

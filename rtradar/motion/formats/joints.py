@@ -60,7 +60,7 @@ LONGEST_GAP_S = 0.25
 """Longest gap that is bridged [s]: a quarter of a step of a walk."""
 
 RATE_HZ = 120.0
-"""Least rate of the motion that is made [Hz], for `Motion` interpolates its root by PCHIP, which
+"""Least rate of the motion that is made [Hz]. `Motion` interpolates its root by PCHIP, which
 flattens the crests of what is sampled more rarely."""
 
 _LEAST_KEPT = 1 / 3
@@ -98,6 +98,7 @@ def motion_of(
 ) -> Motion:
     """Make the motion of a rigid skeleton of joints that were measured one by one."""
     where = str(recording.path)
+    # The 22 nodes of the body by the names of the joints.
     convention = recognise(where, recording.names)
     nodes = node_positions(convention, recording.names, recording.positions, NODES)
     for unseen in np.flatnonzero(np.isnan(nodes[..., 0]).all(axis=0)):
@@ -105,18 +106,23 @@ def motion_of(
             f"{where}: the joint of node {NODES[unseen]!r} is never seen; add it, or take another "
             "recording"
         )
+    # Unit and axes, as far as they are said; what is not said follows from the person.
     up, usual = up or recording.up, recording.usual or convention.up
     to_world, unit_m, found = settled_nodes(where, nodes, unit_m=unit_m, up=up, usual=usual)
     rate_hz = 1 / float(np.median(np.diff(recording.times)))
     found = [*recording.findings, *found, rate_of(round(rate_hz, 3))]
     nodes = unit_m * nodes @ to_world.T
+    # Gaps: joints that a camera lost for a moment, the longest stretch without a long gap, and in
+    # it even times through the short ones.
     if convention.low_pass_hz:
         _drop_lost(nodes, recording.times)
     nodes, times = _longest_stretch(where, nodes, recording.times)
     nodes, rate_hz = _resampled(nodes, times, convention)
+    # Heads and feet are completed after the axes are known, because feet go on as the pelvis looks.
     pelvis, thorax = (_axes(where, nodes, sides) for sides in ("hip", "shoulder"))
     _complete(nodes, pelvis, convention)
     _keep_directions(where, nodes)
+    # A person who stands is put on the floor z = 0, whatever the origin of the file is.
     size = stature_of(nodes) / _NOMINAL_STATURE_M
     lowest = np.quantile(nodes[..., 2].min(axis=1), _ON_THE_FLOOR)
     nodes[..., 2] += _TOE_HEIGHT_M * size - lowest
@@ -141,12 +147,14 @@ def _drop_lost(nodes: Array, times: Array) -> None:
     right angle from one frame to the next. What hangs on such a joint was lost with it. Hands and
     feet may be foreshortened; `_complete` mends them.
     """
+    # A bone of a rigid body has one length; far from its median the joint at its end is wrong.
     bones, last = nodes - nodes[:, NODE_PARENTS], len(times) - 1
     spans = np.linalg.norm(bones, axis=2)
     usual = np.nanmedian(spans, axis=0)
     ends = np.array([node.endswith(("hand", "toe")) for node in NODES])
     lost = (spans > _TIMES_TOO_LONG * usual) | ((spans < _TIMES_TOO_SHORT * usual) & ~ends)
     turned = np.sum(bones[1:] * bones[:-1], axis=2) < 0
+    # Between two reversals of a bone within a short time the joint was somewhere else.
     for node in range(1, len(NODES)):
         turns = [0, *(1 + np.flatnonzero(turned[:, node])).tolist(), len(times)]
         for begin, end in itertools.pairwise(turns):
@@ -154,6 +162,7 @@ def _drop_lost(nodes: Array, times: Array) -> None:
             lost[begin:end, node] |= len(turns) > 2 and around <= LONGEST_GAP_S
         if NODES[NODE_PARENTS[node]][2:] in ("knee", "ankle", "elbow", "wrist"):
             lost[:, node] |= lost[:, NODE_PARENTS[node]]
+        # Longer stretches are kept as they are: they could not be bridged.
         for begin, end in runs(lost[:, node]):
             if times[min(end, last)] - times[max(begin - 1, 0)] <= LONGEST_GAP_S:
                 nodes[begin:end, node] = np.nan
@@ -163,13 +172,16 @@ def _longest_stretch(where: str, nodes: Array, times: Array) -> tuple[Array, Arr
     """Cut to the longest stretch in which no gap of any node is longer than `LONGEST_GAP_S`."""
     unseen = np.isnan(nodes[..., 0])
     out, last = np.zeros(len(times), dtype=bool), len(times) - 1
+    # Frames in a long gap of any node, or in one at an end, are out.
     for node in range(len(NODES)):
         for begin, end in runs(unseen[:, node]):
             at_an_end = begin == 0 or end > last
             if at_an_end or times[end] - times[begin - 1] > LONGEST_GAP_S:
                 out[begin:end] = True
+    # A jump in time is a gap of all nodes at once.
     breaks = 1 + np.flatnonzero(np.diff(times) > LONGEST_GAP_S)
     best = slice(0, 0)
+    # Of each stretch the part from its first to its last frame in which every node is seen.
     for begin, end in runs(~out):
         inside = breaks[(breaks > begin) & (breaks < end)] - begin
         for stretch in np.split(np.arange(begin, end), inside):
@@ -196,6 +208,7 @@ def _resampled(nodes: Array, times: Array, convention: Convention) -> tuple[Arra
         rate_hz = round(math.ceil(RATE_HZ * step - 1e-6) / step, 6)
     at = np.arange(int(times[-1] * rate_hz + 1e-6) + 1) / rate_hz
     made = np.empty((len(at), *nodes.shape[1:]))
+    # A spline through the frames in which a node was seen bridges its gaps.
     seen = ~np.isnan(nodes[..., 0])
     for own in np.unique(seen, axis=1).T:  # nodes that are seen in the same frames go together
         alike = np.flatnonzero((seen == own[:, None]).all(axis=0))
@@ -215,6 +228,7 @@ def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
     the joint that cameras find is at the instep. A hand or a head that is foreshortened, whose
     direction is uncertain then, points more and more as the forearm or the trunk does.
     """
+    # The head, which by convention ends at its top or somewhere inside.
     thigh = _length(nodes, "l_knee", "l_hip")
     head = of_node(nodes, "head") - of_node(nodes, "neck")
     upward = unit(middle(nodes, "shoulder") - middle(nodes, "hip"))
@@ -224,12 +238,14 @@ def _complete(nodes: Array, pelvis: Array, convention: Convention) -> None:
     nodes[:, NODES.index("head")] = of_node(nodes, "neck") + head
     for side in ("l", "r"):
         knee, ankle, toe = (of_node(nodes, f"{side}_{at}") for at in ("knee", "ankle", "toe"))
+        # The foot: its part along the shank stays, and its part across it is made long enough.
         shank = unit(knee - ankle)
         length = _FOOT_OF_SHANK * _length(nodes, f"{side}_knee", f"{side}_ankle")
         along = np.sum((toe - ankle) * shank, axis=1, keepdims=True) * shank
         reach = np.sqrt(np.maximum(length**2 - np.sum(along**2, axis=1, keepdims=True), 0))
         ahead = _lengthened(toe - ankle - along, np.cross(pelvis[..., 1], shank), reach)
         nodes[:, NODES.index(f"{side}_toe")] = ankle + along + ahead
+        # A hand keeps at least half of its median length, along the forearm if need be.
         elbow, wrist, end = (of_node(nodes, f"{side}_{at}") for at in ("elbow", "wrist", "hand"))
         half = 0.5 * _length(nodes, f"{side}_hand", f"{side}_wrist")
         hand = _lengthened(end - wrist, unit(wrist - elbow), half)
@@ -240,6 +256,7 @@ def _axes(where: str, nodes: Array, sides: str) -> Array:
     """Axes (frame, 3, 3) with the left of hips or shoulders; where it is upward, those before."""
     left = of_node(nodes, f"l_{sides}") - of_node(nodes, f"r_{sides}")
     upward = middle(nodes, "shoulder") - middle(nodes, "hip")
+    # Where the line of hips or shoulders is along the trunk, it says nothing of forward.
     forward = np.cross(left, upward)
     kept = _last(np.linalg.norm(forward, axis=1) > MINIMUM_PART_M**2)
     if kept is None:
@@ -265,6 +282,7 @@ def _last(good: NDArray[np.bool_]) -> NDArray[np.int64] | None:
     """Index of the last good frame at each, or the first one; None where most are not."""
     if good.mean() < 0.5:
         return None
+    # The running maximum of the indices of good frames; frames before the first good one take that.
     return np.maximum.accumulate(np.where(good, np.arange(len(good)), int(np.argmax(good))))
 
 

@@ -100,12 +100,16 @@ def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: floa
         raise InputError(f"{path}: no frame of markers in this file; export it again")
     check_number(where, f"{read.rate_key} [frames a second]", read.rate_hz, 1.0, 100_000.0)
     by, unit_m = "given" if unit_m else "the file says", unit_m or UNITS_M.get(read.unit.lower())
+    # A file of points may hold joints in place of markers: where all joints of a known set are
+    # there, it is read as a recording of joints.
     there = {plain(label) for label in read.names}
     known = min(conventions("joints"), key=lambda known: len(known.missing(there)))
     if not known.missing(there):
         names, rate = np.array([name.strip(" \0") for name in read.names]), np.array(read.rate_hz)
         given = {"positions": read.positions, "joints": names, "rate_hz": rate}
         return motion_of(replace(checked(path, given, None), usual=read.up), unit_m, up)
+    # Markers: gaps are bridged, centres of joints are found inward of the skin, and all is turned
+    # to the world.
     places = np.moveaxis(bridged(chosen(read, NEEDED)), 1, 0)
     centres, pelvis, thorax = joint_centres(dict(zip(NEEDED, places, strict=True)))
     to_world, unit_m, found = settled_nodes(
@@ -120,6 +124,7 @@ def _motion_of(read: Points, unit_m: float | None, up: str | None, rate_hz: floa
 def read_c3d(path: Path) -> Points:
     """Read the points of a C3D file, gaps and all, in its axes and its unit."""
     try:
+        # The reader warns, and does not fail, where a file ends early.
         with (
             _Bounded(open_regular(path).detach()) as handle,
             warnings.catch_warnings(record=True) as caught,
@@ -148,6 +153,8 @@ def read_c3d(path: Path) -> Points:
 def _read_trc(path: Path) -> Points:
     """Read a table of tabs, below a header of five lines."""
     with TextFile(path, "TRC") as text:
+        # A header of five lines: the kind of file, names of its values, these values, the labels of
+        # the markers, and the labels of their coordinates.
         lines = iter(text)
         first = next(lines, "")
         names = next(lines, "").split()
@@ -156,6 +163,7 @@ def _read_trc(path: Path) -> Points:
             raise text.fail("not a TRC file (PathFileType, then DataRate, Units, ...)")
         labels = [word.strip() for word in next(lines, "").split("\t")[2:] if word.strip()]
         next(lines, "")
+        # A row may end early, where the last markers are not seen, but has no cells beyond them.
         rows, width = list[list[float]](), 2 + 3 * len(labels)
         for line in lines:
             cells = [cell.strip() for cell in line.rstrip("\r\n").split("\t")]
@@ -184,6 +192,7 @@ def bridged(seen: Points) -> NDArray[np.float64]:
         unseen = np.isnan(positions[:, k, 0])
         if not unseen.any():
             continue
+        # A gap at an end has no neighbours on one side, and a long one could hide any movement.
         for begin, end in runs(unseen):
             first, last = seen.first_frame + begin, seen.first_frame + end - 1
             where = f"{seen.path}: marker {name} is not seen in frames {first} to {last}"
@@ -221,6 +230,7 @@ def _read(path: Path, handle: object) -> Points:
 
     frames = [points for _, points, _ in reader.read_frames(copy=True)]
     points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
+    # A negative residual is how C3D says that a point was not seen.
     places = np.where(points[..., 3:4] < 0, np.float32(np.nan), points[..., :3])
     up = text("POINT:Y_SCREEN").lower().removeprefix("+")
     return Points(
@@ -237,6 +247,7 @@ def _read(path: Path, handle: object) -> Points:
 
 def _column(path: Path, labels: tuple[str, ...], name: str) -> int:
     """Column of a marker, by its name in the set of CMU or by that of another set."""
+    # The tables of names have sides as `l_` and `r_`.
     key = f"{name[0]}_{name[1:]}" if len(name) > 3 and name[0] in "LR" else name
     others = (known.joints.get(key.lower(), ()) for known in conventions("markers"))
     wanted = [plain(name), *chain.from_iterable(others)]
@@ -296,11 +307,13 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     nodes (frame, node, 3); the rotations of pelvis and thorax (frame, 3, 3) have columns forward,
     left and up.
     """
+    # The offsets of the table grow with the person, whose size is measured by the shanks.
     frames = _segments(markers)
     knees, ankles = ([markers[side + end] for side in "LR"] for end in ("KNE", "ANK"))
     shanks = np.linalg.norm(np.subtract(knees, ankles), axis=2)
     size = float(np.median(shanks)) / SHANK_M
     centres = []
+    # Offsets are given for the left side; those of the right are mirrored.
     for node in NODES:
         side = node[0].upper()
         centre = CENTRES[node if node in CENTRES else node[2:]]
@@ -324,11 +337,13 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
         forward=middle("CLAV", "STRN") - middle("C7", "T10"),
     )
     frames = {"thorax": thorax}
+    # Four markers around waist and head: left is between the sides, forward between front and back.
     for name, end in (("pelvis", "WT"), ("head", "HD")):
         frames[name] = level_axes(
             middle(f"LF{end}", f"LB{end}") - middle(f"RF{end}", f"RB{end}"),
             middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
         )
+    # Limbs: up along the bone, and forward by toes, by the bend of the elbow and by the wrist bar.
     for side, sign in (("L", 1.0), ("R", -1.0)):
         shoulder, elbow = markers[f"{side}SHO"], markers[f"{side}ELB"]
         knee, ankle = markers[f"{side}KNE"], markers[f"{side}ANK"]
@@ -354,6 +369,7 @@ def _bend(shoulder: Array, elbow: Array, wrist: Array, thorax: Array, sign: floa
     reflected = ahead - 2 * np.dot(ahead, rest) * rest
     along = np.sum(half * half, axis=1, keepdims=True)
     held = reflected - 2 * half * (half @ reflected)[:, None] / np.maximum(along, 1e-9)
+    # The straighter the arm, the more of the direction that the shoulder suggests.
     lacking = np.maximum(_STRAIGHT - np.linalg.norm(bent, axis=1, keepdims=True), 0.0)
     return np.asarray(bent + lacking * np.einsum("tij,tj->ti", thorax, held))
 

@@ -50,6 +50,8 @@ def load_skeleton(path: Path) -> Skeleton:
     bones, parents = {"root": Bone("root", 1)}, dict[str, str]()
     bone: Bone | None = None
     sections, inside, unit, degrees = [""], False, 1.0, True
+    # A line belongs to the section whose heading came last, and in :bonedata to the bone between
+    # begin and end.
     with TextFile(path, "ASF skeleton") as text:
         for raw in text:
             words = raw.split("#", 1)[0].split()
@@ -82,6 +84,7 @@ def load_skeleton(path: Path) -> Skeleton:
                 inside = key == "begin"
             elif section == ":hierarchy" and inside:
                 _hierarchy_line(words, bones, parents, text)
+    # The hierarchy is the last section: a file without its end was cut off.
     if ":root" not in sections or len(bones) == 1 or sections[-1] != ":hierarchy" or inside:
         raise InputError(
             f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be "
@@ -92,6 +95,7 @@ def load_skeleton(path: Path) -> Skeleton:
             f"{path}: the root has no order; give TX TY TZ RX RY RZ in the AMC's order"
         )
     text.check_size(len(bones))
+    # Lengths and angles to metres and degrees, and the order of the angles of each bone.
     unit_m = _INCH_M / unit
     for bone in bones.values():
         bone.offset = bone.offset * bone.length * unit_m
@@ -159,6 +163,7 @@ def _hierarchy_line(
 
 def _parents_first(bones: dict[str, Bone], parents: dict[str, str], text: TextFile) -> list[Bone]:
     names = ["root"]
+    # Bones are listed in any order; each is taken once its parent is.
     while rest := [name for name in bones if name not in names]:
         ready = [name for name in rest if parents.get(name) in names]
         if not ready:
@@ -183,6 +188,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
     with TextFile(path, "AMC motion") as text:
         values = kept_rows(_amc_frames(text, known), known.bones)
     _warn_of_another_person(path, skeleton)
+    # Every bone is a joint that its own rotation carries.
     joints = [(number, number) for number in range(len(known.bones))]
     offsets = np.array([bone.offset for bone in known.bones])
     rate_hz = _RATE_HZ if rate_hz is None else rate_hz
@@ -193,7 +199,7 @@ def load_amc(path: Path, *, skeleton: Path | None, rate_hz: float | None, up: st
 def _warn_of_another_person(path: Path, skeleton: Path) -> None:
     """Warn where a skeleton beside a recording has its name, and another is given.
 
-    Skeletons of one source fit each other's recordings: only names tell whose is whose.
+    Skeletons of one source fit each other's recordings, so only their names tell them apart.
     """
     found = path.parent.glob("*.asf")  # of a folder that was just read from
     own = [one.stem for one in found if path.stem.startswith(f"{one.stem}_")]
@@ -208,6 +214,8 @@ def _warn_of_another_person(path: Path, skeleton: Path) -> None:
 
 def _amc_frames(text: TextFile, skeleton: Skeleton) -> Iterator[list[float]]:
     """Yield the values of the channels of all bones in each frame [m] [deg]."""
+    # Bones may come in any order, so the values of a frame are gathered by bone. They are yielded
+    # in the order of the skeleton once the next frame begins.
     widths = {bone.name: len(bone.channels) for bone in skeleton.bones}
     degrees, count = skeleton.degrees, 0
     frame: int | None = None
@@ -221,6 +229,7 @@ def _amc_frames(text: TextFile, skeleton: Skeleton) -> Iterator[list[float]]:
                 f"frame {frame} lacks {len(missing)} bones ({some}); the file may be cut off", line
             )
         text.check_size(len(widths), count)
+        # Lengths by the skeleton's unit, angles to degrees.
         factors = {"t": skeleton.unit_m, "r": 1.0 if degrees else 180 / math.pi}
         return [
             value * factors[channel[0]]
@@ -228,6 +237,7 @@ def _amc_frames(text: TextFile, skeleton: Skeleton) -> Iterator[list[float]]:
             for channel, value in zip(bone.channels, values.get(bone.name, ()), strict=True)
         ]
 
+    # A line is a comment, a keyword, the number of the next frame, or a bone with its values.
     for raw in text:
         words = raw.split()
         if not words or words[0].startswith("#"):
@@ -284,13 +294,17 @@ def load_bvh(path: Path, *, unit_m: float | None, up: str | None, rate_hz: float
         joints = _read_hierarchy(text)
         n_frames, rate_hz = _read_header(text, rate_hz)
         values = kept_rows(_bvh_frames(text, n_frames, joints), joints)
+    # Joints above the one that carries the body are left out; what they move goes into the root.
     top = carrier_of(joints, values)
     kept = [j for j in range(len(joints)) if top in chain_to(joints, j)]
+    # Position channels of other joints say the same offset in every frame, but for rounding; how
+    # far they spread is judged in metres, once the unit is known.
     offsets, spreads = np.zeros((len(kept), 3)), np.zeros(len(kept))
     for k, j in enumerate(kept[1:], start=1):
         places = joints[j].places(values)
         offsets[k] = np.median(places, axis=0)
         spreads[k] = np.linalg.norm(places - offsets[k], axis=1).max()
+    # In BVH the rotation of the parent carries the bone that ends in a joint.
     carriers = [top, *(joints[j].parent for j in kept[1:])]
     raw = posed(path, joints, values, list(zip(kept, carriers, strict=True)), offsets, rate_hz)
     motion = settled(str(path), raw, unit_m=unit_m, up=up)
@@ -336,6 +350,7 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
     joints: list[Bone] = []
     stack: list[int] = []
     clauses = _clauses(text)
+    # Braces open and close joints: the stack holds those that are open, the parent last.
     for word, words, line in clauses:
         key = word.upper()
         if not key:
@@ -346,6 +361,7 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
             if stack or not joints:
                 raise text.fail("MOTION before the hierarchy ends; a brace is missing", line)
             return joints
+        # A joint, or the end site of one, hangs on the joint that was opened last.
         if key in ("ROOT", "JOINT", "END"):
             if (key == "ROOT") == bool(joints):
                 raise text.fail("a BVH file must have exactly one ROOT, first", line)
@@ -369,6 +385,7 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
             if not stack:
                 raise text.fail("a closing brace too many", line)
             stack.pop()
+        # Offset and channels belong to that joint, too.
         elif key == "OFFSET" and stack:
             offset = text.numbers(words, line)
             if len(offset) != 3:
@@ -392,6 +409,7 @@ def _read_hierarchy(text: TextFile) -> list[Bone]:
 def _read_header(text: TextFile, rate_hz: float | None) -> tuple[int, float]:
     """Number of frames, and frames per second."""
     found = dict[str, float]()
+    # Two lines, in any order, before the values.
     for raw in filter(str.strip, text):
         words, _, value = raw.lower().partition(":")
         key = " ".join(words.split())
@@ -426,6 +444,8 @@ def _bvh_frames(text: TextFile, n_frames: int, joints: list[Bone]) -> Iterator[l
             line,
         )
 
+    # A frame may go on over several lines, but a line that is whole by itself may not follow one
+    # that is not.
     for raw in text:
         row = text.numbers(raw.split())
         if begun and len(row) >= width:

@@ -89,6 +89,7 @@ def carrier_of(joints: Sequence[Bone], values: Array) -> int:
     """Find the last joint of an unbranched chain from the root whose own position moves."""
     top, carrier = 0, 0
     while True:
+        # Where the tree branches the body begins, and the chain ends.
         children = [j for j, joint in enumerate(joints) if joint.parent == top]
         if len(children) != 1:
             return carrier
@@ -109,10 +110,12 @@ def posed(
 ) -> Motion:
     """Make the motion of a rigid skeleton, as if y were up in the file.
 
-    ``joints`` are the indices of the bones that become joints, the root first, each with that of
-    the bone whose rotation it has, and ``offsets`` (joint, 3) theirs.
+    ``joints`` has a pair of indices for each joint, the root first: the bone that becomes the
+    joint, and the bone whose rotation it takes. ``offsets`` (joint, 3) are the joints' offsets.
     """
     roots, rotations = FileBackedRows(), FileBackedRows()
+    # Recordings may be larger than memory, so some frames are posed at a time. The place of the
+    # root is the sum of the chain above it.
     for (frames,) in in_blocks(values):
         turned = _rotations(bones, frames)
         places = np.zeros((len(frames), 3))
@@ -121,6 +124,7 @@ def posed(
             places += own if parent < 0 else quaternion_rotate(turned[:, parent], own)
         roots.append(to_world(places))
         rotations.append(quaternions_to_world(turned[:, [carrier for _, carrier in joints]]))
+    # Bones that are left out do not count in the indices of parents.
     index = {bone: joint for joint, (bone, _) in enumerate(joints)}
     return Motion(
         name=path.stem,
@@ -141,6 +145,7 @@ def _rotations(bones: Sequence[Bone], values: Array) -> Array:
         if bone.order:
             own = [bone.column + bone.channels.index("r" + axis) for axis in bone.order.lower()]
             local = Rotation.from_euler(bone.order, values[:, own], degrees=True)
+        # ASF: the angles are meant in axes of the bone, C R C^-1.
         if bone.axis.any():
             axes = Rotation.from_euler(bone.axis_order, bone.axis, degrees=True)
             local = axes * local * axes.inv()
@@ -162,6 +167,7 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
     its next direction, so that nothing on it spins. Arguments are as `joint_centres` gives them, in
     the world [m].
     """
+    # Bones from joint to joint, each of which needs a direction in every frame.
     parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
     bones = centres[:, 1:] - centres[:, parents]
     spans = np.linalg.norm(bones, axis=2)
@@ -172,6 +178,8 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
             f"every body part needs at least {MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers "
             "about it"
         )
+    # Each bone is followed as seen from the part of the trunk that carries it, so that a person who
+    # turns round does not twist their limbs.
     hips, chest = (
         sign_continuous(Rotation.from_matrix(axes).as_quat()) for axes in (pelvis, thorax)
     )
@@ -180,6 +188,7 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
     directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
     rotations = quaternion_multiply(carriers, _followed(directions))
     rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
+    # The offset is the first direction with the median length, and rotations lead on from there.
     lengths = np.median(spans, axis=0)
     return Motion(
         name=name,
@@ -202,6 +211,7 @@ def _followed(directions: Array) -> Array:
     """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
     rotations = np.empty((*directions.shape[:2], 4))
     rotations[0] = [0.0, 0.0, 0.0, 1.0]
+    # The smallest rotation from frame to frame, on top of all before it.
     for frame, step in enumerate(smallest_rotation(directions[:-1], directions[1:])):
         rotations[frame + 1] = quaternion_multiply(step, rotations[frame])
     return rotations / np.linalg.norm(rotations, axis=2, keepdims=True)

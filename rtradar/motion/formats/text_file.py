@@ -29,8 +29,8 @@ _FIRST_BYTES, _LONG_BYTES, _CHARACTERS_A_STEP = 65_536, 20_000_000, 1_000_000
 class TextFile:
     """Lines of a text file, one after the other, with a progress bar where reading takes long.
 
-    The text is Latin-1, for every byte is a character there and only comments use more than ASCII.
-    Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
+    The text is Latin-1, because every byte is a character there and only comments use more than
+    ASCII. Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
     statement, so that it is closed before an error message is written.
     """
 
@@ -93,6 +93,8 @@ class TextFile:
                         f"{path}: {size / 1e6:.0f} MB; a {kind} file may have "
                         f"{_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
                     )
+                # The first bytes show a binary file, and a byte order mark, before any line is
+                # taken.
                 start = file.buffer.read(_FIRST_BYTES)
                 if b"\0" in start:
                     raise InputError(f"{path}: binary data; expected {kind} text")
@@ -105,6 +107,7 @@ class TextFile:
                     while line := file.readline(_MOST_CHARACTERS + 1):
                         if "\0" in line:
                             raise InputError(f"{path}: binary data; expected {kind} text")
+                        # A file without line ends would otherwise be read into memory whole.
                         if len(line) > _MOST_CHARACTERS:
                             raise InputError(
                                 f"{path}: a line of more than {_MOST_CHARACTERS} characters; "

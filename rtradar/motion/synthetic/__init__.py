@@ -145,6 +145,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         pose = dataclasses.replace(pose, root=pose.root - down)
         roots.append(pose.root)
         rotated.append(rotations(pose, height_m))
+    # Rotations and the bones of the figure make the skeleton.
     bones = offsets(height_m)
     motion = Motion(
         name=f"synthetic:{activity}" + (f",style={subject.style}" if subject.style else ""),
@@ -157,6 +158,7 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
         length_s=duration_s,
         girth=chosen.build * height_m / 1.75,
     )
+    # The figure faces +x, and a Motion the radar at -x.
     own = {name: value for name, value in traits.items() if name != "duration_s"}
     keys = {"motion": f"{SYNTHETIC}{asked}", "seed": seed, "duration_s": duration_s}
     return motion.turned(math.pi).made_from(Source(keys | ({"traits": own} if own else {}), {}))
@@ -164,6 +166,8 @@ def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> 
 
 def _checked(asked: str, traits: Traits) -> tuple[str, _Chosen]:
     """The activity, and all its traits."""
+    # Traits follow the activity in its name, as in "walk,tempo=1.1", or are given as keywords,
+    # which overrule those in the name.
     check_activity(asked)
     activity, *texts = asked.split(",")
     names = [key for key in rules_of(_Chosen) if key not in ("duration_s", "rate_hz")]
@@ -196,6 +200,7 @@ def _parsed(value: str) -> float | str:
 
 def _subject(activity: str, seed: int, chosen: _Chosen) -> Subject:
     """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
+    # The same seed is another subject in another activity. A take changes the phase alone.
     own = check_seed("", seed), list(ACTIVITIES).index(activity)
     rng = np.random.default_rng(stream(*own))
     spread = (1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)).tolist()

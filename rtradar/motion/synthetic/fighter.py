@@ -139,6 +139,7 @@ class Fighter:
         self.rng = np.random.default_rng([subject.manner, int(2**32 * subject.phase)])
         self.facing = 0.0
         """Yaw of the opponent [rad], a multiple of full turns."""
+        # Everything begins in the stance, and rests there until a move is planned.
         self.feet = {}
         for side in SIDES:
             x, y, yaw = self.place(side, 0.0, 0.0)
@@ -203,6 +204,8 @@ class Fighter:
         foot, (x, y, yaw) = self.feet[side], to
         duration, begin = end - begin, max(begin, self.stepped + _BETWEEN_S)
         self.stepped = begin + duration
+        # Steps follow one another: a step that is asked for too early begins when the last foot is
+        # down.
         foot.lifts.append((begin, self.stepped, lift, math.radians(28)))
         # The foot moves while it is off the floor.
         foot.toe.move(begin + 0.06 * duration, self.stepped - 0.04 * duration, x, y)
@@ -228,6 +231,7 @@ class Fighter:
     def into_stance(self, begin: float, end: float, x: float, y: float, lift: float) -> float:
         """Bring feet, hips, shoulders and hands back to the stance about a point; return when."""
         own, at = self.bearing, begin
+        # A foot that is far from its place steps there, the rear one first; one that is near stays.
         for side, other in ((self.rear, self.lead), (self.lead, self.rear)):
             to, foot = self.place(side, x, y), self.feet[side]
             far = math.dist(to[:2], foot.toe.last)
@@ -239,6 +243,7 @@ class Fighter:
                 at = self.step(side, at, at + 0.5 * (end - begin), to, lift * min(1.0, far / 0.1))
             else:
                 foot.heel.move(at, end, own.heel * (side != self.lead))
+        # Trunk and hands come back meanwhile.
         end = max(at + 0.16, end)
         self.root.move(at - 0.16, end, *self.middle())
         self.turn_home(begin, end)
@@ -260,6 +265,7 @@ class Fighter:
     def poses(self, t: Array) -> Pose:
         """Poses at times (n,) [s]."""
         own, height, hz = self.bearing, self.subject.height_m, self.bearing.pulse
+        # The plan with small restless motions on top, those of hips and shoulders alike in phase.
         x, y = self.root.at(t)
         x, y = x + own.sway * self._idle(t, 0, 0.5 * hz), y + own.sway * self._idle(t, 1, 0.5 * hz)
         idle = 2.5 * own.sway * np.stack([self._idle(t, k, 0.5 * hz) for k in (2, 3, 4)])
@@ -268,9 +274,12 @@ class Fighter:
         turned, lean, side_lean = self.thorax.at(t) + 1.6 * idle
         thorax = about(y=lean, x=side_lean, z=turned)
 
+        # The wanted height of the root, softly limited to just below standing upright.
         wanted = ROOT - self.depth.at(t)[0] + own.bounce * self._idle(t, 5, hz)
         wanted = -np.logaddexp(-_SHARPNESS * wanted, -_SHARPNESS * (ROOT - 0.012)) / _SHARPNESS
         root, limits = xyz(x, y, wanted), []
+        # How high each leg lets the root be: a leg that is all but stretched from its foothold to
+        # the hip. A leg in the air is freed of it by `free`.
         for side in SIDES:
             foot = self.feet[side]
             hip = pelvis.apply([0.0, SIDES[side] * HIP_Y, HIP - ROOT])
@@ -279,9 +288,12 @@ class Fighter:
             gap = np.sum((root + hip - ankle)[:, :2] ** 2, axis=1)
             leg = ankle[:, 2] + np.sqrt(np.maximum((_LONGEST * _LEG) ** 2 - gap, 0.01))
             limits.append(leg - hip[:, 2] + foot.free.at(t)[0])
+        # The root rises as wanted, but no higher than both legs allow. The soft minimum of these
+        # heights has no kink in time.
         levels = -_SHARPNESS * np.stack([wanted, *limits])
         root[:, 2] = -np.logaddexp.reduce(levels) / _SHARPNESS
 
+        # With the root known, legs and arms follow.
         legs = {side: self._leg(side, t, root, pelvis, yaw) for side in SIDES}
         arm, arms = (UPPER_ARM + FOREARM) * height, {}
         for number, side in enumerate(SIDES):
@@ -319,6 +331,8 @@ class Fighter:
         turned = 0.6 * yaw + 0.4 * pelvis_yaw
         if not air.any():
             return toe - flat.apply(TOE), flat, about(z=turned).apply(LEFT)
+        # In the air the ankle is where azimuth, elevation and reach put it from the hip, kept above
+        # the floor.
         azimuth, elevation, reach, roll, flexion = foot.leg.at(t)
         hip = root + pelvis.apply([0.0, SIDES[side] * HIP_Y, HIP - ROOT])
         level, up = np.cos(elevation), np.sin(elevation)

@@ -190,12 +190,17 @@ def bend(
     the axis of the middle joint, to the left, and is made perpendicular to ``reach``. With
     ``forward`` = 1 the middle joint goes forward, as a knee does, with -1 backward, as an elbow.
     """
+    # Direction and length of the target, not beyond what both bones reach.
     distance = np.linalg.norm(reach, axis=1, keepdims=True)
     along = reach / distance
     distance = np.minimum(distance, MAXIMUM_REACH * (first + second))
+    # The plane of both bones is across the hinge, of which the part along the reach counts for
+    # nothing.
     axis = hinge - np.sum(hinge * along, axis=1, keepdims=True) * along
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     ahead = forward * np.cross(axis, -along)
+    # The law of cosines gives the angle of the first bone to the reach; the second closes the
+    # triangle.
     cosine = np.clip((distance**2 + first**2 - second**2) / (2 * distance * first), -1.0, 1.0)
     upper = cosine * along + np.sqrt(1 - cosine**2) * ahead
     lower = (distance * along - first * upper) / second
@@ -248,6 +253,7 @@ def lowering(pose: Pose, height_m: float) -> float:
     bones = offsets(height_m)
     leg = (THIGH + SHANK) * height_m * MAXIMUM_REACH
     worst = 0.0
+    # With a leg stretched over this level distance, the hip is so high over the ankle at most.
     for side in SIDES:
         gap = pose.root + pose.pelvis.apply(bones[f"{side}_hip"]) - pose.ankles[side]
         level = np.sqrt(np.maximum(leg**2 - gap[:, 0] ** 2 - gap[:, 1] ** 2, 0.0))
@@ -260,6 +266,7 @@ def rotations(pose: Pose, height_m: float) -> Array:
     from scipy.spatial.transform import Rotation  # slow to import
 
     bones = offsets(height_m)
+    # The bend of the trunk is split evenly over the spine, and the nod over neck and head.
     bent = (pose.pelvis.inv() * pose.thorax).as_rotvec()
     nod = (pose.thorax.inv() * pose.head).as_rotvec()
     found: dict[str, Rotation] = {
@@ -270,6 +277,7 @@ def rotations(pose: Pose, height_m: float) -> Array:
         "neck": pose.thorax * Rotation.from_rotvec(nod / 2),
         "head": pose.head,
     }
+    # Legs follow by inverse kinematics from hips and ankles, arms are given.
     for side, sign in SIDES.items():
         leg = pose.ankles[side] - pose.root - pose.pelvis.apply(bones[f"{side}_hip"])
         hinge = pose.left[side] if isinstance(pose.left, Mapping) else pose.left
@@ -315,6 +323,7 @@ def joints(pose: Pose, height_m: float) -> dict[str, Array]:
 def centre_of_mass(pose: Pose, height_m: float) -> Array:
     """Centre of mass (n, 3) of a pose [m]."""
     at = joints(pose, height_m)
+    # The trunk is one segment from root to thorax, and the head one from the thorax on.
     starts = {**NODE_PARENT, "thorax": "root", "head": "thorax"}
     centre = sum(
         mass * (at[starts[node]] + part * (at[node] - at[starts[node]]))
@@ -342,6 +351,7 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     """Minimum-jerk moves (time, ...) between values (key, ...), at rest at each key and outside."""
     at, keys = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     moves = np.diff(keys, axis=0)
+    # The value where each move begins, and the fraction of the move that is under way.
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
     under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
     fraction = smooth((t - at[under_way]) / np.diff(at)[under_way])
@@ -360,6 +370,8 @@ def hermite(
     p0, v0, a0 = (np.asarray(value, dtype=np.float64) for value in begin)
     p1, v1, a1 = (np.asarray(value, dtype=np.float64) for value in end)
     u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
+    # What the beginning alone, moving on with constant acceleration, would miss at the end in
+    # position, velocity and acceleration; three higher powers make it up.
     p, v = p1 - p0 - (v0 + a0 * span / 2) * span, (v1 - v0 - a0 * span) * span
     a = (a1 - a0) * span**2
     cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2

@@ -90,6 +90,8 @@ class _Walker:
     def _footprints(self, duration_s: float) -> list[Step]:
         """Make steps from more than a cycle before 0 to more than a cycle after ``duration_s``."""
         own, step_m, half_cycle = self.own, self.step_m, self.cycle_s / 2
+        # A short walk goes through the middle at half its time; a long one goes up and down between
+        # two points where it turns round.
         straight = step_m / half_cycle * duration_s <= STRAIGHT_M
         x = -step_m / half_cycle * duration_s / 2 if straight else -HALF_TRACK_M
         x -= (5 + self.subject.phase) * step_m
@@ -98,6 +100,8 @@ class _Walker:
         uneven = np.random.default_rng(self.subject.manner)
         plan: list[tuple[float, float]] = []  # advance and rotation of the steps ahead
         steps: list[Step] = []
+        # Near the end of the track the steps ahead are planned: up to the end, some steps on the
+        # spot that turn, and a short one back.
         while time < duration_s + 2 * self.cycle_s:
             direction = round(math.cos(heading))
             lame = 1.0 if side == self.subject.side else -1.0
@@ -106,6 +110,7 @@ class _Walker:
                 plan = [(rest, 0.0)] if rest < 0.6 * step_m else [(rest / 2, 0.0)] * 2
                 plan += [(0.0, turn)] * _TURN_STEPS + [(step_m / 2, 0.0)]
                 turn = -turn
+            # People step unevenly, and the lame side also differs in length and time.
             far, late = 1 + own.unsteady * np.clip(uneven.standard_normal(2), -2.0, 2.0)
             usual = step_m * (far + lame * own.lame_step)
             advance, turning = plan.pop(0) if plan else (usual, 0.0)
@@ -125,6 +130,7 @@ class _Walker:
         headings = np.array([step.heading for step in steps])
         across = np.stack([-np.sin(headings), np.cos(headings)], axis=1)
         sway = self.own.sway * self.own.track * self.subject.height_m
+        # The body sways toward the foot that carries.
         swayed = sway * np.array([SIDES[step.side] for step in steps])[:, None] * across
         # The body does not limp as much as the feet: it goes over the mean of three footprints.
         smoothed = [
@@ -132,6 +138,7 @@ class _Walker:
             for some in (landings, np.array([step.middle for step in steps]))
         ]
         lame = [float(step.side == self.subject.side) for step in steps]
+        # The body is over each footprint some time after the foot has landed there.
         over = smoothed[0] + np.array([self.midstance(one) for one in lame]) * self.cycle_s
         places = np.column_stack([smoothed[1] + swayed, headings])
         self.way = CubicSpline(over, places)
@@ -151,15 +158,22 @@ class _Walker:
             """1 at a part of the cycle after the lame foot has landed, 0 half a cycle away."""
             return np.asarray(vigour * (0.5 + 0.5 * np.cos(lame - 2 * np.pi * part)) ** 2)
 
+        # When the lame leg carries, swings, and is about to land.
         loaded, swinging, landing = near(0.45 * stance), near((1 + stance) / 2), near(-0.05)
+        # Twice a cycle, once a step, the body slows down and speeds up, and sinks while both feet
+        # carry.
         twice = 2 * (phase - 2 * np.pi * self.midstance(0.5))
         forward = -vigour * own.pulse_mps * self.cycle_s / (4 * np.pi) * np.sin(twice)
         # The neck moves less than the hips do.
         rocking = -(1 - own.trunk_pulse) * forward / ((NECK_BASE - ROOT) * height)
         back, lean = own.lame_back * landing, own.lean
+        # A limp: while the lame leg carries, the root sways to its side and dips, and the other hip
+        # drops; while it swings, its hip is raised.
         aside = toward * height * own.lame_sway * loaded
         down = vigour * own.bob * (1 - np.cos(twice)) + own.lame_dip * loaded
         tipped = own.lame_drop * loaded + own.lame_hike * swinging
+        # Hips turn with the step and drop on the side of the swinging leg; the chest turns against
+        # them.
         pelvis = about(
             z=heading - own.hip_yaw * vigour * np.cos(phase - 0.1 * np.pi),
             x=own.drop * vigour * np.sin(phase) + toward * tipped,
@@ -181,6 +195,7 @@ class _Walker:
             ahead = own.arm_forward + swing * vigour * beat + lean
             elbow = own.elbow + own.elbow_swing * loss * vigour * (1 + beat) / 2
             arms[side] = swing_arm(thorax, side, ahead, own.arm_outward, elbow)
+        # Along and across the way, turned to where the walker heads.
         root_x = x + forward * np.cos(heading) - aside * np.sin(heading)
         root_y = y + forward * np.sin(heading) + aside * np.cos(heading)
         return Pose(
@@ -208,6 +223,9 @@ class _Foot:
         toe_off = own.toe_off_deg + lame * own.lame_toe_off_deg
         landing = math.radians(-own.heel_strike_deg + lame * own.lame_landing_deg)
         keys: list[tuple[float, float]] = []
+        # The pitch of the foot over time: it lands on its heel, is soon flat, and late in the
+        # stance begins to roll over its toe, which goes on for a moment after it has left the
+        # floor.
         for step, following in itertools.pairwise([*steps, steps[-1]]):
             # Short steps roll less.
             lift = toe_off * min(max(subject.amplitude * following.vigour, 0.25), 1.1)
@@ -221,6 +239,7 @@ class _Foot:
         self.pitch = partial(keyed, times=times, values=pitches)
         """Pitch (n,) by time, positive with toes down."""
         self.landings = np.array([step.time for step in steps])
+        # A foot turns in the air, between leaving the floor and landing.
         yawing = np.stack([self.landings - (1 - stance) * cycle, self.landings], axis=1).ravel()
         headings = np.repeat([step.heading for step in steps], 2)
         self.yaw = partial(keyed, times=yawing[1:], values=headings[:-1])
@@ -241,9 +260,12 @@ class _Foot:
         ankle, own = np.zeros((len(t), 3)), self.own
         first, last = np.searchsorted(self.landings, (t[0], t[-1]), side="right")
         for step, after in itertools.pairwise(self.steps[max(first - 1, 0) : last + 1]):
+            # On the floor the ankle follows from the roll of the foot over its footprint.
             lift = step.time + self.stance_s
             down = (t >= step.time) & (t < lift)
             ankle[down] = self._standing(step, t[down])
+            # In the air a quintic goes on from where, how fast and how accelerated the ankle left
+            # the floor, to the same of its landing, with some clearance.
             swings = (t >= lift) & (t < after.time)
             begin = state(partial(self._standing, step), lift)
             end = state(partial(self._standing, after), after.time)

@@ -67,6 +67,7 @@ def _longest_contact(speed: float, height: float) -> float:
     In the middle of such a curve the root is lower by 5/16 v T + g T^2/32. Who is on the floor for
     longer would go deeper than people do, and stands in between.
     """
+    # The positive root of the quadratic equation for the deepest contact.
     slope, curve = 5 / 16 * speed, GRAVITY_MPS2 / 32
     return (math.sqrt(slope**2 + 4 * curve * DEEPEST * height) - slope) / (2 * curve)
 
@@ -77,6 +78,9 @@ def _contacts(
     """Yield each contact of a set, with the flights before and after it; long ones in two parts."""
     before: _Flight | None = None
     for hop in hops:
+        # A short contact goes from landing to take-off in one curve. In a long one the jumper is
+        # caught, stands, and takes off; a set begins with a take-off from standing, and ends with a
+        # landing.
         if before and hop.begin - before.end <= longest_s:
             yield (before.end, hop.begin), before, hop
         else:
@@ -114,6 +118,7 @@ class _Jumper:
         self.wide = (HIP_Y + self.own.wide * subject.amplitude) * height
         self.heel = rolled(np.radians([self.own.heels]), height)[0]
         """How far a raised heel moves the ankle [m]."""
+        # Heights of the root with feet close and wide, for legs that are stretched as much in both.
         self.levels = [self._level(track) for track in (self.close, self.wide)]
         self.standing = height * (ROOT - 0.008)
         self.sets = self._sets(until_s, apart=activity == "jumping_jack")
@@ -139,6 +144,8 @@ class _Jumper:
         longer = 0.2 * own.lopsided**3  # a few people hurry in one of both positions, most do not
         longest = (0.55 - 0.5 * abs(longer)) * hop
         flight = min(own.flight_s * math.sqrt(self.subject.amplitude), longest)
+        # Out and back makes two hops of each jack. The phase begins the capture somewhere in the
+        # first set.
         number = 2 * round(own.jacks)
         begin = -hop * (1 + self.subject.phase * (number - 2))
         uneven = np.random.default_rng(self.subject.manner)
@@ -158,7 +165,7 @@ class _Jumper:
     def _knots(self, hops: list[_Flight], longest_s: float) -> tuple[list[_Knot], ...]:
         """Knots of root, ankles and heels over their heights in standing.
 
-        The root is thrown and caught; between knots it flies along a parabola, for the
+        The root is thrown and caught; between knots it flies along a parabola, because the
         accelerations at both ends are the same. Relative to the hips the ankles move slowly while
         the legs are stretched: in flight, at take-off and at landing, where they are higher by what
         the raised heel lifts them. So the knees bend on the floor only, where the heels come down
@@ -167,6 +174,8 @@ class _Jumper:
         """
         roots, ankles = list[_Knot](), list[_Knot]()
         drop, follow = self.heel[2], self.own.follow
+        # Each contact: how the root arrives from the flight before, and leaves into the one after,
+        # both in free fall.
         for (begin, end), before, after in _contacts(hops, longest_s):
             span, down, up = end - begin, 0.0, 0.0
             least = 2 * drop / (longest_s if before and after else span)
@@ -179,6 +188,8 @@ class _Jumper:
                 level, speed, _ = self._thrown(after, landing=False)
                 thrown = level - self.standing, speed, -GRAVITY_MPS2
                 up = max(follow * speed, least)
+            # The ankles come down at a speed of their own and go up again, with a rest on the floor
+            # if there is time for it.
             roots += [(begin, caught), (end, thrown)]
             stays = not (down and up) or 2 * drop * (1 / down + 1 / up) < span
             if not stays:  # the largest speeds at which the heels do not go below the floor
@@ -202,6 +213,7 @@ class _Jumper:
     def _thrown(self, hop: _Flight, *, landing: bool) -> tuple[float, float, float]:
         """Height of the root at one end of a flight [m], and its speeds up and down [m/s]."""
         begin, end = self.levels[int(not hop.apart)], self.levels[int(hop.apart)]
+        # Speed at take-off for a flight of this time between both levels; gravity takes the rest.
         up = (end - begin) / hop.span + GRAVITY_MPS2 * hop.span / 2
         return end if landing else begin, up, GRAVITY_MPS2 * hop.span - up
 
@@ -217,6 +229,7 @@ class _Jumper:
         near = [
             k for k, (here, over) in enumerate(zip(begun, ended, strict=True)) if here and not over
         ]
+        # Root, ankles and heels over time, from the knots of the sets at hand.
         hops = [hop for k in near for hop in self.sets[k]]
         rises = [sum((_through(t, self.knots[k][of]) for k in near), 0 * t) for of in range(3)]
         z, ankles_rise, heels = self.standing + rises[0], rises[1], rises[2]
@@ -224,15 +237,18 @@ class _Jumper:
         # The feet move sideways while they are well off the floor.
         apart = _between(t, hops, [0.0, *(float(hop.apart) for hop in hops)], -0.05 * span)
         airborne = sum((bump((t - hop.begin) / hop.span) for hop in hops), 0 * t)
+        # The foot stands on its toe as far as the ankle is raised over it.
         roll = heels / self.heel[2]
         pitch = _pitch(heels / height)
         trail, above = own.trail * height * airborne, ANKLE * height + ankles_rise - heels
         ankle = rolled(pitch, height) + xyz(-trail, 0.0, above)
+        # Who crouches leans forward; trunk and head waver slowly.
         lean = np.radians(own.lean + own.crouch * (height * ROOT - z) / (0.1 * height))
         lean += math.radians(own.nod) * self._wavering(t, "nod")
         turn = math.radians(own.turn) * self._wavering(t, "turn")
         thorax = about(z=-turn, x=0.4 * turn, y=lean)
         ankles, feet, left = {}, {}, {}
+        # Feet go out by the width of the hop, toes and knees turned outward.
         for side, sign in SIDES.items():
             outward = about(z=sign * math.radians(own.toes_out) * apart)
             across = sign * (close + (self.wide - close) * apart)
@@ -263,6 +279,7 @@ class _Jumper:
         """Arms that go up aside as the feet go apart, and swing forward."""
         own, contact, span = self.own, self.contact, self.span
         swung = np.zeros(len(t))
+        # Arms swing forward about each flight, and back shortly before it.
         for hop in hops:
             swung += own.swing * bump((t - hop.begin + 0.3 * contact) / (span + 0.7 * contact))
             swung -= own.back * bump((t - hop.begin + 0.8 * contact) / (0.7 * contact))
@@ -279,6 +296,8 @@ class _Jumper:
         beyond = (raised - ends[0]) / (ends[1] - ends[0])
         moving = np.sin(np.pi * beyond) ** 2
         arms = {}
+        # The higher an arm is, the more the forearm bends over the head; the elbow bends most
+        # half-way.
         for side, sign in SIDES.items():
             upper = thorax * about(
                 x=sign * self.subject.uneven[side] * raised, y=-np.radians(own.forward + swung)

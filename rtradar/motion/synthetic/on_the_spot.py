@@ -59,6 +59,8 @@ def standing(subject: Subject, pose: Callable[[Array], Pose], forward: Array) ->
 
     ``pose`` gives the pose of such ways; ``forward`` is the first guess.
     """
+    # The feet stay, so that the centre of mass moves by a little less than the hips do: with a
+    # factor just above 1 a few steps suffice.
     for _ in range(4):
         centre = centre_of_mass(pose(forward), subject.height_m)[:, 0]
         forward = forward - 1.1 * (centre - AHEAD * subject.height_m)
@@ -93,6 +95,8 @@ def over_feet(feet: Pose, height_m: float, pelvis: Rotation, forward: Array, leg
     ankle = feet.ankles["l"]
     aside = ankle[:, 1] - HIP_Y * height_m
     away = forward - ankle[:, 0]
+    # The hip is at the given distance from the ankle; what that leaves after both level parts is
+    # its height.
     up = np.sqrt(np.maximum((legs * height_m) ** 2 - aside**2 - away**2, (0.02 * height_m) ** 2))
     hips = xyz(forward, 0.0, ankle[:, 2] + up)
     return np.asarray(hips + pelvis.apply([0.0, 0.0, (ROOT - HIP) * height_m]))
@@ -130,6 +134,7 @@ def repetitions(
     rng = np.random.default_rng(subject.manner)
     begin = -subject.phase * float(usual.sum())
     rows = []
+    # The plan of all repetitions, each a little different, from before 0 on.
     while begin < until_s + 1.0:
         go, stay, back, rest = usual * (1 + 0.06 * np.clip(rng.standard_normal(4), -2.0, 2.0))
         far = 1 + extent * float(np.clip(rng.standard_normal(), -2.0, 2.0))
@@ -140,6 +145,7 @@ def repetitions(
     def fraction(t: Array) -> Array:
         k = np.clip(np.searchsorted(table[:, 0], t, side="right") - 1, 0, len(table) - 1)
         first, go, stay, back, far = table[k].T
+        # There by a minimum-jerk move, and back by another.
         since = t - first
         there = smooth(np.clip(since / go, 0.0, 1.0) ** sudden)
         return np.asarray(far * (there - smooth((since - go - stay) / back)))
@@ -170,6 +176,7 @@ _LONGEST_S = 5000.0
 
 def sway(t: Array, phases: Array) -> Array:
     """Sway (n,) of root mean square 1 in the long run, at times (n,) of tempo 1 [s]."""
+    # Tones of the spectrum's power in their share of the band, in sum a variance of 1.
     power = np.gradient(_TONES_HZ) / (1 + (_TONES_HZ / CORNER_HZ) ** 2) ** 2
     amplitudes = np.sqrt(2 * power / power.sum())
     turned = 2 * np.pi * np.multiply.outer(t, _TONES_HZ) + phases
@@ -244,6 +251,7 @@ def bend(duration_s: float, subject: Subject) -> PosesAt:
     straight = own.straight_legs
 
     def pose(bent: Array, forward: Array) -> Pose:
+        # The trunk tilts, the knees give a little, and the arms hang or reach.
         tilt = deep * bent
         legs = LEGS * (straight + (min(own.knees, straight) - straight) * bent)
         tilts = own.hips * tilt, tilt + math.radians(2), 0.8 * tilt
@@ -292,12 +300,14 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
     legs = LEGS * own.straight_legs
 
     def pose(bent: Array, forward: Array) -> Pose:
+        # The trunk leans forward most half-way.
         way = 4 * bent * (1 - bent)
         tilt = lean * way
         hands = math.radians(3) + math.radians(own.thighs) * bent + 0.3 * tilt
         tilts = 0.7 * tilt + rests * bent, tilt + rests * bent + math.radians(2), 0.3 * tilt
         arms = hands, np.radians(12 + (own.elbows - 12) * bent)
         found = _crouched(subject, own, forward, legs + 0 * bent, tilts, arms)
+        # The seat, not the feet, gives the height in the end.
         level = (ANKLE + legs + ROOT - HIP - own.seat) * height
         found.root[:, 2] += bent * (level - found.root[:, 2])
         return found
@@ -324,6 +334,7 @@ def wave(duration_s: float, subject: Subject) -> PosesAt:
         body = quiet(subject, t)
         up = done(t)
         arms = dict(body.arms)
+        # The upper arm is raised, and the forearm swings, on that side or on both.
         for side, sign in SIDES.items():
             if not both and side != subject.side:
                 continue
@@ -388,6 +399,7 @@ def _arms(
 def _backward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array) -> Pose:
     height = subject.height_m
     feet = soles(subject, len(down), own.feet, own.toes)
+    # Hips go back and down along a line, while the feet stay and the trunk follows.
     root = height * xyz(
         AHEAD - 0.012 - (own.behind + AHEAD) * down,
         0.0,
@@ -413,6 +425,7 @@ def _forward(subject: Subject, own: SimpleNamespace, down: Array, follows: Array
     thigh = _angle(down, -6, -own.sits_back, 0) + _angle(follows, 0, 40, 80)
     pelvis = about(y=_angle(follows, 1, own.hips, 87))
     thorax = about(y=_angle(follows, 2, own.chest, 86))
+    # From the toes up: ankles, knees and hips by the angles of shank and thigh.
     hips = ankle + height * (
         xyz(0.0, 0.0, ANKLE + 0 * down)
         + SHANK * xyz(np.sin(shank), 0.0, np.cos(shank))

@@ -53,6 +53,7 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     """Kicks of any kind, facing +x."""
     own = subject.traits("kick")
     stance = subject.traits("kick_stance")
+    # Traits from 0 to 1 become lengths and angles; cubes make the extremes rare.
     stance.lead = subject.other if stance.behind < 0.7 else subject.side
     stance.stagger = 0.04 + 0.10 * stance.stagger + 0.12 * stance.depth**3
     stance.depth = 0.018 + 0.03 * stance.depth + 0.15 * stance.depth**3
@@ -64,6 +65,7 @@ def kick(duration_s: float, subject: Subject) -> PosesAt:
     rng = np.random.default_rng([subject.manner, 1])
     shares = _shares("kick", subject.style, rng, [0.9, 0.35, 0.6, 0.12, 0.5])
     fighter = Fighter(subject, stance, own)
+    # One kick after another until the capture ends; the same leg again, or the other one.
     leg, t = subject.side, -1.6 * subject.phase
     while t < duration_s + 0.5:
         kind = _kind("kick", STYLES["kick"][int(fighter.rng.choice(len(shares), p=shares))])
@@ -104,6 +106,8 @@ def _kick(fighter: Fighter, kind: SimpleNamespace, leg: str, t: float) -> float:
     out = chambered + kind.out_s * fighter.between(0.85, 1.2)
     back = out + fighter.between(0.16, 0.30)
     land = back + fighter.between(0.26, 0.40)
+    # The leg goes through chamber, impact and recoil; how high a person kicks raises all of them in
+    # part.
     raised = habits.height + float(rng.normal(0, 4))
     leg_to = partial(_leg, fighter, kind, leg, raised)
     low = (0.0, -105.0 if spinning else -75.0, 0.93)
@@ -111,6 +115,7 @@ def _kick(fighter: Fighter, kind: SimpleNamespace, leg: str, t: float) -> float:
     foot.leg.move(at(lift), at(chambered), *leg_to(kind.chamber, 0.35))
     foot.leg.move(at(chambered - 0.02), at(out), *leg_to(kind.impact, 1.0))
     foot.leg.move(at(out + 0.01), at(back), *leg_to(kind.recoil, 0.35))
+    # From the lift on the leg moves through the air and no longer limits the height of the root.
     foot.air.move(at(lift), at(chambered - 0.04), 1.0)
     foot.free.move(at(lift), at(chambered), 0.5)
     foot.heel.move(at(lift - 0.18), at(lift + 0.04), math.radians(40))
@@ -121,6 +126,7 @@ def _kick(fighter: Fighter, kind: SimpleNamespace, leg: str, t: float) -> float:
     away *= 0.6 + 0.4 * math.sin(math.radians(max(60.0 + raised, 0.0)))
     aside = sign * math.radians(kind.aside) * habits.tilt
     fighter.pivot(support, at(lift), at(out), fighter.facing - sign * math.radians(kind.pivot))
+    # The weight comes over the ball of the foot that carries, about which it pivots.
     (x, y), (toe_x, toe_y) = fighter.ankle(support), fighter.feet[support].toe.last
     over = 0.6 * x + 0.4 * toe_x - 0.02, 0.6 * y + 0.4 * toe_y
     fighter.root.move(at(begin + 0.42), at(out), *over)
@@ -134,6 +140,7 @@ def _kick(fighter: Fighter, kind: SimpleNamespace, leg: str, t: float) -> float:
     # The leg lands behind or in front, and the stance follows.
     if spinning:
         fighter.facing += sign * 2 * math.pi
+    # Where the stance will be: near the middle of the place, within reach of the leg that lands.
     ahead = rng.random() < habits.forward and x < 0.3
     fighter.lead = leg if ahead else support
     middle = fighter.between(-0.04, 0.04) - habits.recoil
@@ -213,6 +220,7 @@ def punch(duration_s: float, subject: Subject, *, boxing: bool = False) -> Poses
     """
     own = _habits(subject, boxing=boxing)
     stance = subject.traits("boxing_stance" if boxing else "punch_stance")
+    # Traits from 0 to 1 become lengths and angles.
     stance.lead = subject.other
     stance.stagger = 0.06 + 0.10 * stance.stagger + 0.06 * stance.low**2
     stance.depth = 0.015 + 0.05 * stance.low
@@ -220,6 +228,8 @@ def punch(duration_s: float, subject: Subject, *, boxing: bool = False) -> Poses
     fighter = Fighter(subject, stance, own)
     rng = fighter.rng
     t = -1.2 * subject.phase
+    # A step perhaps, one punch or a row of them with alternating hands, and back into the stance,
+    # drawn toward the middle.
     while t < duration_s + 0.5:
         x, _ = fighter.middle()
         middle_x, middle_y = 0.4 * x, 0.0
@@ -232,6 +242,8 @@ def punch(duration_s: float, subject: Subject, *, boxing: bool = False) -> Poses
         for _ in range(int(rng.integers(1, own.most + 1))):
             style = STYLES["punch"][int(rng.choice(len(own.shares), p=own.shares))]
             kind = _kind("punch", style)
+            # The jab belongs to the front hand, the cross to the rear one: where hands take turns,
+            # the hand says which of both it is, and else the punch says the hand.
             if kind.hand != "either" and own.in_turn:
                 kind = _kind("punch", "jab" if hand == fighter.lead else "cross")
             elif kind.hand != "either":
@@ -251,6 +263,7 @@ def _step_in(fighter: Fighter, t: float, x: float, y: float) -> float:
     forward = x > fighter.middle()[0]
     side = fighter.lead if forward else fighter.rear
     to = fighter.place(side, x, y)
+    # Feet do not come farther apart than a stance allows.
     gap = to[0] - fighter.feet[OTHER[side]].toe.last[0]
     to = float(to[0] + np.clip(gap, -0.34, 0.34) - gap), to[1], to[2]
     end = fighter.step(side, t, t + 0.26 / max(fighter.habits.pace, 0.7), to, 0.03)
@@ -264,11 +277,13 @@ def _punch(fighter: Fighter, kind: SimpleNamespace, hand: str, t: float) -> floa
     sign, other = SIDES[hand], OTHER[hand]
     pace = habits.pace * fighter.between(0.85, 1.15)
     wrist = fighter.wrists[hand]
+    # The hand begins when its last move is over: out to the impact, and back.
     t = max(t, wrist.end - 0.02)
     out = t + kind.out_s / pace
     back = out + fighter.between(0.18, 0.30) / pace
     vary = fighter.between(0.85, 1.15)
 
+    # The hips lead by a moment, then shoulders; trunk and weight go with the hand.
     turn = math.radians(kind.turn) * habits.turn * vary
     turn = -sign * (turn + 0.5 * own.bladed * (hand == fighter.lead))
     lean = own.lean + math.radians(kind.lean) * habits.lean + habits.bow * fighter.between(0, 1)
@@ -287,12 +302,15 @@ def _punch(fighter: Fighter, kind: SimpleNamespace, hand: str, t: float) -> floa
         fighter.feet[side].heel.move(t, out, raised)
 
     def from_shoulder(place: tuple[float, float, float], share: float) -> list[float]:
+        # Targets are meant in the axes of the facing. The wrist is planned in those of the thorax,
+        # which has then turned by a share of its way, and within reach of the arm.
         ahead, inward, up = place
         aimed = np.array([ahead, -sign * inward, up + 0.05 * float(rng.normal())])
         body = about(y=share * lean, x=share * aside, z=share * turn)
         moved = np.asarray(body.inv().apply(aimed)).reshape(3)
         return (moved * min(1.0, 0.955 / float(np.linalg.norm(moved)))).tolist()
 
+    # Some punches draw the hand back first.
     begin = t + 0.12 * (out - t)
     if kind.load:
         wrist.move(t, t + 0.52 * (out - t), *from_shoulder(kind.load, 0.3))

@@ -37,6 +37,8 @@ def draw_pictures(folder: Path, plots: Plots, room: ShownRoom | None) -> None:
         pictures |= {"range_angle": plots.range_angle, "cloud_xyz": plots.spatial}
     for name, draw in pictures.items():
         save_figure(draw().get_figure(root=True), folder / f"{name}.png")
+    # A room has two more maps, before and after clutter removal and over azimuth with its walls,
+    # and a plan.
     if room is not None:
         time_s = plots.summary["room"]["ghosts"]["time_s"]
         heading = f"{maps.attrs['title']}, window at {time_s:.2f} s"
@@ -55,19 +57,24 @@ def room_of(capture: Capture, plots: Plots) -> ShownRoom | None:
     if not capture.room:
         return None
     maps: Any = plots.maps
+    # Everything is shown at the instant for which the summary lists the ghosts.
     radar, body, scene, model = capture.radar, capture.body, capture.scene, capture.model.room
     findings = plots.summary["room"]["ghosts"]
     time_s = findings["time_s"]
     frame = int(np.abs(maps["time"][:] - time_s).argmin())
+    # Where clutter was removed, one frame was kept as it was received; else every frame is such a
+    # one.
     suffix = "_received" if "range_doppler_received" in maps else ""
 
     def received(name: str) -> NDArray[Any]:
         return np.asarray(maps[name + suffix][:] if suffix else maps[name][frame])
 
+    # One panel as received, and one beside it where clutter was removed.
     panels = {"As received": (received("range_doppler"), received("detections").astype(bool))}
     if suffix:
         after = how_made(maps["range_doppler"]).partition("\n")[0].capitalize()
         panels[after] = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
+    # A number for each set of walls, the nearest ghost first, marks the same ghost on map and plan.
     there = radar.at(time_s)
     # Out and back over the same walls is as long as the reverse: both have one number.
     found = [(one, _walls(one["path"])) for one in findings["paths"]]
@@ -78,6 +85,7 @@ def room_of(capture: Capture, plots: Plots) -> ShownRoom | None:
     marked = [
         ghost_mark(number, one["range_m"], one["velocity_mps"]) for number, one in numbered.items()
     ]
+    # The same numbers on the map over azimuth, if the radar measures it.
     azimuth = []
     if "azimuth" in maps and "range_azimuth" + suffix in maps:
         places = [
@@ -86,11 +94,13 @@ def room_of(capture: Capture, plots: Plots) -> ShownRoom | None:
         power = received("range_azimuth"), maps["azimuth"][:]
         windows = capture.processing.window_functions
         azimuth = [rooms.azimuth_and_walls(power, scene, there, places, windows)]
+    # The ways of all people over the floor.
     times = np.linspace(0, body.duration_s, _TRACK_POINTS)
     tracks = truth_of(body, times)["person_position"][..., :2]
     named = dict(zip(body.names, np.swapaxes(tracks, 0, 1), strict=True))
     if len(named) == 1:
         named = {"person": tracks[:, 0]}
+    # The course of each ghost, drawn to the pelvis of the first person.
     paths = {}
     if model is not None:
         middle = body.people[0].motion.at([min(time_s, body.duration_s)])[0][0, 0]

@@ -36,8 +36,10 @@ def snapshots(table: EchoTable) -> Snapshots:
     """
     capture, window = table.capture, table.shown_frames
     radar, body, scene = capture.radar, capture.body, capture.scene
+    # A frame may end after the recording, whose last pose is then held.
     times = np.minimum(radar.window_times(capture.frame_starts[window]), body.duration_s)
     paths = capture.model.paths
+    # Of all echoes the strongest are shown, and only the paths that these take.
     keys, (power, ranges, rates) = _by_key(table.shown(), len(body.part_names))
     chosen = _strongest(keys, power)
     keys = [keys[number] for number in chosen]
@@ -80,6 +82,7 @@ def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], list[NDArray[np
     Echoes of one path, part and number of reflections are summed; of those that are not there range
     and rate are 0.
     """
+    # Echoes of all instants are put side by side, each with the number of its instant.
     step = np.repeat(np.arange(len(looks)), [len(look.part) for look in looks])
     path, part, bounces, *values = (
         np.concatenate([getattr(look, name) for look in looks])
@@ -88,6 +91,7 @@ def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], list[NDArray[np
     # The view follows the parts of people, not objects.
     own = part < n_parts
     keys, column = np.unique(np.stack([path, part, bounces])[:, own], axis=1, return_inverse=True)
+    # Each pair of an instant and a key is a cell, in which powers add up.
     shape = len(looks), keys.shape[1]
     found = added_up(
         step[own] * shape[1] + column.ravel(), shape, *(value[own] for value in values)
@@ -98,6 +102,7 @@ def _by_key(looks: list[Look], n_parts: int) -> tuple[list[Key], list[NDArray[np
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
     """Choose direct echoes and the strongest of the others, in the order of the keys."""
     mean = power_m2.mean(axis=0)
+    # Direct echoes are always kept, ahead of any other.
     mean[[bounces == 1 for _, _, bounces in keys]] = np.inf
     order = np.argsort(-mean, kind="stable")[:MAX_ECHOES]
     return sorted(int(number) for number in order if mean[number] > 0)
@@ -117,17 +122,24 @@ def _corners(
 
     The specular point is that of both images of the middle of the array. NaN if it is not known.
     """
+    # One path for the whole array, from its middle.
     centre = radar.poses_at(times)[1]
     poses = body.at(times)
     most = max((paths[path].order for path, _, _ in keys), default=0) + 1
     out = np.full((len(times), len(keys), most, 3), np.nan)
+    # By the method of images the specular point of a path over walls is that between the images of
+    # both antennas.
     for number in {path for path, _, _ in keys}:
         path = paths[number]
         out_and_back = images(path.out, centre), images(path.back, centre)[:, None]
         _, _, point = solve_specular_points(Geometry(*out_and_back, *poses), points=True)
+        # The images are folded back into the points at which each leg meets the walls: out to the
+        # body and, in the reverse order, back.
         legs = path.out, path.back
         there, back = (corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in legs)
         course = np.stack([*there, *reversed(back[:-1])], axis=2)
+        # Other numbers of reflections, as those from part to part, have corners that are not known
+        # here.
         for echo, (other, part, bounces) in enumerate(keys):
             if other == number and bounces == path.order + 1:
                 out[:, echo, : course.shape[2]] = course[:, part]
@@ -161,12 +173,16 @@ def moving_meshes(
 
     # Of each mesh: whose it is, its faces, the part of each vertex, weights, and rows over time.
     found: list[tuple[int, NDArray[Any], NDArray[Any], Any, NDArray[np.float64]]] = []
+    # A skinned mesh: each vertex is a blend of the bones' places, so that the bones over time say
+    # all.
     for number, person in enumerate(body.people):
         if (mesh := person.mesh) is not None:
             kept, faces = thinned_mesh(mesh.fit.vertices, mesh.faces(), most_faces)
             part = np.flatnonzero(body.owner == number)[mesh.weights()[kept].argmax(axis=1)]
             bones = mesh.bones(np.minimum(times, person.duration_s))
             found.append((number, faces, part, mesh.fit.skinning[kept].tocoo(), bones))
+    # A rigid object in the same form: the blend of a vertex is its own (x, y, z, 1), and the rows
+    # are the object's axes and its place.
     for number, one in enumerate(objects, start=len(body.people)):
         kept, faces = thinned_mesh(one.shape.vertices, one.shape.faces, most_faces)
         rotation, place = one.pose(times)
@@ -208,6 +224,7 @@ def thinned_mesh(
     while len(thinned) > most_faces:
         cells = np.floor(vertices / cell_m).astype(np.int64)
         _, kept, number = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+        # Faces of the vertices that are left; one with two equal corners has no area any more.
         thinned = number.reshape(-1)[faces]
         thinned = thinned[(thinned != np.roll(thinned, 1, axis=1)).all(axis=1)]
         cell_m *= _COARSER

@@ -80,6 +80,7 @@ def summary_of(source: Capture | Samples, clouds: Clouds) -> dict[str, Any]:
     }
     if isinstance(source, Capture):
         return _of_simulation(summary, source)
+    # Samples that were recorded have no settings of a simulation.
     taken = {"radar", *ProcessingOptions.__annotations__}
     parameters = {key: value for key, value in summary["parameters"].items() if key in taken}
     told = {"duration_s": radar.duration_of(n_chirps), "unit": processing.unit}
@@ -204,6 +205,7 @@ def room_findings(capture: Capture, plots: Plots) -> dict[str, Any]:
     """
     if capture.room is None:
         return {}
+    # The instant is that of the frame kept as received, or else of the frame with most detections.
     maps: Any = plots.maps
     times = np.asarray(maps["time"])
     if "range_doppler_received" in maps:
@@ -212,6 +214,7 @@ def room_findings(capture: Capture, plots: Plots) -> dict[str, Any]:
     else:
         frame = int(plots.detections.argmax())
         time_s = float(times[frame])
+    # Where the ghosts of that instant lie.
     paths = [
         {
             "path": ghost.path,
@@ -223,9 +226,11 @@ def room_findings(capture: Capture, plots: Plots) -> dict[str, Any]:
         for ghost in ghosts(capture.model.room, capture.radar, time_s)
     ]
     clutter = dict(capture.room.summary["clutter"])
+    # Where nobody and nothing moves, every detection is a false alarm.
     if not (capture.people or capture.scene.objects):
         clutter["false_alarm_rate"] = float(plots.detections.sum() / maps["detections"].size)
     before_db = clutter["signal_to_clutter_db"]
+    # What removal gains is measured on the map, over the Doppler bins in which echoes at rest lie.
     if "range_doppler_received" in maps and before_db is not None:
         velocity = np.asarray(maps["velocity"])
         received, left = (

@@ -63,6 +63,7 @@ def truth_of_parts(table: EchoTable, start_cycle: int, time_s: float) -> dict[st
     direct = (look.bounces == 1) & (look.path == 0)
     values = (own[direct] for own in (look.power_m2, look.range_m, look.rate_mps))
     total, range_m, rate = added_up(look.part[direct], (n_parts,), *values)
+    # The look is at the middle of a chirp, which differs a little from the middle of the frame.
     range_m += (time_s - look.time_s) * rate
     return {"range_m": range_m, "range_rate_mps": rate, "power_m2": total, "visible": total > 0}
 
@@ -82,6 +83,7 @@ def added_up(
         return np.bincount(cell, values, size).reshape(shape).astype(np.float64)
 
     total = summed(power)
+    # Cells in which everything is occluded have no power to weight by.
     weight = np.where(total.ravel()[cell] > 0, power, 1.0)
     with np.errstate(invalid="ignore"):
         return [total, *(summed(weight * own) / summed(weight) for own in values)]
@@ -97,6 +99,7 @@ def truth_of(body: Body, times: NDArray[np.float64]) -> dict[str, NDArray[np.flo
     for number, person in enumerate(body.people):
         end = person.duration_s
         joints[:, number] = person.motion.at(np.minimum(times, end))[0]
+        # A central difference, one-sided at both ends of the recording.
         ends = np.clip([times - _STEP_S / 2, times + _STEP_S / 2], 0.0, end)
         before, after = (person.motion.at(instants)[0][:, 0] for instants in ends)
         apart_s, away = ends[1] - ends[0], np.linalg.norm(after - before, axis=1)
@@ -115,6 +118,7 @@ def labelled_echoes(capture: Capture, chirps: NDArray[np.int64]) -> xr.Dataset:
     import xarray as xr  # slow to import
 
     radar, parts = capture.radar, parts_of(capture)
+    # A few chirps tell how many echoes there are, before all of them take memory.
     few = capture.model.echoes(chirps[:_FEW_CHIRPS])
     count = float(len(chirps)) * radar.n_rx * len(few.part)
     refuse_large(
@@ -123,6 +127,7 @@ def labelled_echoes(capture: Capture, chirps: NDArray[np.int64]) -> xr.Dataset:
         "take them for a shorter time (start_s, duration_s)",
     )
     echoes = few if len(chirps) <= _FEW_CHIRPS else capture.model.echoes(chirps)
+    # Amplitudes are known at some frequencies of the sweep; one at its centre stands for them.
     centre_hz = radar.centre_frequency_hz
     (amplitude,) = at_nodes(echoes.amplitude, echoes.frequency, np.array([centre_hz]))
     axes = "chirp", "rx", "echo"
@@ -170,6 +175,7 @@ def compared_echoes(captures: Mapping[str, Capture], reference: str) -> xr.Datas
     """
     import xarray as xr  # slow to import
 
+    # The same whole cycles for all levels, evenly over the recording.
     first = captures[reference]
     n_cycles = first.n_chirps // first.radar.n_tx
     cycles = np.unique(np.linspace(0, n_cycles - 1, CYCLES_COMPARED).astype(np.int64))
@@ -181,6 +187,8 @@ def compared_echoes(captures: Mapping[str, Capture], reference: str) -> xr.Datas
         compat="override",
         join="outer",
     )
+    # Levels may have other echoes, but the parts are the same, so differences are taken part by
+    # part.
     other = found.sel(fidelity=reference, drop=True)
     differences = {
         "length_difference_m": found["length_m"] - other["length_m"],
@@ -196,12 +204,14 @@ def _by_part(echoes: xr.Dataset, capture: Capture) -> xr.Dataset:
     parts, names = parts_of(capture), echoes["part"].values
     length, amplitude = echoes["length_m"].values, echoes["amplitude"].values
     wavenumber = 2 * np.pi * echoes.attrs["frequency_hz"] / SPEED_OF_LIGHT_MPS
+    # A matrix (echo, part) of ones and zeros makes sums over the echoes of each part.
     own = np.array([names == name for name in parts.names], dtype=np.float64).T
     power = np.abs(amplitude) ** 2
     total = power @ own
     mean = np.divide(
         (power * length) @ own, total, out=np.full(total.shape, np.nan), where=total > 0
     )
+    # The field of an echo has the phase exp(+jkL), that of its IF.
     field = (amplitude * np.exp(1j * wavenumber * length)) @ own
     axes = "chirp", "rx", "part"
     coordinates = {name: echoes.coords[name] for name in ("chirp", "time", "tx")}
@@ -222,8 +232,8 @@ _RATE_CYCLES = 2
 """Cycles before and after such a time, over which range rates are taken."""
 
 MAX_SHOWN, SHOWN_HZ = 400, 40.0
-"""Largest number of frames whose middle is kept, those of 10 s, and of these in a second; of longer
-captures fewer frames are kept."""
+"""Largest number of frames whose middle is kept, which lasts for 10 s, and their largest rate [Hz].
+Longer captures keep fewer frames a second."""
 
 
 class Look(NamedTuple):
@@ -253,9 +263,11 @@ class EchoTable:
         self.capture, self._middles, radar = capture, middles, capture.radar
         self._cycles = radar.cycles_per_frame
         self._every = max(1, self._cycles // _INSTANTS)
+        # One Tx stands for all of them: the one nearest to the middle of the array.
         self._middle_tx = int(
             np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin()
         )
+        # Looks of the frames at hand by their cycle, and those of shown frames, which stay.
         self._kept: dict[int, Look] = {}
         starts = capture.frame_starts[self.shown_frames].tolist()
         self._shown = dict[int, Look | None].fromkeys(starts)
@@ -267,6 +279,7 @@ class EchoTable:
         hop_s = radar.frame_hop_s
         if len(starts) > 1:
             hop_s = radar.frame_period_s or float(np.diff(starts).mean()) * radar.cycle_duration_s
+        # As many frames at most, and no more of them in a second of radar, as the view shows.
         every = max(math.ceil(len(starts) / MAX_SHOWN), math.ceil(1 / (SHOWN_HZ * hop_s) - 1e-6))
         return np.arange(0, len(starts), every)
 
@@ -291,6 +304,8 @@ class EchoTable:
     def _instants(self, start_cycle: int) -> Indices:
         """Cycles about a frame at which echoes are looked at; past a gap there is nothing."""
         end, every = start_cycle + self._cycles, self._every
+        # A frame with gaps around it has instants of its own, with one at each end. Without gaps
+        # the instants are multiples of a step, so that overlapping frames share them.
         if self.capture.radar.in_frames:
             return np.append(np.arange(start_cycle, max(end - 1, start_cycle + 1), every), end - 1)
         return np.arange(start_cycle // every, (end - 1) // every + 2) * every
@@ -299,6 +314,7 @@ class EchoTable:
         """Echoes at some cycles about a frame, found once for all frames."""
         missing = [number for number in numbers.tolist() if number not in self._kept]
         if missing:
+            # Frames come in order: what lies before this one is not asked for again.
             first = int(self._instants(start_cycle)[0])
             self._kept = {n: look for n, look in self._kept.items() if n >= first}
             wanted = sorted({*missing, *self._ahead(start_cycle)} - self._kept.keys())
@@ -319,12 +335,14 @@ class EchoTable:
 
     def _look(self, numbers: Indices) -> list[Look]:
         capture, radar = self.capture, self.capture.radar
+        # Each instant is looked at a few cycles before and after it, for the range rate between.
         cycles = numbers[:, None] + [-_RATE_CYCLES, _RATE_CYCLES]
         cycles = np.clip(cycles, 0, capture.n_chirps // radar.n_tx - 1)
         if radar.in_frames:
             first = numbers[:, None] - numbers[:, None] % self._cycles
             cycles = np.clip(cycles, first, first + self._cycles - 1)
         wanted = (cycles * radar.n_tx + self._middle_tx).astype(np.int64)
+        # Neighbouring instants share chirps, whose echoes are computed once.
         chirps, where = np.unique(wanted, return_inverse=True)
         echoes = capture.model.echoes(chirps)
         # (number, before and after, rx, echo)
@@ -335,6 +353,7 @@ class EchoTable:
         both = np.sqrt(power[:, 0] * power[:, 1])
         weight = np.where(both.any(axis=1, keepdims=True), both, 1.0)
         weight /= weight.sum(axis=1, keepdims=True)
+        # Range and rate are means over receivers, weighted by power. The range is half the path.
         before, after = ((weight * length[:, side]).sum(axis=1) for side in (0, 1))
         apart_s = np.diff(cycles, axis=1) * radar.cycle_duration_s
         rate = np.divide(after - before, 2 * apart_s, out=np.zeros_like(before), where=apart_s > 0)

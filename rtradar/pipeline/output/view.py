@@ -65,6 +65,7 @@ def view(
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
     if not os.path.isdir(folder):
         raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
+    # A folder that a run has not finished is refused before it is read.
     check_whole(Path(folder))
     run_view = load_run_view(Path(folder))
     times, margin_s = run_view.snapshots.times, run_view.radar.frame_duration_s
@@ -79,6 +80,7 @@ def view(
         "first_s": float(times[0]),
         "last_s": float(times[-1]),
     }
+    # The page and the still are made of the same view.
     if page is not None:
         write_view(page, run_view, name=printable(Path(folder).resolve().name), colour=colour)
         shown["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
@@ -113,6 +115,8 @@ def load_run_view(folder: Path) -> RunView:
 
 def run_view_of(result: Result, maps: Mapping[str, Any], snapshots: Snapshots) -> RunView:
     """Return the view of a run from what it found, its maps with their axes, and snapshots."""
+    # The summary may be anybody's: what it lacks has a default, and its texts are made fit to
+    # print.
     summary, radar, points = result.summary, result.radar, result.points
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
@@ -141,6 +145,7 @@ def read_result(folder: Path) -> Result:
 
     InputError if there is no run, or a file is missing or damaged.
     """
+    # The path is set anew before each file, so that a complaint names the one that is damaged.
     path = folder / "summary.json"
     if not os.path.isfile(path):
         raise InputError(
@@ -226,17 +231,20 @@ def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
 def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
     """Maps of the windows of the snapshots, mean of the channels."""
     power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
+    # In the unit of the pictures, which may take out the loss with distance, range by range.
     unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
     scale = np.asarray(unit.scale) / radar.n_channels
     windows = snapshots.window.tolist()
+    # Large maps are pooled to the strongest of neighbouring cells, so that no echo is lost.
     rows, columns = math.ceil(len(distance) / _MAX_ROWS), math.ceil(len(velocity) / _MAX_COLUMNS)
     shape = len(windows), math.ceil(len(distance) / rows), math.ceil(len(velocity) / columns)
     pooled, medians = np.empty(shape, np.float32), []
-    for number, window in enumerate(windows):  # read once, for that takes longest
+    for number, window in enumerate(windows):  # read once, because that takes longest
         found = power[window] * scale
         pooled[number] = strongest(found, rows, columns)
         if number % math.ceil(len(windows) / _SAMPLED) == 0:
             medians.append(float(np.median(found)))
+    # The scale of the colours runs from the noise, the median of some maps, to the strongest cell.
     scaled = FieldUnit(unit.name, 1.0)
     extremes = np.array([pooled.max(), np.median(medians)])
     limits = limits_of(*scaled.level(_powers(extremes)).tolist())
@@ -274,20 +282,25 @@ def _of_points(
     power, found = np.zeros(len(points)), np.full(len(points), -1)
     if not len(points):
         return power, found
+    # The cell of a point is that between whose borders, half-way between the middles of cells, it
+    # lies.
     axes = [maps[axis][:] for axis in _MAPS["range_doppler"]]
     cells = [
         np.searchsorted((values[1:] + values[:-1]) / 2, column)
         for values, column in zip(axes, points.T, strict=True)
     ]
+    # The 27 cells about a point, its own first, then those across a face, an edge and a corner.
     nearest_first = sorted(np.ndindex(3, 3, 3), key=lambda step: sum(abs(i - 1) for i in step))
     for window in np.unique(cells[0]).tolist():
         own = np.flatnonzero(cells[0] == window)
         power[own] = maps["range_doppler"][window][cells[1][own], cells[2][own]]
         if "source" not in maps:
             continue
+        # Only three frames of sources are in memory at a time.
         first = max(window - 1, 0)
         near = np.asarray(maps["source"][first : window + 2])
         sources = _sound("source", near, {}, "i8", _MAPS["range_doppler"])
+        # Points that no nearer cell has given a source look at the next one.
         for step in nearest_first:
             lacking = own[found[own] < 0]
             at = [cells[axis][lacking] + step[axis] - 1 for axis in range(3)]

@@ -116,11 +116,13 @@ class RunWriter(AbstractContextManager["RunWriter"]):
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.max_chirps = self._clouds.max_chirps
         self._angle_names = measured_angles(radar)
+        # Each kind of map has frames of its own length, over which clutter is removed.
         removed = {
             "time": removal.description(radar.cycles_per_frame),
             "slow_time": removal.description(self._range_time.window_cycles),
             "spectrogram_time": removal.description(processing.window_cycles),
         }
+        # The middle frame is kept as received only where something is removed from it.
         self._received: list[NDArray[np.complexfloating]] = []
         self._kept_cycle = None
         if len(frame_starts) and removed["time"] != "none":
@@ -138,9 +140,11 @@ class RunWriter(AbstractContextManager["RunWriter"]):
         A block that is cut after a multiple of ``max_chirps`` chirps gives the same as the whole.
         """
         stages, store = self._processing.stages, self._store
+        # Before clutter is removed, because that frame is wanted with its clutter.
         if self._kept_cycle is not None:
             self._keep_received(spectra, first, self._kept_cycle)
         spectra = self._clouds.without_clutter(spectra, first)
+        # Maps over slow time and the spectrogram are made of the stream itself.
         with stages.time("range"):
             power, times = self._range_time.push(spectra, first)
         with stages.time("spectrogram"):
@@ -148,6 +152,8 @@ class RunWriter(AbstractContextManager["RunWriter"]):
         with stages.time("write"):
             store.extend("slow_time", times, range_time=power)
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
+        # Frames that end with this block give the range-Doppler maps, and from these everything
+        # else.
         for frame in self._clouds.frames(spectra):
             maps = {"range_doppler": frame.power, "detections": frame.mask}
             if frame.sources is not None:
@@ -175,13 +181,16 @@ class RunWriter(AbstractContextManager["RunWriter"]):
     ) -> None:
         """Collect the range spectra of the frame that is kept, and once it is whole, its maps."""
         radar, windows = self._processing.radar, self._processing.window_functions
+        # Where the frame begins and ends in this block; it may reach over several.
         begin = start_cycle * radar.n_tx - first
         end = begin + radar.chirps_per_frame
         if end <= 0 or begin >= len(spectra):
             return
+        # A copy, because the next block comes in the same array.
         self._received.append(spectra[max(begin, 0) : end].copy())
         if end > len(spectra):
             return
+        # The frame is whole: the same maps as of any other, but with the clutter in it.
         shape = radar.cycles_per_frame, radar.n_tx, *spectra.shape[1:]
         cube, self._received = np.concatenate(self._received).reshape(shape), []
         with self._processing.stages.time("received"):
@@ -241,9 +250,9 @@ class MapStore:
     ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
-    becomes an attribute of their datasets, ``attributes`` those of the file. ``unit`` is that of
-    the samples, whose square is that of powers. For the ``parts`` there is a group ``truth``, and
-    without them no map ``source``.
+    becomes an attribute of their datasets, and ``attributes`` become attributes of the file.
+    Samples have the ``unit``, and powers have its square. With ``parts`` there is a group
+    ``truth``, and without them there is no map ``source``.
     """
 
     def __init__(
@@ -263,11 +272,13 @@ class MapStore:
         self._dtypes: dict[str, np.dtype[Any]] = {}
         self._waiting: dict[str, list[NDArray[Any]]] = {}
         self._waiting_bytes = 0
+        # Axes that grow have no values yet, the others have all of theirs.
         self._file.attrs.update(attributes)
         for name in _GROWING:
             self._growing(name, TABLES["axes"][name])
         for name, values in fixed.items():
             self._make(name, TABLES["axes"][name], data=values)
+        # Maps are made if all of their axes but the growing one are known.
         said = {"gaps": attributes["gaps"]} if "gaps" in attributes else {}
         for name, kind in TABLES["maps"].items():
             unknown = name == "source" and parts is None
@@ -287,11 +298,14 @@ class MapStore:
     def _growing(self, name: str, kind: Array, shape: tuple[int, ...] = (), **said: object) -> None:
         """Make an array of no steps of this shape yet."""
         steps = _STEPS_A_CHUNK[len(shape)] if len(shape) < 2 else 1
+        # A chunk holds one map, or many steps of an axis or of a row.
         chunk = steps, *(size or 1 for size in shape)  # HDF5 has no chunks of nothing
         options: dict[str, Any] = {"maxshape": (None, *(size or None for size in shape))}
         # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
         chunk_bytes = math.prod(chunk) * np.dtype(kind.dtype).itemsize
         options |= {"chunks": chunk, "rdcc_nbytes": 0 if steps == 1 else chunk_bytes}
+        # Masks and sources are the same nearly everywhere: the fastest compression shrinks them
+        # most.
         if kind.sparse:
             options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
         self._make(name, kind, said, shape=(0, *shape), **options)
@@ -307,7 +321,7 @@ class MapStore:
     def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
         """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it.
 
-        They wait until there are some megabytes, for HDF5 takes as long for one step as for many.
+        They wait for some megabytes, because HDF5 takes as long for one step as for many.
         """
         for name, added in ((axis, values), *maps.items()):
             steps: NDArray[Any] = np.array(added, dtype=self._dtypes[name])
@@ -332,6 +346,7 @@ class MapStore:
 
     def put_truth(self, body: Body) -> None:
         """Write what is true of each person of a body at the times of the frames."""
+        # The times of the frames must be in the file before they are read from it.
         self._write()
         axes = {"person": body.names, "joint": NODES, "coordinate": ("x", "y", "z")}
         for name, names in axes.items():
