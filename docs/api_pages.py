@@ -33,7 +33,7 @@ PACKAGES = {
 
 FIRST_PAGE = {
     "Motion": ("load_motion", "synthetic_motion", "Motion"),
-    "Radar": ("Radar", "Antenna", "Receiver", "Interferer"),
+    "Radar": ("Radar", "Antenna", "Receiver", "Interferer", "Chip"),
     "Scene": ("Scene", "Person", "Object", "Turning", "Swinging", "FollowingPath"),
     "Run": ("run", "simulate", "process_samples", "compare", "RunSettings", "Breathing"),
     "Results": ("Result", "Simulation", "Comparison"),

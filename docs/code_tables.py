@@ -20,7 +20,7 @@ from rtradar.campaign.intervals import INTERVAL_KEYS, Augmented, Intervals
 from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS
 from rtradar.campaign.spec_file import RUN_LIMITS
 from rtradar.clouds.sample_files import TABLES as ARRAY_TABLES
-from rtradar.front_end import Antenna, Interferer, Receiver
+from rtradar.front_end import Antenna, Chip, Interferer, Receiver
 from rtradar.motion import ACTIVITIES
 from rtradar.radar import Radar
 from rtradar.scene import (
@@ -428,6 +428,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "antenna-keys": lambda: keys(Antenna),
     "receiver-keys": lambda: keys(Receiver),
     "interferer-keys": lambda: keys(Interferer),
+    "chip-keys": lambda: keys(Chip),
     "radar-limits": radar_limits,
     "board-limits": board_limits,
     "scene-keys": scene_keys,

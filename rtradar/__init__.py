@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     )
     from rtradar.front_end import (
         Antenna as Antenna,
+        Chip as Chip,
         Interferer as Interferer,
         Receiver as Receiver,
     )
@@ -76,7 +77,7 @@ _NAMES = {
     "clouds": "Collection",
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
-    "front_end": "Antenna Interferer Receiver",
+    "front_end": "Antenna Chip Interferer Receiver",
     "motion": "Motion load_motion register_reader synthetic_motion",
     "pipeline": "Comparison Experiment Result Simulation Sweep compare "
     "compare_recordings process_samples run simulate sweep",

@@ -1,4 +1,4 @@
-"""Front end of a radar: antenna elements, and what a real receiver adds to the IF."""
+"""Front end of a radar: antennas, what a receiver adds to the IF, and how a chip detects."""
 
 from __future__ import annotations
 
@@ -284,3 +284,54 @@ class Receiver:
             "highpass_hz": self.highpass_hz,
         }
         return tuple(name for name, value in named.items() if value)
+
+
+_Cells = Annotated[int, Limits(1, 64)]
+_Mode = Literal["ca", "cago", "caso"]
+_ThresholdDb = Annotated[float, Limits(1e-3, 200, "it must be above 0 dB, and at most 200")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chip:
+    """How a chip of Texas Instruments makes points of a frame: the lines of its configuration file.
+
+    The defaults are those of the "out of box" profiles of the mmWave SDK.
+
+    Parameters
+    ----------
+    cfar_axes : {"both", "range", "doppler"}
+        Axes over which a cell must exceed the noise beside it, one for each line ``cfarCfg``.
+    threshold_db, doppler_threshold_db : float
+        Level of a cell above the noise beside it, over range and over Doppler [dB].
+    range_mode, doppler_mode : {"ca", "cago", "caso"}
+        Noise beside a cell: the mean of both sides, or of that with the greatest or the smallest.
+    range_noise, doppler_noise : int
+        Number of cells on either side whose mean is the noise.
+    range_guard, doppler_guard : int
+        Number of cells between them and the cell itself, on either side.
+    grouping : {"both", "range", "doppler", "none"}
+        Axes along which a cell that is weaker than its neighbour is left out. Along others a strong
+        echo gives a point for every cell of its main lobe.
+    max_points : int
+        Largest number of points of a frame.
+
+    Raises
+    ------
+    InputError
+        Where a value is out of its range.
+    """
+
+    cfar_axes: Literal["both", "range", "doppler"] = "both"
+    threshold_db: _ThresholdDb = 15.0
+    doppler_threshold_db: _ThresholdDb = 15.0
+    range_mode: _Mode = "caso"
+    doppler_mode: _Mode = "ca"
+    range_noise: _Cells = 8
+    doppler_noise: _Cells = 4
+    range_guard: Annotated[int, Limits(0, 64)] = 4
+    doppler_guard: Annotated[int, Limits(0, 64)] = 2
+    grouping: Literal["both", "range", "doppler", "none"] = "both"
+    max_points: Annotated[int, Limits(1, 10_000)] = 100
+
+    def __post_init__(self) -> None:
+        check_fields(self, "chip: ")

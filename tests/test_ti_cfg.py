@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import contextlib
 import warnings
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from hypothesis import strategies as st
 from rtradar.cli.captures import _radar_and_layout
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.exchange import Dca1000Layout
+from rtradar.front_end import Chip
 from rtradar.radar import Radar
 from rtradar.radar.ti_cfg import read_ti_cfg
 from rtradar.system.registries import BOARDS
@@ -392,9 +395,63 @@ def test_what_a_file_asks_of_the_processing_is_named_with_what_does_it(tmp_path:
     more = "clutterRemoval -1 1\ncfarCfg -1 0 2 8 4 3 0 15 1\nextendedMaxVelocity -1 0\n"
     _, warning = said(VISUALIZER_16XX + more, tmp_path)
     assert "clutterRemoval (line 13; --clutter-removal mean)" in warning
-    assert "cfarCfg (line 14; --detector and --pfa)" in warning
+    assert "cfarCfg" not in warning
     assert "extendedMaxVelocity" not in warning
     assert said(VISUALIZER_16XX + "clutterRemoval -1 0\n", tmp_path)[1] == ""
+
+
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        # Of the xWR14xx: 512 steps are 6 dB.
+        (
+            "cfarCfg 0 2 8 4 3 0 768\npeakGrouping 1 0 1 1 125\n",
+            {"cfar_axes": "range", "threshold_db": 9.03, "grouping": "doppler"},
+        ),
+        # Of the xWR16xx: 256 steps for each of 2 x 4 virtual antennas.
+        (
+            "cfarCfg -1 0 0 6 2 4 0 5120\ncfarCfg -1 1 1 4 1 2 0 2560\n"
+            "peakGrouping -1 1 1 1 1 255\n",
+            {
+                "threshold_db": 15.05,
+                "range_mode": "ca",
+                "range_noise": 6,
+                "range_guard": 2,
+                "doppler_threshold_db": 7.53,
+                "doppler_mode": "cago",
+                "doppler_noise": 4,
+                "doppler_guard": 1,
+            },
+        ),
+        # Of SDK 3: decibels, and grouping by axis.
+        (
+            "cfarCfg -1 0 2 8 4 3 0 15 0\ncfarCfg -1 1 0 4 2 3 1 12 1\n",
+            {"threshold_db": 15.0, "doppler_threshold_db": 12.0, "grouping": "doppler"},
+        ),
+        ("cfarCfg -1 0 2 8 4 3 0 15 0\n", {"cfar_axes": "range", "grouping": "doppler"}),
+    ],
+)
+def test_how_the_chip_detects_is_read(lines: str, expected: dict[str, Any], tmp_path: Path) -> None:
+    radar, warning = said(VISUALIZER_16XX + lines, tmp_path)
+    assert radar.chip is not None
+    for key, value in asdict(Chip(**expected)).items():
+        assert getattr(radar.chip, key) == pytest.approx(value, rel=1e-3), key
+    # Six cells on either side are divided by 16.
+    assert ("the noise is the mean of its cells" in warning) == (" 6 2 4 " in lines)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("cfarCfg -1 2 2 8 4 3 0 15 1", "line 13: the direction of CFAR is 2"),
+        ("cfarCfg -1 0 3 8 4 3 0 15 1", "line 13: the mode of CFAR is 3"),
+        ("cfarCfg -1 0 2 8 4 3 0 0 1", "chip: threshold_db = 0.0; it must be above 0 dB"),
+        ("cfarCfg -1 0 2", "cfarCfg has 3 values"),
+    ],
+)
+def test_what_no_chip_does_is_refused(line: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=says):
+        said(VISUALIZER_16XX + line + "\n", tmp_path)
 
 
 def test_the_place_of_the_sensor_is_that_of_the_radar(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,11 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from rtradar.errors import InputError
+from rtradar.errors import InputError, prefixed
+from rtradar.front_end import Chip
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.signal.multiplexing import tell_apart
-from rtradar.system.checks import brief
 from rtradar.system.registries import DETECTORS
 
 Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
@@ -186,10 +187,6 @@ def _parameters(find: Callable[..., Any]) -> list[str]:
 ANGLE_BINS = 64
 """Bins of the azimuth FFT, which lie evenly over the sine from -1 to 1."""
 
-_RANGE_GUARD, _RANGE_NOISE = 4, 8
-_DOPPLER_GUARD, _DOPPLER_NOISE = 2, 4
-"""Guard and noise cells on either side (cfarCfg of the demo's default profile)."""
-
 _GROUPED = {"both": (3, 3), "range": (1, 3), "doppler": (3, 1), "none": (1, 1)}
 """Cells (Doppler, range) about a cell among which it must be the strongest, by ``grouping``."""
 
@@ -203,10 +200,10 @@ def ti_oob(
     radar: Radar,
     *,
     window_functions: WindowFunctions = DEFAULT_WINDOWS,
-    threshold_db: float = 15.0,
-    max_points: int = 100,
-    cfar_axes: str = "both",
-    grouping: str = "both",
+    threshold_db: float | None = None,
+    max_points: int | None = None,
+    cfar_axes: str | None = None,
+    grouping: str | None = None,
 ) -> tuple[NDArray[np.bool_], _Reals]:
     """Points of one frame as the chips of Texas Instruments make them.
 
@@ -215,20 +212,16 @@ def ti_oob(
     cube : (cycle, tx, rx, range) complex
         Range spectra of one frame, without static clutter.
     radar : Radar
-        Radar under TDM or BPM.
+        Radar under TDM or BPM, whose ``chip`` says how it detects.
     window_functions : WindowFunctions
         Window functions, of which that in slow time is applied.
-    threshold_db : float
-        Level of a cell above the noise beside it, over the axes of ``cfar_axes`` [dB].
-    max_points : int
-        Largest number of points. The list is filled in the order of the chip: by Doppler bin, from
-        that of no speed on, the receding ones first, then by range.
-    cfar_axes : {"both", "range"}
-        Axes over which a cell must exceed the noise. The first SDK of the IWR1443 has range alone.
-    grouping : {"both", "range", "doppler", "none"}
-        Axes along which a cell that is weaker than its neighbour is left out. The line
-        ``peakGrouping`` of a profile says it; without any, a strong echo gives a point for every
-        cell of its main lobe.
+    threshold_db : float, optional
+        Level of a cell above the noise beside it, over both axes, in place of the chip's own [dB].
+    max_points : int, optional
+        Largest number of points, in place of the chip's own. The list is filled in the order of the
+        chip: by Doppler bin, from that of no speed on, the receding ones first, then by range.
+    cfar_axes, grouping : str, optional
+        Axes of CFAR and of peak grouping, see `Chip`, in place of the chip's own.
 
     Returns
     -------
@@ -248,32 +241,38 @@ def ti_oob(
             f"detector ti-oob: radar '{radar.name}' has multiplexing = '{radar.multiplexing}'; the "
             "chain is that of tdm and bpm"
         )
-    whole = 1 <= max_points < np.inf and max_points == int(max_points)
-    for option, value, good, wanted in (
-        ("threshold_db", threshold_db, 0 < threshold_db < np.inf, "it must be above 0 dB"),
-        ("max_points", max_points, whole, "it must be a whole number, at least 1"),
-        ("cfar_axes", cfar_axes, cfar_axes in ("both", "range"), "allowed: both, range"),
-        ("grouping", grouping, grouping in _GROUPED, f"allowed: {', '.join(_GROUPED)}"),
-    ):
-        if not good:
-            raise InputError(f"detector ti-oob: {option} = {brief(value)}; {wanted}")
+    given: dict[str, Any] = {
+        "threshold_db": threshold_db,
+        "doppler_threshold_db": threshold_db,
+        "max_points": max_points,
+        "cfar_axes": cfar_axes,
+        "grouping": grouping,
+    }
+    with prefixed("detector ti-oob: "):
+        chip = replace(
+            radar.chip or Chip(), **{key: own for key, own in given.items() if own is not None}
+        )
     n_cycles = len(cube)
     window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
     spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)
     velocity = np.fft.ifftshift(radar.velocity_mps(n_cycles))
+    # The Tx transmit one after the other, while targets move on: their phases are turned back.
     turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
     still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
     spectra = tell_apart(spectra * still[:, :, None, None], radar)
     level_db = _heat_map(spectra)
-    beside_db = _along_range(level_db)
-    if cfar_axes == "both":
-        beside_db = np.maximum(_beside(level_db), beside_db)
-    detected = level_db > threshold_db + beside_db
+    detected = np.ones(level_db.shape, dtype=np.bool_)
+    if chip.cfar_axes != "range":
+        beside = _around(level_db, chip.doppler_mode, chip.doppler_noise, chip.doppler_guard)
+        detected &= level_db > chip.doppler_threshold_db + beside
+    if chip.cfar_axes != "doppler":
+        beside = _along(level_db, chip.range_mode, chip.range_noise, chip.range_guard)
+        detected &= level_db > chip.threshold_db + beside
     # Peak grouping; the Doppler axis is a circle, and beyond the range axis there is nothing.
     beyond = np.pad(level_db, ((0, 0), (1, 1)), constant_values=-np.inf)
-    neighbours = maximum_filter(beyond, size=_GROUPED[grouping], mode="wrap")[:, 1:-1]
+    neighbours = maximum_filter(beyond, size=_GROUPED[chip.grouping], mode="wrap")[:, 1:-1]
     doppler, row = np.nonzero(detected & (level_db >= neighbours))
-    doppler, row = doppler[: int(max_points)], row[: int(max_points)]
+    doppler, row = doppler[: chip.max_points], row[: chip.max_points]
     column = (doppler + n_cycles // 2) % n_cycles
     mask = np.zeros((cube.shape[3], n_cycles), dtype=np.bool_)
     mask[row, column] = True
@@ -289,35 +288,45 @@ def _heat_map(spectra: NDArray[np.complexfloating]) -> _Reals:
     return np.asarray(10 * np.log10(np.maximum(power, least)).mean(axis=(1, 2)), dtype=np.float64)
 
 
-def _beside(level_db: _Reals) -> _Reals:
-    """Mean level of the noise cells on both sides of each cell over Doppler, which is a circle."""
+_OF_BOTH = {"cago": np.max, "caso": np.min}
+"""Which of the means of both sides is the noise, by the mode of CFAR."""
+
+
+def _around(level_db: _Reals, mode: str, noise: int, guard: int) -> _Reals:
+    """Noise beside each cell over Doppler, which is a circle, of cells (doppler, range) [dB]."""
     count = len(level_db)
-    guard = {step % count for step in range(-_DOPPLER_GUARD, _DOPPLER_GUARD + 1)}
-    farthest = _DOPPLER_GUARD + _DOPPLER_NOISE
-    steps = {step % count for step in range(-farthest, farthest + 1)} - guard
-    if not steps:
+    near = {step % count for step in range(-guard, guard + 1)}
+    far = range(guard + 1, guard + noise + 1)
+    sides = [{sign * step % count for step in far} - near for sign in (-1, 1)]
+    if not all(sides):
         raise InputError(
             f"detector ti-oob: {count} Doppler bins leave no cell for the noise beside one; take "
-            f"at least {2 * _DOPPLER_GUARD + 2} cycles in a frame (frame_duration_s)"
+            f"at least {2 * guard + 2} cycles in a frame (frame_duration_s)"
         )
-    return np.asarray(np.mean([np.roll(level_db, step, axis=0) for step in sorted(steps)], axis=0))
+    # On a short circle both sides have cells in common, each of which counts once in their mean.
+    sides = [sides[0] | sides[1]] if mode == "ca" else sides
+    means = [
+        np.mean([np.roll(level_db, step, axis=0) for step in sorted(side)], axis=0)
+        for side in sides
+    ]
+    return np.asarray(_OF_BOTH.get(mode, np.mean)(means, axis=0))
 
 
-def _along_range(level_db: _Reals) -> _Reals:
-    """Mean level of the noise cells on that side of each cell over range where it is the less.
+def _along(level_db: _Reals, mode: str, noise: int, guard: int) -> _Reals:
+    """Noise beside each cell over range, of cells (doppler, range) [dB].
 
-    It is CFAR_CASO, mode 2 of cfarCfg, which the profiles of the SDK have over range, and CFAR_CA
-    over Doppler. At the ends of the axis one side is whole; infinite where none is.
+    At the ends of the axis one side is whole, which counts alone; infinite where none is.
     """
-    count = level_db.shape[1]
-    means = np.full((2, *level_db.shape), np.inf)
+    means = np.full((2, *level_db.shape), np.nan)
     total = np.cumsum(np.pad(level_db, ((0, 0), (1, 0))), axis=1)
-    whole = count - _RANGE_GUARD - _RANGE_NOISE
+    whole = level_db.shape[1] - guard - noise
     if whole > 0:
-        sums = (total[:, _RANGE_NOISE:] - total[:, :-_RANGE_NOISE]) / _RANGE_NOISE
-        means[0, :, _RANGE_GUARD + _RANGE_NOISE :] = sums[:, :whole]
+        sums = (total[:, noise:] - total[:, :-noise]) / noise
+        means[0, :, guard + noise :] = sums[:, :whole]
         means[1, :, :whole] = sums[:, -whole:]
-    return np.asarray(means.min(axis=0))
+    # A side that is not whole gives way to the other.
+    means = np.where(np.isnan(means), means[::-1], means)
+    return np.nan_to_num(_OF_BOTH.get(mode, np.mean)(means, axis=0), nan=np.inf)
 
 
 def _sines(values: NDArray[np.complexfloating], radar: Radar) -> _Reals:

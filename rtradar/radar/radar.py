@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from rtradar.cards import html_card, text_card
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError, prefixed
-from rtradar.front_end import Antenna, Receiver
+from rtradar.front_end import Antenna, Chip, Receiver
 from rtradar.radar import display
 from rtradar.radar.checks import check_rules
 from rtradar.radar.schedule import FollowingCount, Schedule
@@ -119,6 +119,8 @@ class Radar(Schedule):
         Elements of each Tx and Rx, a table in TOML; isotropic by default.
     receiver : Receiver, optional
         What the receiver adds to the IF, a table in TOML; an ideal one by default.
+    chip : Chip, optional
+        How `ti-oob` detects on this radar, a table in TOML; as the "out of box" demo by default.
 
     Raises
     ------
@@ -153,6 +155,7 @@ class Radar(Schedule):
     tx_antenna: Antenna | None = None
     rx_antenna: Antenna | None = None
     receiver: Receiver | None = None
+    chip: Chip | None = None
 
     def __post_init__(self) -> None:
         # The number of chirps either is given or follows from the duration of a frame. One that

@@ -20,6 +20,7 @@ from typing import Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from rtradar.errors import InputError, ValidityWarning, prefixed
+from rtradar.front_end import Chip
 from rtradar.radar.radar import Radar
 from rtradar.system.checks import brief, printable
 from rtradar.system.files import read_bytes
@@ -36,6 +37,12 @@ _BOARDS, _PROCESSING, _REFUSED = (_TABLE[key] for key in ("boards", "processing"
 _GEOMETRIES = {tuple(places): board for board, places in _TABLE["geometries"].items()}
 _COUNTS: dict[str, Sequence[int]] = {**_TABLE["counts"], "antGeometryCfg": range(2, 100)}
 """Commands that are read, with the numbers of values that they may have."""
+
+_Q9_DB, _Q8_DB = 20 * math.log10(2) / 512, 20 * math.log10(2) / 256
+"""Decibels of one step of thresholds, which count logarithms to base 2 in units of 1/512 or, summed
+over the virtual antennas, 1/256."""
+
+_MODES = ("ca", "cago", "caso")
 
 _PLATFORM = re.compile(r"%\s*platform\s*:\s*(\S+)", re.IGNORECASE)
 
@@ -216,6 +223,8 @@ def _radar(
     Where the file says height and tilt of the sensor they count; beneath a ceiling it is above
     x = 0. It is named by its board and its file, once where the file is named after the board.
     """
+    virtual = len(fields["tx_positions_m"]) * rx_mask.bit_count()
+    fields["chip"] = _chip(path, commands, virtual) if "cfarCfg" in commands else None
     name = printable(path.stem)
     fields["name"] = name if board.name in name.lower() else f"{board.name} {name}"
     fields["rx_positions_m"] = tuple(own for k, own in enumerate(rx_places) if rx_mask >> k & 1)
@@ -225,6 +234,41 @@ def _radar(
         fields |= {"position_m": (*place, height_m), "yaw_deg": -azimuth_deg}
         fields["pitch_deg"] = -tilt_deg
     return dataclasses.replace(board, **fields)
+
+
+def _chip(path: Path, commands: _Commands, virtual: int) -> Chip:
+    """Say how the chip detects, by its lines ``cfarCfg`` and ``peakGrouping``.
+
+    Those of ``cfarCfg`` have 7 values on the xWR14xx, 8 on other chips up to SDK 2, whose first one
+    is the subframe, and 9 from SDK 3 on, which gives the threshold in decibels and says at the end
+    whether peaks are grouped along that axis.
+    """
+    found: dict[str, Any] = {}
+    grouped = {"range": True, "doppler": True}
+    axes: list[str] = []
+    for line in commands["cfarCfg"]:
+        count = len(line.values)
+        first = 0 if count == 7 else 1
+        axis = ("range", "doppler")[line.whole(first, 0, 1, "the direction of CFAR")]
+        mode = line.whole(first + 1, 0, 2, "the mode of CFAR")
+        cells, guard = (line.whole(first + k, 1 - (k == 3), 64, "the cells") for k in (2, 3))
+        both = 2 if mode == 0 else 1
+        if 2 ** line.whole(first + 4, 0, 8, "the divisor of the noise") != both * cells:
+            _warn(path, f"line {line.number}: the noise is the mean of its cells here")
+        step_db = {7: _Q9_DB, 8: _Q8_DB / virtual, 9: 1.0}[count]
+        key = "threshold_db" if axis == "range" else "doppler_threshold_db"
+        found[key] = step_db * line.values[first + 6]
+        found |= {f"{axis}_mode": _MODES[mode], f"{axis}_noise": cells, f"{axis}_guard": guard}
+        if count == 9:
+            grouped[axis] = bool(line.values[8])
+        axes.append(axis)
+    if "peakGrouping" in commands:
+        _, along_range, along_doppler, *_ = commands["peakGrouping"][-1].values[-5:]
+        grouped = {"range": bool(along_range), "doppler": bool(along_doppler)}
+    names = [axis for axis, on in grouped.items() if on]
+    grouping: Any = "both" if len(names) == 2 else (*names, "none")[0]
+    cfar_axes: Any = "both" if len(set(axes)) == 2 else axes[0]
+    return Chip(cfar_axes=cfar_axes, grouping=grouping, **found)
 
 
 def _virtual_places(line: _Line, n_tx: int, n_rx: int) -> tuple[_Places, _Places]:
@@ -275,6 +319,9 @@ def _commands(path: Path) -> tuple[_Commands, str | None]:
                 processing.setdefault(command, number)
         elif command and not re.fullmatch(_TABLE["without_effect"], command):
             unknown.setdefault(command, number)
+    if "chirpComnCfg" in found and "cfarCfg" in found:
+        # The low-power chips look for peaks over range and azimuth, in another chain.
+        processing["cfarCfg"] = found.pop("cfarCfg")[0].number
     listed = [f"{brief(name)[1:-1]} (line {n})" for name, n in unknown.items()]
     listed += [f"{name} (line {n}; {_PROCESSING[name]})" for name, n in processing.items()]
     if listed:

@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 
 import rtradar as rt
 from rtradar.clouds import points_of_sines
+from rtradar.description.run_file import plain
 from rtradar.errors import ExtensionError, InputError
 from rtradar.process import build_detector, build_point_detector, range_spectrum, ti_oob
+from rtradar.process.detectors import _along, _around
 
 RADAR = rt.Radar(
     name="board",
@@ -127,6 +129,34 @@ def test_over_range_alone_an_echo_at_all_speeds_is_seen() -> None:
     assert alone >= 8
 
 
+@pytest.mark.parametrize("mode", ["ca", "cago", "caso"])
+@pytest.mark.parametrize("axis", ["range", "doppler"])
+def test_the_noise_beside_a_cell_is_that_of_the_mode(mode: str, axis: str) -> None:
+    """The level rises by a step along the axis; a cell just below it has both beside it."""
+    level = np.zeros((32, 40))
+    across = level.T if axis == "range" else level
+    across[20:, :] = 10.0
+    found = _along(level, mode, 4, 2) if axis == "range" else _around(level, mode, 4, 2)
+    noise = found.T[:, 5] if axis == "range" else found[:, 5]
+    # Cells 21 to 24 are those above 18, of which 14 to 15 are below.
+    assert noise[18] == {"ca": 5.0, "cago": 10.0, "caso": 0.0}[mode]
+    assert noise[10] == 0.0
+    if axis == "range":  # at the ends one side is whole, and counts alone
+        assert noise[0] == 0.0
+        assert noise[39] == 10.0
+    else:  # a circle
+        assert noise[0] == noise[18]
+
+
+def test_the_radar_says_how_its_chip_detects() -> None:
+    own = dataclasses.replace(RADAR, chip=rt.Chip(grouping="none", threshold_db=20.0, max_points=7))
+    cube = cube_of(*TWO)
+    given = ti_oob(cube, RADAR, grouping="none", max_points=7)[0]
+    np.testing.assert_array_equal(ti_oob(cube, own, threshold_db=15.0)[0], given)
+    assert ti_oob(cube, own, grouping="both")[0].sum() == 2
+    assert rt.Radar.load(plain(own)) == own
+
+
 def test_the_list_ends_at_so_many_points_receding_ones_first() -> None:
     many = [(1.2 + 0.3 * k, speed, 0.0, 0.0) for k in range(8) for speed in (-2.0, 0.0, 2.0)]
     whole, _ = ti_oob(cube_of(*many), RADAR)
@@ -196,7 +226,7 @@ def test_azimuth_is_on_the_grid_of_measured_clouds() -> None:
 @pytest.mark.parametrize(
     ("options", "changes", "says"),
     [
-        ({"threshold_db": 0.0}, {}, "threshold_db = 0.0; it must be above 0"),
+        ({"threshold_db": 0.0}, {}, "threshold_db = 0.0; it must be above 0 dB"),
         ({"threshold_db": math.nan}, {}, "threshold_db = nan; it must be above 0"),
         ({"max_points": math.inf}, {}, "max_points = inf; it must be a whole number"),
         ({"max_points": 0}, {}, "max_points = 0; it must be a whole number"),

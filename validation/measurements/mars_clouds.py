@@ -40,7 +40,6 @@ Ints = NDArray[np.int64]
 FRAME_S, DOPPLER_BIN_MPS = 0.1, 0.356
 MOVES = 10
 RANGE_BINS = 128
-MOST_POINTS = 64
 LONGEST_GAP = 2  # frames, from one to the next; the reader of joints bridges as much
 SHORTEST = 8  # frames: the smoothing of shorter stretches is that of their ends alone
 
@@ -204,9 +203,7 @@ def detected(
     """Points of a frame, as the chip makes them, within the volume of the recorded ones."""
     radar = rt.Radar.preset("mars")
     own = cube - cube.mean(axis=0) if removal else cube  # static removal as the chip does it
-    mask, sines = ti_oob(
-        own, radar, max_points=MOST_POINTS, cfar_axes="range", grouping="none", **options
-    )
+    mask, sines = ti_oob(own, radar, **options)
     row, column = np.nonzero(mask)
     window = scipy.signal.windows.hann(len(cube), sym=False)[:, None, None, None]
     spectra = scipy.fft.fft(own[..., row] * window, axis=0)

@@ -41,7 +41,6 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.validate.rows import Row, judged, leave_out, main, reported
 
-THRESHOLD_DB = 9.0
 ACTIVITIES = {  # of the files, and of actors: activity, place [m] and heading [deg]
     "boxing": ("punch", (1.5, 0.0), 0.0),
     "jack": ("jumping_jack", (1.9, 0.0), 0.0),
@@ -89,11 +88,6 @@ def simulated(activity: str, seconds: float) -> Cloud:
         fidelity="specular",
         snr_db="physical",
         detector="ti-oob",
-        detector_options={
-            "threshold_db": THRESHOLD_DB,
-            "cfar_axes": "range",
-            "grouping": "doppler",
-        },
     )
     cloud = result.spatial
     moving = cloud.velocity != 0

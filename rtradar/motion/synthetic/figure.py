@@ -74,6 +74,7 @@ STYLES: Mapping[str, tuple[str, ...]] = {
     "fall": ("backward", "forward"),
     "punch": ("jab", "cross", "hook", "uppercut", "lunge"),
     "boxing": ("outfighter", "infighter", "steady"),
+    "jump": ("high", "hop"),
 }
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 

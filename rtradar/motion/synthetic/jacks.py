@@ -312,7 +312,7 @@ class _Jumper:
 
 def jumping_jack(duration_s: float, subject: Subject, activity: str = "jumping_jack") -> PosesAt:
     """Jumping jacks, or jumps with both legs on the spot, facing +x."""
-    return _Jumper(subject, activity, duration_s).poses
+    return _Jumper(subject, "hop" if subject.style == "hop" else activity, duration_s).poses
 
 
 def _between(
