@@ -36,7 +36,7 @@ from rtradar.system.seeds import check_seed, stream
 
 __all__ = ["ACTIVITIES", "ACTORS", "STYLES", "Traits", "synthetic_motion"]
 
-ACTORS = 3
+ACTORS = 4
 """Version of the actors, raised whenever one of them moves otherwise than before."""
 
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {

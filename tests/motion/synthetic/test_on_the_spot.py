@@ -101,6 +101,21 @@ def test_one_hand_waves_or_both_do(side: str) -> None:
     assert np.ptp(node(both, f"{other}_hand")[:, 2]) > 0.3
 
 
+def test_hops_are_low_and_their_arms_quiet() -> None:
+    """A flight of 0.26 s rises by g t^2 / 8 = 8 cm; the arms of a jump swing by up to 50 degrees."""
+
+    def reach(style: str, seed: int) -> tuple[float, float]:
+        motion = synthetic_motion("jump", seed, duration_s=4.0, style=style)
+        ahead = node(motion, "l_hand")[:, 0] - node(motion, "thorax")[:, 0]
+        return float(np.ptp(node(motion, "root")[:, 2])), float(np.ptp(ahead))
+
+    hops, jumps = (
+        np.array([reach(style, seed) for seed in range(12)]) for style in ("hop", "high")
+    )
+    assert np.median(hops, axis=0)[0] < 0.6 * np.median(jumps, axis=0)[0]
+    assert np.median(hops, axis=0)[1] < 0.5 * np.median(jumps, axis=0)[1]
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_jumps_fly_freely(seed: int) -> None:
     motion = synthetic_motion("jump", seed, duration_s=4.0)
