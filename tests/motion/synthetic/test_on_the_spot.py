@@ -102,7 +102,7 @@ def test_one_hand_waves_or_both_do(side: str) -> None:
 
 
 def test_hops_are_low_and_their_arms_quiet() -> None:
-    """A flight of 0.26 s rises by g t^2 / 8 = 8 cm; the arms of a jump swing by up to 50 degrees."""
+    """A flight of 0.26 s rises by g t^2 / 8, 8 cm; arms of jumps swing by up to 50 degrees."""
 
     def reach(style: str, seed: int) -> tuple[float, float]:
         motion = synthetic_motion("jump", seed, duration_s=4.0, style=style)
