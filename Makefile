@@ -1,6 +1,7 @@
 # make demo    a 3 s synthetic walk by two models side by side, in out/demo/
 # make test    the tests, in minutes
 # make test-all    these, and what takes minutes for one answer: browsers, gallery, slow levels, kills
+# make test-backends    a walk on each libLLVM of the machine, on none and on the scalar backend; part of test-all
 # make test-fresh    the property tests alone, on new random examples each time (TESTS=tests/motion: those of one folder)
 # make lint    ruff, mypy and the import contract
 # make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
@@ -16,7 +17,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 # Python keeps what it parsed: without that, each process would parse all modules and tests anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all test-fresh lint docs clean
+.PHONY: demo test test-all test-backends test-fresh lint docs constraints clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
@@ -35,6 +36,9 @@ test-all: $(VENV)/.installed-test $(VENV)/.installed-docs
 
 TESTS ?= tests
 test-fresh: $(VENV)/.installed-test
+test-backends: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -q -rA tests/trace/test_backend_matrix.py
+
 	RTRADAR_HYPOTHESIS=fresh RTRADAR_EXAMPLES=10 $(BIN)/python -m pytest -q -m hypothesis $(TESTS)
 
 lint: $(VENV)/.installed-lint
