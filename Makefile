@@ -4,7 +4,9 @@
 # make test-backends    a walk on each libLLVM of the machine, on none and on the scalar backend; part of test-all
 # make test-fresh    the property tests alone, on new random examples each time (TESTS=tests/motion: those of one folder)
 # make lint    ruff, mypy and the import contract
-# make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
+# make docs    all pages with theory, gallery and Python interface, in out/docs/, and by a Chromium on PATH as one PDF,
+#              out/docs/rtradar.pdf; the gallery takes minutes the first time
+# make constraints    the newest versions of all packages into constraints.txt
 # make clean   removes all that these made, .venv/ included
 #
 # All goes into .venv/; another Python: make PYTHON=python3.12 demo
@@ -34,11 +36,11 @@ test: $(VENV)/.installed-test
 test-all: $(VENV)/.installed-test $(VENV)/.installed-docs
 	$(BIN)/python -m pytest -q -n auto --dist worksteal
 
-TESTS ?= tests
-test-fresh: $(VENV)/.installed-test
 test-backends: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -q -rA tests/trace/test_backend_matrix.py
 
+TESTS ?= tests
+test-fresh: $(VENV)/.installed-test
 	RTRADAR_HYPOTHESIS=fresh RTRADAR_EXAMPLES=10 $(BIN)/python -m pytest -q -m hypothesis $(TESTS)
 
 lint: $(VENV)/.installed-lint
@@ -47,8 +49,17 @@ lint: $(VENV)/.installed-lint
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees
 docs: $(VENV)/.installed-docs
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/docs
+	$(SPHINX) --builder html docs out/docs
+	$(SPHINX) --builder singlehtml docs out/one-page
+	@chromium=$$(command -v chromium || command -v chromium-browser || command -v google-chrome) || \
+	  { echo "no Chromium on PATH prints out/docs/rtradar.pdf" >&2; exit 0; }; \
+	"$$chromium" --headless --no-sandbox --log-level=3 --user-data-dir=out/chromium --no-pdf-header-footer \
+	  --generate-pdf-document-outline --print-to-pdf=out/docs/rtradar.pdf "file://$(CURDIR)/out/one-page/index.html"
+
+constraints: | $(BIN)/python
+	$(BIN)/python validation/constraints.py
 
 clean:
 	rm -rf $(VENV) out docs/api docs/auto_gallery docs/drawn build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
