@@ -50,7 +50,11 @@ class Schedule(Array):
 
     @property
     def at_once(self) -> bool:
-        """Whether each chirp is one of all Tx, which are told apart within it or by Doppler."""
+        """Whether the chirps of a cycle, one of each Tx, share one slot of time: FDM and DDM.
+
+        Under BPM all Tx transmit at once, too, but a cycle takes the slots of ``n_tx`` chirps,
+        whose signs tell the Tx apart.
+        """
         return self.multiplexing in ("fdm", "ddm")
 
     @property
