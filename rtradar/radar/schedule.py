@@ -336,7 +336,7 @@ class Schedule(Array):
         last = n_chirps // self.n_tx - self.cycles_per_frame
         candidates = np.arange(max(0, math.floor((last + 0.5) / self.hop_cycles) + 1))
         starts = np.rint(candidates * self.hop_cycles).astype(np.int64)
-        return np.unique(starts[starts <= last])
+        return starts[starts <= last]
 
     def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Give the centres of frames.
