@@ -227,8 +227,9 @@ class Schedule(Array):
     def slots_of(self, chirps: NDArray[np.integer]) -> NDArray[np.integer] | NDArray[np.float64]:
         """Give the places of chirps in time, counted in `chirp_interval_s`.
 
-        They are the numbers of the chirps themselves where no gap is between frames. What is
-        computed at regular intervals is interpolated between them by these.
+        They are the numbers of the chirps themselves where no gap is between frames, and that of
+        the first for all that are transmitted at once. What is computed at regular intervals is
+        interpolated between them by these.
 
         Parameters
         ----------
@@ -240,14 +241,14 @@ class Schedule(Array):
         (chirp,) int or float64
             Number of intervals since the start of the capture.
         """
-        if not self.in_frames:
-            return np.asarray(chirps)
         frame_s, numbers = self._in_frame(np.asarray(chirps, dtype=np.int64))
-        return np.asarray(frame_s / self.chirp_interval_s + numbers)
+        if self.at_once:
+            numbers = numbers - numbers % self.n_tx
+        return np.asarray(frame_s / self.chirp_interval_s + numbers) if self.in_frames else numbers
 
     @cached_property
     def gapless(self) -> Self:
-        """The radar without gaps between its frames, whose chirp n is at place n of `slots_of`."""
+        """The radar without gaps between its frames, whose cycles begin at places of `slots_of`."""
         if not self.in_frames:
             return self
         return dataclasses.replace(self, frame_period_s=None)
