@@ -91,8 +91,9 @@ class BodyTracer:
     ) -> tuple[Indices, Array]:
         """Part (ray,) met first from points on parts ``own (ray,)``, and its distance [m].
 
-        Rays leave on the side of the normals, along unit vectors ``directions (ray, 3)``. The
-        distance is infinite where nothing is met; no part is met from itself, since all are convex.
+        Rays leave along unit vectors ``directions (ray, 3)``. The distance is infinite where
+        nothing is met; no part is met from itself, since all are convex. So ``normals`` are not
+        used here: they are for `MeshTracer`, which lifts points off its faces by them.
         """
         # Rays have to end behind the whole body.
         centre, ball = ball_around(self._posed[0], self._longest)
