@@ -1,9 +1,12 @@
 # make demo    a 3 s synthetic walk by two models side by side, in out/demo/
 # make test    the tests, in minutes
 # make test-all    these, and what takes minutes for one answer: browsers, gallery, slow levels, kills
+# make test-backends    a walk on each libLLVM of the machine, on none and on the scalar backend; part of test-all
 # make test-fresh    the property tests alone, on new random examples each time (TESTS=tests/motion: those of one folder)
 # make lint    ruff, mypy and the import contract
-# make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
+# make docs    all pages with theory, gallery and Python interface, in out/docs/, and by a Chromium on PATH as one PDF,
+#              out/docs/rtradar.pdf; the gallery takes minutes the first time
+# make constraints    the newest versions of all packages into constraints.txt
 # make clean   removes all that these made, .venv/ included
 #
 # All goes into .venv/; another Python: make PYTHON=python3.12 demo
@@ -16,7 +19,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constr
 # Python keeps what it parsed: without that, each process would parse all modules and tests anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all test-fresh lint docs clean
+.PHONY: demo test test-all test-backends test-fresh lint docs constraints clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
@@ -33,6 +36,9 @@ test: $(VENV)/.installed-test
 test-all: $(VENV)/.installed-test $(VENV)/.installed-docs
 	$(BIN)/python -m pytest -q -n auto --dist worksteal
 
+test-backends: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -q -rA tests/trace/test_backend_matrix.py
+
 TESTS ?= tests
 test-fresh: $(VENV)/.installed-test
 	RTRADAR_HYPOTHESIS=fresh RTRADAR_EXAMPLES=10 $(BIN)/python -m pytest -q -m hypothesis $(TESTS)
@@ -43,8 +49,17 @@ lint: $(VENV)/.installed-lint
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+SPHINX := $(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees
 docs: $(VENV)/.installed-docs
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/docs
+	$(SPHINX) --builder html docs out/docs
+	$(SPHINX) --builder singlehtml docs out/one-page
+	@chromium=$$(command -v chromium || command -v chromium-browser || command -v google-chrome) || \
+	  { echo "no Chromium on PATH prints out/docs/rtradar.pdf" >&2; exit 0; }; \
+	"$$chromium" --headless --no-sandbox --log-level=3 --user-data-dir=out/chromium --no-pdf-header-footer \
+	  --generate-pdf-document-outline --print-to-pdf=out/docs/rtradar.pdf "file://$(CURDIR)/out/one-page/index.html"
+
+constraints: | $(BIN)/python
+	$(BIN)/python validation/constraints.py
 
 clean:
 	rm -rf $(VENV) out docs/api docs/auto_gallery docs/drawn build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis

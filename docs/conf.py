@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from docutils.utils.math import latex2mathml
 from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
+OWN = f"{HERE.parent}/"
 sys.path.insert(0, str(HERE))
 
 import api_pages  # noqa: E402
@@ -58,9 +60,21 @@ os.environ.setdefault("RTRADAR_GALLERY_OUT", str(HERE.parent / "out" / "gallery"
 os.environ.pop("RTRADAR_MOCAP", None)
 
 
+FUNCTION = r"(\\(?:arcsin|sin|cos|tan|det)\b(?:\^\d)?)"
+BAR = '<mo stretchy="false">|</mo>'
+
+
+def mathml(node: nodes.math | nodes.math_block, **how: bool) -> str:
+    """Return a formula as MathML, with space around functions and none within bars."""
+    text = re.sub(rf"(?<=[\w)}}]) {FUNCTION}", r"\\,\1", node.astext())
+    text = re.sub(rf"{FUNCTION} (?=[\w\\])", r"\1\\,", text)
+    found: str = latex2mathml.tex2mathml(text, **how)
+    return found.replace(BAR, BAR.replace(">|", ' lspace="0" rspace="0">|'))
+
+
 def inline_math(page: Any, node: nodes.math) -> None:
     """A formula within a line, as MathML, which browsers draw without help."""
-    page.body.append(latex2mathml.tex2mathml(node.astext()))
+    page.body.append(mathml(node))
     raise nodes.SkipNode
 
 
@@ -71,7 +85,7 @@ def displayed_math(page: Any, node: nodes.math_block) -> None:
         page.body.append(f'<span class="eqno">({node["number"]}) <small>{node["label"]}</small>')
         page.add_permalink_ref(node, "Link to this equation")
         page.body.append("</span>")
-    page.body.append(latex2mathml.tex2mathml(node.astext(), as_block=True) + "</div>\n")
+    page.body.append(mathml(node, as_block=True) + "</div>\n")
     raise nodes.SkipNode
 
 
@@ -81,5 +95,7 @@ def setup(app: Sphinx) -> None:
     app.add_directive("from-code", code_tables.CodeTable)
     app.add_role("names", level_tables.names_role)
     app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))
+    # What scripts of the gallery print names the folder of this checkout.
+    app.connect("source-read", lambda app, name, text: text.append(text.pop().replace(OWN, "")))
     app.connect("builder-inited", lambda app: api_pages.write(Path(app.srcdir) / "api"))
     app.connect("builder-inited", lambda app: drawings.draw(Path(app.srcdir) / "drawn"))

@@ -40,10 +40,10 @@ def said(level: str) -> Said:
     text, found, occlusion = (inspect.getdoc(MODELS[level]) or "").partition("\n\nOcclusion: ")
     computes, _, details = text.partition("\n\nParameters\n")[0].partition("\n\n")
     short, _, asked = " ".join(occlusion.partition("\n\n")[0].split()).partition(". ")
-    computes = computes.removeprefix(f"`{level}`: ").removesuffix(".")
+    computes, details = computes.removeprefix(f"`{level}`: ").rstrip("."), " ".join(details.split())
     if not found:
         return Said(computes, details, "none", "Every part is visible.")
-    return Said(computes, " ".join(details.split()), short, asked)
+    return Said(computes, details, short, asked)
 
 
 def levels() -> str:

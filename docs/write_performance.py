@@ -1,9 +1,10 @@
-"""Write the tables of docs/performance.md from a measurement of this machine.
+"""Write the tables of docs/performance.md from measurements of this machine.
 
     rtradar bench --only models --json bench.json
-    python docs/write_performance.py bench.json
+    sh validation/wheel.sh python3.11
+    python docs/write_performance.py bench.json out/installed.json
 
-What is between the markers of the page is replaced.
+What is between the markers of the page is replaced, of the files that are named.
 """
 
 from __future__ import annotations
@@ -73,6 +74,16 @@ def stages(bench: dict[str, Any]) -> str:
     return pipe_table(["stage of `analytic`", "it takes [s]"], lines)
 
 
+def installed(found: dict[str, Any]) -> str:
+    """Return the table of what is installed, a row for each package of more than 5 MB."""
+    large = [row for row in found["installed"] if row["mb"] > 5]
+    small = [row["mb"] for row in found["installed"] if row["mb"] <= 5]
+    rows = [[f"{row['package']}", f"{row['mb']:.0f}", row["first"] or "-"] for row in large]
+    rows.append([f"{len(small)} others", f"{sum(small):.0f}", ""])
+    rows.append(["all", f"{sum(row['mb'] for row in found['installed']):.0f}", ""])
+    return pipe_table(["package", "MB", "first imported by"], rows)
+
+
 def replaced(text: str, name: str, content: str) -> str:
     """Return the text with other content between the markers of that name."""
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
@@ -81,9 +92,12 @@ def replaced(text: str, name: str, content: str) -> str:
 
 
 def main() -> int:
-    bench = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
-    text = replaced(PAGE.read_text(encoding="utf-8"), "models", models(bench))
-    PAGE.write_text(replaced(text, "stages", stages(bench)), encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
+    for name in sys.argv[1:]:
+        found = json.loads(Path(name).read_text(encoding="utf-8"))
+        for table in (installed,) if "installed" in found else (models, stages):
+            text = replaced(text, table.__name__, table(found))
+    PAGE.write_text(text, encoding="utf-8")
     return 0
 
 

@@ -181,6 +181,10 @@ def test_the_pages_can_be_built(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "pages" / "theory.html").read_text(encoding="utf-8")
     assert page.count("<math") > 100
+    assert re.search(
+        r"<mi>h</mi>\s*<mspace[^>]*></mspace>\s*<mi>cos</mi>\s*<mo>[^<]*</mo>\s*<mspace", page
+    )
+    assert '<mo stretchy="false">|' not in page  # bars have no space within
     outside = [
         found
         for ending, expression in LOADED.items()

@@ -26,6 +26,8 @@ def test_all_names_of_a_kind_are_listed_each_with_its_description(
     rows = json.loads((tmp_path / "names.json").read_text())[kind]
     assert [row["name"] for row in rows] == list(NAMES[kind])
     assert all(len(row["description"]) > 10 for row in rows)
+    if kind == "activities":
+        assert len({row["description"].partition(".")[0] for row in rows}) == len(rows)
     shown = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line[0] != " "]
     assert shown == list(NAMES[kind])
 

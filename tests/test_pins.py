@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
@@ -55,6 +57,18 @@ def test_every_package_has_one_pinned_version() -> None:
     assert len(pins) == len(lines)
     missing = sorted(needed() - {plain(name) for name in pins})
     assert missing == []
+
+
+def test_pins_are_those_of_a_report_of_pip(script: Callable[[str], ModuleType]) -> None:
+    report = [
+        {"metadata": {"name": name, "version": version}, "is_direct": name == "rtradar"}
+        for name, version in (
+            *(("torch", "2.13.0+cpu"), ("Jinja2", "3.1.6"), ("rtradar", "0.2.0"), ("pip", "26.3")),
+            *(("nvidia-cublas", "13.1"), ("triton", "3.8.0"), ("mypy_extensions", "1.2.0")),
+        )
+    ]
+    pinned = script("constraints.py").pins(report)
+    assert pinned == ["jinja2==3.1.6", "mypy-extensions==1.2.0", "torch==2.13.0"]
 
 
 def test_the_search_follows_what_needs_what() -> None:

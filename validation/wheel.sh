@@ -4,7 +4,8 @@
 #     sh validation/wheel.sh [PYTHON ...]       # of each Python (default: python3)
 #
 # The wheel is built from the source distribution, so that both are tried. The versions of all packages are the pinned
-# ones. In the end it says how many megabytes were installed, by package.
+# ones. For each Python it says how many megabytes were installed, by package and who imports it, and
+# leaves that in out/installed.json.
 set -eu
 checkout=$(cd "$(dirname "$0")/.." && pwd)
 [ $# -gt 0 ] || set -- python3
@@ -34,9 +35,12 @@ print(f"{len(mesh_names())} meshes in {shipped_folder('meshes').name}/, {len(cla
 PROBE
   venv/bin/rtradar run synthetic:walk --duration 0.3 --out out --overwrite
   venv/bin/rtradar run synthetic:walk --duration 0.2 --scene bedroom --fidelity analytic --out room --overwrite
+  venv/bin/rtradar compare synthetic:kick --fidelities analytic,specular --duration 0.2 --out levels
   test -s out/report.html
   test -s room/maps.h5
-  du -sm venv | cut -f1 | xargs echo "$python: the wheel works; megabytes installed:"
-  du -sm venv/lib/python*/site-packages/* | sort -rn | head -12 | sed 's,\t.*/,  ,'
-  rm -rf venv
+  test -s levels/compare.html
+  mkdir -p "$checkout/out"
+  venv/bin/python "$checkout/validation/cost/installed.py" --json "$checkout/out/installed.json"
+  echo "$("$python" --version): the wheel works"
+  rm -rf venv out room levels
 done

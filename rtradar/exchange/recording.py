@@ -184,7 +184,7 @@ class IfRecording(SampleFile):
         times = radar.chirp_times(chirps * tx).reshape(chirps, tx)
         since = "centre of each chirp since the start of the capture"
         fast = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
-        begun = "time of each sample since the chirp began"
+        begun = "time of each sample since the first of its chirp"
         rx, listens = radar.rx[radar.rx_of_tx], "place of each Rx that listens to a Tx"
         return {
             "chirp_time": Quantity(("chirp", "tx"), times, "s", since),

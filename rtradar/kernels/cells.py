@@ -82,12 +82,16 @@ def highest_maxima(power, below, above, index, count):
                 top = sine
         highest = own[top]
         best[:] = top
-        # Of equal neighbours the first may count. At an end of the grid one neighbour is enough.
+        # Of equal neighbours the first may count, where the spectrum falls after the last. At an
+        # end of the grid one neighbour is enough.
         for sine in range(sines):
-            value = own[sine]
+            value, after = own[sine], sine + 1
             rises = sine == 0 or value > own[sine - 1]
-            falls = sine == sines - 1 or value >= own[sine + 1]
-            if not (value > 0 and value >= highest * below and rises and falls):
+            if not (value > 0 and value >= highest * below and rises):
+                continue
+            while after < sines and own[after] == value:
+                after += 1
+            if after < sines and own[after] > value:
                 continue
             # Any other maximum has to stand out of the median of the spectrum as well.
             if value < highest:

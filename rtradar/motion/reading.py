@@ -116,7 +116,7 @@ def found_unit(where: str, stature: float) -> tuple[float, str]:
     tall = [f"{stature * unit:.3g} m in {name}" for name, unit in UNITS_M.items()]
     raise InputError(
         f"{where}: a person of {stature:.4g} units would be {', '.join(tall)} tall; give the unit "
-        "(unit, --unit: {', '.join(UNITS_M)}, or metres)"
+        f"(unit, --unit: {', '.join(UNITS_M)}, or metres)"
     )
 
 

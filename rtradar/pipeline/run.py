@@ -422,7 +422,7 @@ def if_samples(values: NDArray[np.complex64], radar: Radar, first: int = 0) -> x
         "fast_time": (
             "sample",
             np.arange(n_samples) / radar.sample_rate_hz,
-            {"units": "s", "long_name": "time since the start of the chirp"},
+            {"units": "s", "long_name": "time since the first sample of the chirp"},
         ),
     }
     if not radar.receives_sums:

@@ -49,9 +49,7 @@ class SlidingWindows:
         self._buffer = np.empty(shape, np.complex64)
         self._first = 0  # chirp at the front of the buffer
         self._held = 0  # chirps in the buffer
-        self._candidate = 0  # frames are counted by multiples of the hop ...
-        self._index = 0  # ... of which those that round to the same cycle are one frame
-        self._last_start = -1
+        self._index = 0  # of the next frame
         self._busy = False
         self.n_chirps = 0
 
@@ -98,15 +96,14 @@ class SlidingWindows:
                 cube = view.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *view.shape[1:])
                 # Frames overlap in the buffer: who wrote into one would change the next.
                 cube.flags.writeable = False
-                index = self._index
                 self._index += 1
-                yield index, start, cube
+                yield self._index - 1, start, cube
         self._busy = False
 
     def _take(self, block: NDArray[np.generic]) -> int:
         """Copy what fits of the block behind what is still needed; how many chirps it took."""
         # No later frame needs a chirp before this one.
-        wanted = self._start_of(self._candidate) * self._radar.n_tx
+        wanted = self._start_of(self._index) * self._radar.n_tx
         gone = min(max(wanted - self._first, 0), self._held)
         room = len(self._buffer) - self._held
         # Nothing that is held is needed any more: the buffer begins anew.
@@ -132,20 +129,17 @@ class SlidingWindows:
         self.n_chirps += count
         return count
 
-    def _start_of(self, candidate: int) -> int:
-        return round(candidate * self._radar.hop_cycles)
+    def _start_of(self, index: int) -> int:
+        return round(index * self._radar.hop_cycles)
 
     def _next_start(self) -> int | None:
         """First cycle of the next frame if its last chirp is there, as in `Radar.window_starts`."""
-        # Starts are multiples of the hop, rounded to whole cycles.
+        # Starts are multiples of the hop, rounded to whole cycles. A hop has a cycle or more, so no
+        # two of them round to the same.
         last = self.n_chirps // self._radar.n_tx - self._radar.cycles_per_frame
         newest = math.floor((last + 0.5) / self._radar.hop_cycles)
-        while self._candidate <= newest and (start := self._start_of(self._candidate)) <= last:
-            self._candidate += 1
-            if start > self._last_start:
-                self._last_start = start
-                return start
-        return None
+        start = self._start_of(self._index)
+        return start if self._index <= newest and start <= last else None
 
 
 def _copy(chirps: NDArray[np.generic], to: NDArray[np.complex64]) -> None:

@@ -50,7 +50,11 @@ class Schedule(Array):
 
     @property
     def at_once(self) -> bool:
-        """Whether each chirp is one of all Tx, which are told apart within it or by Doppler."""
+        """Whether the chirps of a cycle, one of each Tx, share one slot of time: FDM and DDM.
+
+        Under BPM all Tx transmit at once, too, but a cycle takes the slots of ``n_tx`` chirps,
+        whose signs tell the Tx apart.
+        """
         return self.multiplexing in ("fdm", "ddm")
 
     @property
@@ -223,8 +227,9 @@ class Schedule(Array):
     def slots_of(self, chirps: NDArray[np.integer]) -> NDArray[np.integer] | NDArray[np.float64]:
         """Give the places of chirps in time, counted in `chirp_interval_s`.
 
-        They are the numbers of the chirps themselves where no gap is between frames. What is
-        computed at regular intervals is interpolated between them by these.
+        They are the numbers of the chirps themselves where no gap is between frames, and that of
+        the first for all that are transmitted at once. What is computed at regular intervals is
+        interpolated between them by these.
 
         Parameters
         ----------
@@ -236,14 +241,14 @@ class Schedule(Array):
         (chirp,) int or float64
             Number of intervals since the start of the capture.
         """
-        if not self.in_frames:
-            return np.asarray(chirps)
         frame_s, numbers = self._in_frame(np.asarray(chirps, dtype=np.int64))
-        return np.asarray(frame_s / self.chirp_interval_s + numbers)
+        if self.at_once:
+            numbers = numbers - numbers % self.n_tx
+        return np.asarray(frame_s / self.chirp_interval_s + numbers) if self.in_frames else numbers
 
     @cached_property
     def gapless(self) -> Self:
-        """The radar without gaps between its frames, whose chirp n is at place n of `slots_of`."""
+        """The radar without gaps between its frames, whose cycles begin at places of `slots_of`."""
         if not self.in_frames:
             return self
         return dataclasses.replace(self, frame_period_s=None)
@@ -332,7 +337,7 @@ class Schedule(Array):
         last = n_chirps // self.n_tx - self.cycles_per_frame
         candidates = np.arange(max(0, math.floor((last + 0.5) / self.hop_cycles) + 1))
         starts = np.rint(candidates * self.hop_cycles).astype(np.int64)
-        return np.unique(starts[starts <= last])
+        return starts[starts <= last]
 
     def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Give the centres of frames.

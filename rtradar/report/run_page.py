@@ -35,7 +35,7 @@ def write_report(
 ) -> None:
     """Write a run as a page: what was seen, body and maps that move together, and tables.
 
-    The file includes plotly.js (2.3 MB), and its content security policy forbids any request.
+    The file includes plotly.js (2.0 MB), and its content security policy forbids any request.
 
     Parameters
     ----------

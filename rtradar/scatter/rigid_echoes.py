@@ -1,10 +1,12 @@
 """Echoes of rigid objects that move: physical optics over their facets at every chirp.
 
 Facets are fixed in the object's axes, into which antennas are brought by the pose at each chirp, in
-float64. The integral over a facet, with the Fresnel coefficients of a half-space of its material at
-its own angle, is exact but for the bow of the path over it. What the array sees past furniture,
-other objects, people and the object itself changes slowly: Mitsuba is asked at keyframes, for the
-middle of each facet, and visibility fades smoothly in between; so do the coefficients.
+float64. The integral over a facet is exact but for the bow of the path over it. It is multiplied by
+the Fresnel coefficients of a half-space of its material at its own angle. They are those of the
+centre frequency and the middle of the array, for the whole sweep and all antennas
+(`rtradar.scatter.rigid_legs`). What the array sees past furniture, other objects, people and the
+object itself changes slowly: Mitsuba is asked at keyframes, for the middle of each facet, and
+visibility fades smoothly in between; so do the coefficients.
 
 An object has one echo at each of some lengths about the path over its point of reference. Each
 facet is shared between the two echoes next to its path

@@ -51,7 +51,10 @@ duration_s traits"""
 
 _OF_ACTORS = ("seed", "traits")
 _ACTOR_S, _LONGEST_S = 10.0, 3600.0
-"""How long a synthetic actor moves by default, and at most [s]."""
+"""How long a synthetic actor moves by default, and at most [s].
+
+An actor of a run moves as long as the run asks, 3 s by default (`rtradar.recordings.ACTOR_S`). A
+scene does not know the run: its actors move longer, since the shortest motion ends a capture."""
 
 Piece = TypeVar("Piece", Wall, Furniture, Object)
 

@@ -94,9 +94,10 @@ def synthesize(
     -------
     (chirp, rx, sample) complex
         x[n] = sum over echoes of amplitude(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)),
-        tau = length / c, t_n = n / sample rate, f_n = f_c + s t_n; paper, eq. 9, with its neglected
-        last term. Under FDM f_c is that of each Tx, `Radar.tx_offset_hz` higher, except in the
-        amplitudes, which hardly change by so little.
+        tau = length / c, t_n = n / sample rate, f_n = f_c + s t_n, f_c = `Radar.sampled_start_hz`,
+        the sweep at the first sample; paper, eq. 9, with its neglected last term. Under FDM f_c is
+        that of each Tx, `Radar.tx_offset_hz` higher, except in the amplitudes, which hardly change
+        by so little.
 
     Raises
     ------

@@ -91,8 +91,9 @@ class BodyTracer:
     ) -> tuple[Indices, Array]:
         """Part (ray,) met first from points on parts ``own (ray,)``, and its distance [m].
 
-        Rays leave on the side of the normals, along unit vectors ``directions (ray, 3)``. The
-        distance is infinite where nothing is met; no part is met from itself, since all are convex.
+        Rays leave along unit vectors ``directions (ray, 3)``. The distance is infinite where
+        nothing is met; no part is met from itself, since all are convex. So ``normals`` are not
+        used here: they are for `MeshTracer`, which lifts points off its faces by them.
         """
         # Rays have to end behind the whole body.
         centre, ball = ball_around(self._posed[0], self._longest)
@@ -133,13 +134,14 @@ class BodyTracer:
     ) -> NDArray[np.int16]:
         """Part that occludes each vertex, as each antenna sees it, (antenna, vertex) int16.
 
-        It is another part that is nearer to the antenna on the same line, else -1. ``centres`` and
-        ``frames`` are the pose of the body, ``antennas (antenna, 3)`` are places, world [m]. Only
-        vertices of ``parts (n,)`` are asked about that do not face away by more than the sine
-        ``margin``. ``vertices (3, vertex)`` are those of all parts, each from ``first (part + 1,)``
-        on, on its ellipsoid, in its own axes [m].
+        It is another part that is nearer to the antenna on the same line, one of them where these
+        are several (`first_occluders`), else -1. ``centres`` and ``frames`` are the pose of the
+        body, ``antennas (antenna, 3)`` are places, world [m]. Only vertices of ``parts (n,)`` are
+        asked about that do not face away by more than the sine ``margin``. ``vertices (3,
+        vertex)`` are those of all parts, each from ``first (part + 1,)`` on, on its ellipsoid, in
+        its own axes [m].
         """
-        # One ray for each vertex and part that may occlude it; the first part that is met counts.
+        # One ray for each vertex and part that may occlude it.
         found = np.full((len(antennas), vertices.shape[1]), -1, dtype=np.int16)
         floats = (antennas, centres, frames, self._semi_axes, self._longest)
         places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)

@@ -312,6 +312,14 @@ def test_peaks_of_hand_made_spectra() -> None:
     np.testing.assert_allclose(peaks.power[0, :2], [1.0, 0.4], rtol=1e-4)
 
 
+def test_a_spectrum_that_rests_and_rises_on_has_no_peak_there() -> None:
+    power = np.zeros((2, 201), dtype=np.float32)
+    power[:, 50:56] = [[1, 2, 2, 3, 2, 1], [1, 3, 3, 2, 2, 1]]
+    peaks = find_peaks(np.linspace(-1, 1, 201), power)
+    assert peaks.real.sum(axis=1).tolist() == [1, 1]
+    np.testing.assert_allclose(peaks.sine[:, 0], [-0.47, -0.485], atol=1e-5)
+
+
 def test_a_spectrum_of_noise_has_one_peak_mostly() -> None:
     # Exponential power, as of noise in 4-fold oversampled beams of 48 channels; an echo 14 dB above
     # it, just detected.

@@ -37,6 +37,7 @@ from rtradar.report.three_d import (
 pytestmark = pytest.mark.drawn
 
 RADAR = rt.Radar.preset("paper-12ghz")
+REPORT = Path(rt.__file__).parent / "report"
 EVIL = "walk</script><script>alert('1')</script><img src=x>&\"amc"
 
 
@@ -140,6 +141,14 @@ def test_refers_to_nothing_outside_and_allows_its_own_scripts_alone(tmp_path: Pa
         for text in (gzip.decompress(base64.b64decode(page.scripts[1])).decode(), page.scripts[2])
     ]
     assert rules["script-src"] == expected
+
+
+def test_plotly_js_comes_with_its_licence() -> None:
+    script = gzip.decompress((REPORT / "plotly.min.js.gz").read_bytes())[:200].decode()
+    assert re.search(
+        r"plotly\.js v\d.*Copyright 2012-\d+, Plotly.*the MIT license", script, re.DOTALL
+    )
+    assert (REPORT / "plotly.LICENSE").read_text(encoding="utf-8").startswith("MIT License")
 
 
 def test_shows_the_numbers_that_it_was_given(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -257,33 +256,3 @@ def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
         major = int((found.version or library.version or "0").split(".")[0])
         assert found.good or major < 19, (library, found)
         assert not (found.good and major < 17), (library, found)
-
-
-def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
-    bad = [
-        library.path
-        for library in probe.candidates()
-        if not probe.probe_backend("llvm_ad_rgb", library).good
-    ]
-    if not bad:
-        pytest.skip("this machine has no libLLVM that is bad")
-    script = """
-import warnings
-from rtradar.trace.backend import loaded_llvm_version, select, use
-warnings.simplefilter("ignore")
-backend = select("cpu")
-mi = use(backend)
-import drjit as dr
-assert backend.llvm_version in (None, loaded_llvm_version()), loaded_llvm_version()
-print(backend.kind, dr.minimum(mi.Float(3.0), 2.0))
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        env={**os.environ, ENVIRONMENT_VARIABLE: bad[0]},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split()[0] in ("llvm", "scalar")
-    assert done.stdout.strip("[]\n").endswith("2")

@@ -229,6 +229,8 @@ def _search(tx, rx, above, first, second, options, u, v, square):
             break
     # The path after the last step; where the search has failed, that over both points.
     length, amplitude = (r1 + r2 + r3 - drop if definite else r1 + r3), 0.0
+    # Normals after the step and the rest before it: with all of it before the step, amplitudes are
+    # off by up to ten times as much.
     normal_p, area_p = _normal(first, u)
     normal_q, area_q = _normal(second, v)
     cosine_p, cosine_q = -dot(s1, normal_p), -dot(s3, normal_q)

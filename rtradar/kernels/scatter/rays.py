@@ -254,8 +254,12 @@ def facet_rays(antennas, parts, centres, frames, semi_axes, longest, vertices, f
 
 @compiled()
 def first_occluders(met, fraction, whose, occluder):
-    """Fill in for each vertex the part that is met first: where its ray comes nearest decides."""
-    # Along one line of sight the part whose nearest point comes first is taken to be met first.
+    """Fill in for each vertex the part that its line of sight is halfway through first.
+
+    Where parts overlap, another of them may be met before. Each of them occludes the vertex, which
+    is all that counts but on facets that an edge cuts: there `shade` takes the edge of the part
+    that is named, where the edge of all together may lie up to a facet beside it.
+    """
     first = np.full(len(occluder), np.inf, dtype=np.float32)
     for ray in range(len(met)):
         vertex = whose[0, ray]

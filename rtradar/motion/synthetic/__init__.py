@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import Annotated, Any, Literal, TypedDict, Unpack
 
 import numpy as np
@@ -39,6 +38,22 @@ __all__ = ["ACTIVITIES", "ACTORS", "STYLES", "Traits", "synthetic_motion"]
 ACTORS = 4
 """Version of the actors, raised whenever one of them moves otherwise than before."""
 
+
+def _jump(duration_s: float, subject: Subject) -> PosesAt:
+    """Jumps with both legs on the spot, facing +x."""
+    return jumping_jack(duration_s, subject, activity="jump")
+
+
+def _walk_in_place(duration_s: float, subject: Subject) -> PosesAt:
+    """A walk on the spot, facing +x."""
+    return walk(duration_s, subject, table="walk_in_place")
+
+
+def _boxing(duration_s: float, subject: Subject) -> PosesAt:
+    """Combinations of punches, with steps between them and a trunk that weaves, facing +x."""
+    return punch(duration_s, subject, boxing=True)
+
+
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
     "kick": kick,
@@ -49,10 +64,10 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "bend": bend,
     "squat": squat,
     "wave": wave,
-    "jump": partial(jumping_jack, activity="jump"),
+    "jump": _jump,
     "fall": fall,
-    "walk_in_place": partial(walk, table="walk_in_place"),
-    "boxing": partial(punch, boxing=True),
+    "walk_in_place": _walk_in_place,
+    "boxing": _boxing,
 }
 """Activities of the actors, by name."""
 

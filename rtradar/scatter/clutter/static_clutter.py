@@ -3,20 +3,20 @@
 It holds specular reflections by walls up to an order of images, furniture by physical optics over
 facets, corner reflectors with several bounces, and the diffuse returns of rough walls. It does not
 hold the direct coupling from Tx to Rx, which belongs to the radar and not to the room; bounces
-between furniture and walls or other furniture; and waves diffracted at edges of walls. Antennas
-look as their patterns say: isotropic antennas receive what is right below, above and behind the
-radar, as no real antenna would. A room at rest is the same in every TDM cycle: its IF is computed
-once.
+between furniture and walls or other furniture; and what edges of walls send where no wall mirrors
+the path, or later than the range resolution. Antennas look as their patterns say: isotropic
+antennas receive what is right below, above and behind the radar, as no real antenna would. A room
+at rest is the same in every TDM cycle: its IF is computed once.
 
 **What walls return** is specular reflections by images, and diffuse returns of rough faces. A wall
 reflects like an infinite one where the specular point lies well inside its rectangle, and fades at
-edges that are free (`rtradar.scatter.multipath.wall_edges`); only furniture occludes it. The field
-on a path of length L is that of free space times what the walls do. So an echo is F = -2 sqrt(pi)
-(p_rx . E) / L, whose square is a radar cross-section; with a conductor, which reverses E, it is
-+2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's coefficient, or are
-echoes of their own where no polynomial over the sweep follows that coefficient
-(`rtradar.scatter.multipath.slabs`). Left out are waves between a wall and a pane right before it (a
-reflection by the pane's back is in, once), and the direct coupling from Tx to Rx.
+edges that are free, by their diffraction (`rtradar.scatter.multipath.wall_edges`); only furniture
+occludes it. The field on a path of length L is that of free space times what the walls do. So an
+echo is F = -2 sqrt(pi) (p_rx . E) / L, whose square is a radar cross-section; with a conductor,
+which reverses E, it is +2 sqrt(pi) / L. Waves that go to and fro inside one wall are in its slab's
+coefficient, or are echoes of their own where no polynomial over the sweep follows that coefficient
+(`rtradar.scatter.multipath.slabs`). Left out are waves between a wall and a pane right before it; a
+reflection by the pane's back is in, once.
 
 The fraction of the reflected power that roughness takes from the specular wave,
 1 - exp(-(2 k s)^2 cos_i cos_s) (Ament, Proc. IRE 41 (1953) 142, made reciprocal by the mean of both
@@ -28,8 +28,9 @@ S^2 from the height of the surface instead of a fit. So the power per area is
 
 with R of the smooth slab at the angle of each leg, for the polarisation that arrives. Over half of
 space this adds up to S^2 |R|^2 of what arrives, and specular and diffuse power together to what a
-smooth wall reflects. All of it counts as co-polar. A point represents its cell of a jittered grid,
-two range bins wide: near cells give a grainier return than a real wall, with the right mean power.
+smooth wall reflects. All of it counts as co-polar. A point represents its cell of a jittered grid.
+Cells are two range bins wide, 0.1 m at most, and wider where a face would have more than 40 000:
+near cells give a grainier return than a real wall, with the right mean power.
 """
 
 from __future__ import annotations

@@ -241,12 +241,13 @@ _Value = TypeVar("_Value")
 
 
 def keyframe_step(radar: Radar, apart_s: float = 10e-3) -> int:
-    """Return the number of chirps between keyframes.
+    """Return the number of chirps between keyframes, all of those that are transmitted at once.
 
     Visibility and power are evaluated at keyframes, 10 ms apart: a limb at 5 m/s moves 5 cm in
     that time.
     """
-    return max(1, round(apart_s / radar.chirp_interval_s))
+    together = radar.n_tx if radar.at_once else 1
+    return together * max(1, round(apart_s / (together * radar.chirp_interval_s)))
 
 
 def keyframe_before(

@@ -23,7 +23,13 @@ from rtradar.kernels.scatter.facets import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.poses import KeyframeCache, keyframe_before, owners_of
+from rtradar.scatter.common.poses import (
+    KeyframeCache,
+    keyframe_before,
+    keyframe_step,
+    keyframe_time,
+    owners_of,
+)
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.skin import SkinFacets
 from rtradar.system.threads import thread_map
@@ -263,13 +269,16 @@ class ArrayEnvelope:
         # Weights from coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
-        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
+        self._step = keyframe_step(radar, anchor_s)
         self._envelope = Envelope(self._sample, owners_of(body), tolerance, places)
 
     def _sample(self, place: float, parts: Indices, whole: Scale | None) -> Sample:
         """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
-        # The pose in the middle of a chirp, counted without gaps.
-        time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
+        # The time of the keyframe before, in the middle of what is sampled of its chirp, and after
+        # it.
+        start_s = keyframe_time(self._radar, self._body, int(place) * self._step)
+        time = start_s + place % 1 * self._step * self._radar.chirp_interval_s
+        time = min(time, self._body.duration_s)
         pose, radar = self._body.at([time]), self._radar.at(time)
         coarse = self._at_nodes(time, pose, array_nodes(radar, *_COARSE), parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength

@@ -25,6 +25,7 @@ from rtradar.scatter.common.poses import (
     chirp_poses,
     has_mesh,
     keyframe_before,
+    keyframe_step,
     keyframe_time,
 )
 from rtradar.scatter.facets.radiation import one_after_the_other
@@ -210,7 +211,7 @@ class Rays(BuiltInModel):
         check_option("rays", "anchor_s", anchor_s, fine, "from 0 (every chirp) to 1 s")
         self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces
         self._stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
-        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
+        self._step = keyframe_step(radar, anchor_s)
         backend, edge = select(variant), radar.wavelength_m / rays_per_wavelength
         self.variant: str | None = backend.kind
         mi = use(backend)

@@ -105,8 +105,12 @@ def _beam_power() -> Pair:
 
 def highest_maxima_reference(power, below, above, peaks):
     """Index and count of `highest_maxima`, by NumPy."""
-    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
-    good = (power > padded[:, :-2]) & (power >= padded[:, 2:]) & (power > 0)
+    before, after = np.full_like(power, -1), np.full_like(power, -1)
+    before[:, 1:] = power[:, :-1]
+    for n in range(power.shape[1] - 2, -1, -1):
+        equal = power[:, n] == power[:, n + 1]
+        after[:, n] = np.where(equal, after[:, n + 1], power[:, n + 1])
+    good = (power > before) & (power > after) & (power > 0)
     highest = power.max(axis=1, keepdims=True)
     good &= power >= highest * below
     lower = (power[:, None] * above <= power[:, :, None]).sum(axis=2)
@@ -120,6 +124,7 @@ def highest_maxima_reference(power, below, above, peaks):
 @kernel_case(highest_maxima, 0)
 def _maxima() -> Pair:
     power = np.random.default_rng(0).exponential(size=(150, 200)).astype(np.float32) ** 4
+    power[75:] = np.rint(power[75:] / 64)  # with neighbours that are equal
     given, out = (power, np.float32(0.25), np.float32(12)), (np.empty((150, 3), int),)
     found = filled(highest_maxima, *given, out=(*out, np.empty(150, int)))
     return found, highest_maxima_reference(*given, 3)

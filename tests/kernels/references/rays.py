@@ -88,7 +88,7 @@ def _facet_rays() -> Pair:
 
 
 def first_occluders_reference(met, fraction, whose, vertices):
-    """Part (vertex,) that is met first, -1 for none."""
+    """Part (vertex,) among those that are met with the least fraction, -1 for none."""
     occluder = np.full(vertices, -1, dtype=np.int16)
     hits = np.flatnonzero(met)
     farthest_first = hits[np.argsort(-fraction[hits], kind="stable")]

@@ -168,14 +168,16 @@ def test_each_echo_has_its_chirp_receiver_part_path_and_person() -> None:
 
 
 def test_they_are_those_that_make_the_samples() -> None:
-    """A sum of beats, sample by sample, in the middle of a chirp."""
+    """A sum of beats, sample by sample, in the middle of a chirp, counted from the first sample."""
+    radar = replace(RADAR, adc_start_s=5e-6)
     capture = rt.simulate(
-        LONG_KICK, RADAR, duration_s=0.2, fidelity="specular", snr_db=float("inf")
+        LONG_KICK, radar, duration_s=0.2, fidelity="specular", snr_db=float("inf")
     )
     echoes, samples = capture.echoes(duration_s=0.02), capture.samples
     tau = echoes["length_m"].values[..., None] / 299_792_458.0
     t = samples["fast_time"].values
-    start_hz, slope = RADAR.start_frequency_hz, RADAR.slope_hz_per_s
+    slope = radar.slope_hz_per_s
+    start_hz = radar.start_frequency_hz + slope * radar.adc_start_s
     beat = np.exp(2j * np.pi * (start_hz * tau + slope * tau * t - slope * tau**2 / 2))
     expected = (echoes["amplitude"].values[..., None] * beat).sum(axis=2)
     found = samples.values[: len(expected)]

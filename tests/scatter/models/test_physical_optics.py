@@ -20,7 +20,7 @@ from rtradar.kernels.scatter.facets import stretch
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.common.polarization import Polarization
-from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample
+from rtradar.scatter.facets.envelope import TOGETHER, ArrayEnvelope, Envelope, Sample
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.models.physical_optics import PhysicalOptics, Reference
 from rtradar.scatter.models.specular import Specular
@@ -356,3 +356,34 @@ def test_an_envelope_has_one_value_and_one_slope_at_a_keyframe(seed: int) -> Non
     # Slopes reach tens an interval; the second derivative times the step is what they may differ
     # by.
     np.testing.assert_allclose(before[1] - before[0], after[1] - after[0], atol=1e-6)
+
+
+class PlaceAlongY:
+    """In place of the facets: the echo of a part over its carrier is where the part is along y."""
+
+    frequency = np.array([14e9])
+
+    def carriers(self, at: Geometry) -> tuple[Array, Array]:
+        one = np.ones((len(at.tx), 1, at.centres.shape[1]))
+        return one, one
+
+    def field(self, time: float, pose: Poses, *given: Array) -> NDArray[np.complex128]:
+        _, pairs, _, parts = given
+        return np.tile(pose.centres[0, parts, 1] + 0j, (1, len(pairs), 1))
+
+
+@pytest.mark.parametrize("gap_s", [None, 0.0437])
+@pytest.mark.parametrize("multiplexing", ["tdm", "fdm", "ddm", "bpm"])
+def test_an_envelope_is_that_of_the_times_of_chirps(multiplexing: str, gap_s: float | None) -> None:
+    radar = small_radar(
+        tx_y=4, tx_z=0, rx_y=4, rx_z=0, channels="all", multiplexing=multiplexing,
+        chirps_per_frame=72, frame_period_s=gap_s, idle_s=1e-4,
+        adc_start_s=2e-4, adc_rate_hz=256 / 2.5e-4,
+    )  # fmt: skip
+    body, chirps = Passing(), np.arange(200)
+    given = {"anchor_s": 7e-3, "tolerance": -1.0, "unevenness": 1.0}  # divided everywhere
+    envelope = ArrayEnvelope(radar, body, PlaceAlongY(), **given)  # type: ignore[arg-type]
+    strength = np.ones((len(chirps), radar.n_rx, 2))
+    found = envelope.times(chirps, radar.tx_of_chirp(chirps), strength)[0, :, :, 1]
+    exact = body.at(radar.centres_of(chirps)).centres[:, 1, 1]
+    np.testing.assert_allclose(found, np.tile(exact[:, None], radar.n_rx), rtol=0, atol=1e-12)
