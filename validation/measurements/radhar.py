@@ -11,14 +11,17 @@ range     places x, y, z are 240 / 256 of the column "range": the chip pads 240 
           and the ROS driver counts with 240, so that places are right and the column is 1/15 too
           long, as is the preset's bin, which is that column's
 
-Reported, because the people, their places and the room are others: points in a frame that move,
-spread of distance, of speed and of level. As the recorded profile has it, clutter is not removed,
-CFAR is over range alone (``cfarCfg 0 2 8 4 3 0 768``: the smaller of both sides, 8 noise and 4
-guard cells, 9 dB), and peaks are grouped over Doppler alone (``peakGrouping 1 0 1``). Points that
-stand still are the room in the files, and are left out in both. Levels are 512 log2 of the
-magnitude, of which the driver keeps 10 log10(1 + level). The profile is
-``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes and threshold are those of TI's
-mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
+neighbours  hardly any cell has a point in the next one over Doppler, along which peaks are grouped
+
+Reported, because the people, their places and the room are others: cells with a neighbour in range,
+points in a frame that move, spread of distance, of speed and of level. As the recorded profile has
+it, clutter is not removed, CFAR is over range alone (``cfarCfg 0 2 8 4 3 0 768``: the smaller of
+both sides, 8 noise and 4 guard cells, 9 dB), and peaks are grouped over Doppler alone
+(``peakGrouping 1 0 1``). Points that stand still are the room in the files, and are left out in
+both. Levels are magnitudes, of which the driver keeps 10 log10(1 + level): the cells beside a
+strong still echo have half of its level, as a Hann window makes them, where logarithms would be
+nearly the same. The profile is ``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes and
+threshold are those of TI's mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
 
 Without the folder only the grids of simulated points are judged.
 
@@ -49,12 +52,17 @@ ACTIVITIES = {  # of the files, and of actors: activity, place [m] and heading [
 
 
 class Cloud(NamedTuple):
-    """Points that move, seen from the radar."""
+    """Points that move, seen from the radar.
+
+    ``beside`` are the fractions of their cells that have a neighbour with a point in the same
+    frame, over range and over Doppler.
+    """
 
     places: NDArray[np.float64]
     speed: NDArray[np.float64]
     level_db: NDArray[np.float64]
     frames: int
+    beside: tuple[float, float]
 
     @property
     def distance(self) -> NDArray[np.float64]:
@@ -63,18 +71,42 @@ class Cloud(NamedTuple):
 
 def recorded(activity: str) -> tuple[Cloud, NDArray[np.float64]]:
     """Points of an activity that move, and distance over column "range" of all far ones."""
-    parts, frames, ratios = [], 0, []
+    parts, frames, ratios, codes = [], 0, [], []
     for file in sorted(Path(os.environ["RTRADAR_MEASURED"], "radhar").glob(f"*{activity}*.npz")):
         with np.load(file) as stored:
-            points = stored["points"].astype(np.float64)
-            frames += len(np.unique(stored["frame"]))
-        points = points[(points[:, 3] > 0) & (points[:, 3] < 6)]  # two have a garbled number
+            points, frame = stored["points"].astype(np.float64), stored["frame"].astype(np.int64)
+        good = (points[:, 3] > 0) & (points[:, 3] < 6)  # two have a garbled number
+        points, frame = points[good], frame[good] - frame.min() + frames
+        frames += len(np.unique(frame))
+        codes.append(codes_of(frame, points[:, 3], points[:, 4])[points[:, 4] != 0])
         far = points[points[:, 3] > 2]
         ratios.append(np.linalg.norm(far[:, :3], axis=1) / far[:, 3])
         parts.append(points[points[:, 4] != 0])
     found = np.concatenate(parts)
-    level_db = (10 ** (found[:, 7] / 10) - 1) / 512 * 20 * np.log10(2)
-    return Cloud(found[:, :3], found[:, 4], level_db, frames), np.concatenate(ratios)
+    level_db = 20 * np.log10(10 ** (found[:, 7] / 10) - 1)
+    beside = with_neighbours(np.concatenate(codes))
+    return Cloud(found[:, :3], found[:, 4], level_db, frames, beside), np.concatenate(ratios)
+
+
+def codes_of(
+    frame: NDArray[np.int64], range_m: NDArray[np.float64], speed: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """One number for each cell: neighbours in Doppler differ by 1, in range by 100."""
+    radar = rt.Radar.preset("radhar")
+    cell, doppler = (
+        np.rint(values / step).astype(np.int64)
+        for values, step in ((range_m, radar.range_bin_m), (speed, radar.velocity_bin_mps))
+    )
+    return np.asarray((frame * 1000 + cell) * 100 + doppler + 50)
+
+
+def with_neighbours(codes: NDArray[np.int64]) -> tuple[float, float]:
+    """Fractions of cells that have a neighbour in range, and in Doppler."""
+    only = np.unique(codes)
+    over_range, over_doppler = (
+        float((np.isin(only - step, only) | np.isin(only + step, only)).mean()) for step in (100, 1)
+    )
+    return over_range, over_doppler
 
 
 def simulated(activity: str, seconds: float) -> Cloud:
@@ -91,11 +123,14 @@ def simulated(activity: str, seconds: float) -> Cloud:
     )
     cloud = result.spatial
     moving = cloud.velocity != 0
+    frame = np.unique(cloud.time, return_inverse=True)[1].astype(np.int64)
+    distance = np.linalg.norm(cloud.points - radar.position_m, axis=1)
     return Cloud(
         cloud.points[moving] - radar.position_m,
         cloud.velocity[moving],
         10 * np.log10(cloud.power[moving]),
         int(result.summary["windows"]),
+        with_neighbours(codes_of(frame[moving], distance[moving], cloud.velocity[moving])),
     )
 
 
@@ -111,6 +146,12 @@ def grid_rows(name: str, cloud: Cloud) -> Iterator[Row]:
     # The chip rounds places to 1/256 m: at 0.8 m, 1/256 / sqrt(12) of each coordinate is 0.045,
     # and half a step, which 1 % may have, 0.08.
     yield judged(name, "99 % from the grid of azimuth", "1/32", float(off), 0.08, says=says)
+    over_range, over_doppler = cloud.beside
+    yield reported(name, "moving cells with a neighbour in range", "1", over_range)
+    says = "recorded and simulated peaks are grouped over Doppler: cells with a neighbour there"
+    # The chip lists a second direction of a cell at the end, and compares rounded levels, so that
+    # two of the same level may stay.
+    yield judged(name, "cells with a neighbour in Doppler", "1", over_doppler, 0.05, says=says)
 
 
 def figures(cloud: Cloud) -> dict[tuple[str, str], float]:

@@ -8,12 +8,11 @@ says. Windows of 4 s become the figures of `radhar_windows`; moving points are t
 to between all and a third.
 
 What was chosen after looking at the recorded points, without fitting: that peaks are grouped over
-Doppler alone, as the profile's own line has it (96 % of the still cells have a neighbour in range,
-1 to 3 % of the moving ones one in Doppler); the Hann window over range (strong still echoes are
-three cells wide); the noise (in moving cells the levels of the files go from 2 to 22 dB over the
-threshold, 5 to 95 %); the mount (heights of the points); low jumps with quiet arms (style ``hop``)
-and squats with quiet arms (0.1 and 0.3 moving points a frame); still points of the person as
-figures. Of several points in a cell of range and Doppler the first one counts.
+Doppler alone, as the profile's own line has it (`radhar.py` counts neighbours); the Hann window
+over range (strong still echoes are three cells wide); the noise (how the levels of moving cells
+spread); the mount (heights of the points); low jumps with quiet arms (style ``hop``) and squats
+with quiet arms (there are few moving points); still points of the person as figures. Of several
+points in a cell of range and Doppler the first one counts.
 
 A forest learns from windows of simulated clouds alone, and is asked about the recorded files;
 chance is 0.2. Beside it is what a forest knows that has learnt from the recorded training files of
