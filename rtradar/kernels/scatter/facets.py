@@ -29,6 +29,7 @@ from rtradar.kernels.scatter.triangles import (
     SERIES,
     excess_paths,
     large_last,
+    positive_fraction,
     sum_large,
     sum_small,
 )
@@ -45,7 +46,8 @@ class Facets(NamedTuple):
     it is flat: the terminator is softened over it. ``rise (facet,)`` is how far that surface stands
     out of the facet in the mean [m]. ``ends (part + 1, 2)`` int64 are the first vertex and the
     first facet of each part, and last the numbers of all. With ``both_sides`` they are a thin
-    sheet, lit from either side.
+    sheet, lit from either side. ``semi_axes (part, 3)`` are those of the ellipsoids that facets
+    stand for [m], whose terminator cuts the currents sharply; without them, (0, 3), it is softened.
     """
 
     vertices: Array
@@ -56,6 +58,7 @@ class Facets(NamedTuple):
     rise: Array
     ends: NDArray[np.int64]
     both_sides: bool = False
+    semi_axes: Array = np.empty((0, 3))
 
 
 class Views(NamedTuple):
@@ -82,17 +85,17 @@ class Waves(NamedTuple):
 
     ``pairs (pair, 2)`` int64, Tx and Rx among the antennas of a task; ``carrier (task, pair)`` the
     path whose phase is taken out [m]; ``wavenumber (task, node)`` [rad/m]; ``spreading``, whether
-    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 5)`` are,
+    each facet's field is divided by R_T R_R, normalised to 1 m. ``currents (task, pair, 6)`` are,
     with 0 <= w <= 1 the weight of the currents: w e_R.e_T; the vector -w (e_R.s_T) e_T in the axes
-    of the part; and what multiplies the reciprocal obliquity. Without any, (0, 0, 5), the obliquity
-    is the reciprocal one.
+    of the part; what multiplies the reciprocal obliquity; and w. Without any, (0, 0, 6), the
+    obliquity is the reciprocal one.
     """
 
     pairs: NDArray[np.int64]
     carrier: Array
     wavenumber: Array
     spreading: bool
-    currents: Array = np.empty((0, 0, 5))
+    currents: Array = np.empty((0, 0, 6))
 
 
 class _Chosen(NamedTuple):
@@ -123,7 +126,8 @@ class _Terms(NamedTuple):
 def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, start, chosen):
     """Fill ``chosen`` with facets that any of the antennas may light; their number is returned.
 
-    The row of what is seen has the first facet at ``start``.
+    ``bend`` is how far lit facets may face away. The row of what is seen has the first facet at
+    ``start``.
     """
     count_antennas = len(antennas)
     # A ball that holds all antennas.
@@ -151,8 +155,11 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, start, c
 
 
 @inlined()
-def _choose(facets, own, antennas, row, start, seen, x, y, z):
-    """Facets of a part that may be lit; its vertices' coordinates are filled in."""
+def _choose(facets, own, antennas, row, start, seen, bends, x, y, z):
+    """Facets of a part that may be lit; its vertices' coordinates are filled in.
+
+    Facets that face away by more than ``bends`` times their bend are not.
+    """
     (first, begin), (last, end) = facets.ends[own], facets.ends[own + 1]
     vertices, faces = facets.vertices[first:last], facets.faces[begin:end]
     normals, every_bend = facets.normals[begin:end], facets.bend[begin:end]
@@ -168,7 +175,8 @@ def _choose(facets, own, antennas, row, start, seen, x, y, z):
         planes[f] = normals[f, 0] * x[i] + normals[f, 1] * y[i] + normals[f, 2] * z[i]
     lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
     reach = math.sqrt(size)
-    count = _may_be_lit(antennas, planes, normals, every_bend, both, reach, seen, row, start, lit)
+    away = bends * every_bend
+    count = _may_be_lit(antennas, planes, normals, away, both, reach, seen, row, start, lit)
     # Coordinate by coordinate, with unsigned indices: an index that may be negative, and so count
     # from the end of an array, keeps a loop from vector lanes.
     corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
@@ -221,16 +229,36 @@ def _facing_both(tx_facing, rx_facing, bend, both, out):
 
 
 @inlined(fastmath=FAST)
-def _lit_by_tx(tx_facing, chosen, both, currents, out):
-    """Multiply the reciprocal obliquity by its weight, and add that of the currents Tx drives."""
+def _polar_plane(antenna, semi_axes, x, y, z, out):
+    """Fill in a function of vertices that is positive where an antenna lights an ellipsoid.
+
+    It is linear, and 0 in the plane of :eq:`terminator` of the theory page.
+    """
+    a, b, c = (antenna / semi_axes) / semi_axes
+    for i in range(len(x)):
+        out[i] = a * x[i] + b * y[i] + c * z[i] - 1
+
+
+@inlined(fastmath=FAST)
+def _lit_by_tx(tx_facing, chosen, both, level, currents, lit, out):
+    """Multiply the reciprocal obliquity by its weight, and add that of the currents Tx drives.
+
+    ``level (vertex,)`` is that of `_polar_plane`, whose lit fraction of each facet is filled into
+    ``lit``; without any, (0,), the terminator is softened.
+    """
+    first_of, second_of, third_of = chosen.corners[0], chosen.corners[1], chosen.corners[2]
     n0, n1, n2, bend = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.bend
     along, x, y, z, reciprocal = currents[0], currents[1], currents[2], currents[3], currents[4]
     for i in range(len(out)):
         side = -1.0 if both and tx_facing[i] < 0 else 1.0
         facing = side * tx_facing[i]
-        # The term across does not fall to 0 at the terminator by itself: it is faded out.
-        h = max(bend[i], 1e-300)
-        over = min(1.0, max(0.0, (facing + h) / (2 * h)))
+        # The term across does not fall to 0 at the terminator by itself: it is cut or faded out.
+        if len(level) > 0:
+            over = positive_fraction(level[first_of[i]], level[second_of[i]], level[third_of[i]])
+            lit[i] = over
+        else:
+            h = max(bend[i], 1e-300)
+            over = min(1.0, max(0.0, (facing + h) / (2 * h)))
         across = x * n0[i] + y * n1[i] + z * n2[i]
         out[i] = reciprocal * out[i] + along * max(facing, 0.0) + over * side * across
 
@@ -253,36 +281,47 @@ def _light(tx, rx, chosen, far_t, far_r, carrier, spreading, terms):
 
 
 @inlined()
-def _cut(tx, rx, tx_edge, rx_edge, facet, terms):
+def _cut(tx, rx, edges, rows, chosen, level, lit, weight, terms):
     """Replace each facet on the edge of a shadow by its lit piece; return the number of terms.
+
+    The ``rows`` of ``edges``, see `Views`, are those of Tx and of Rx. The terminator is an edge,
+    too: ``level`` and ``lit`` are those of `_lit_by_tx`. It cuts no more of a facet's strength than
+    the ``weight`` of the currents, because the reciprocal form has a soft terminator.
 
     The edge cuts a triangle off. If that is lit, it takes the place of the facet; if not, the whole
     facet stays, and the triangle is appended to the ``terms`` with a negative strength.
     """
     mean, u, v, strength = terms
+    facet, corners = chosen.facet, chosen.corners
     count = len(facet)
     for i in range(len(facet)):
-        fraction = min(tx[4, i], rx[4, i])
+        # The edge of a shadow comes before the terminator.
+        seen = min(tx[4, i], rx[4, i])
+        fraction, share = (lit[i], weight) if seen >= 1 and weight > 0 else (seen, 1.0)
         if fraction <= 0 or fraction >= 1:
             continue
-        edge = tx_edge[facet[i]] if tx[4, i] <= rx[4, i] else rx_edge[facet[i]]
-        a, b, c = edge[0], edge[1], edge[2]
+        if seen < 1:
+            edge = edges[rows[0] if tx[4, i] <= rx[4, i] else rows[1], facet[i]]
+            a, b, c = edge[0], edge[1], edge[2]
+        else:
+            a, b, c = level[corners[0, i]], level[corners[1, i]], level[corners[2, i]]
         # The paths over the three corners, from mean and deviations.
         first, second, third = mean[i] + u[i], mean[i] + v[i], mean[i] - u[i] - v[i]
         # Put first the corner that is alone on its side of the edge.
-        lit = (a > 0) + (b > 0) + (c > 0) == 1
-        if (b > 0) == lit and (a > 0) != lit:
+        single = (a > 0) + (b > 0) + (c > 0) == 1
+        if (b > 0) == single and (a > 0) != single:
             a, b, c, first, second, third = b, c, a, second, third, first
-        elif (a > 0) != lit:
+        elif (a > 0) != single:
             a, b, c, first, second, third = c, a, b, third, first, second
         # The edge crosses both sides that meet at that corner, at these fractions of them.
         along, beside = a / (a - b), a / (a - c)
         second, third = along * (second - first), beside * (third - first)
         # The strength of the whole facet: the fraction that is seen was in it.
-        place, whole = i, strength[i] / fraction
+        place, whole = i, share * strength[i] / fraction
         size = whole * along * beside
-        if not lit:
-            place, strength[i], size, count = count, whole, -size, count + 1
+        if not single or share < 1:
+            strength[i] = (1 - share) * strength[i] + (0.0 if single else whole)
+            place, size, count = count, size if single else -size, count + 1
         # The same terms for the triangle, whose corners are that one and both crossings.
         middle = first + (second + third) / 3
         mean[place], strength[place] = middle, size
@@ -301,8 +340,13 @@ def integrate(begin, end, facets, views, waves, out):
         count_vertices = facets.ends[own + 1, 0] - facets.ends[own, 0]
         x, y, z = np.empty(count_vertices), np.empty(count_vertices), np.empty(count_vertices)
         excess = np.empty(count_vertices)
-        chosen = _choose(facets, own, antennas, row, views.first[task], views.seen, x, y, z)
+        # A corner may face an antenna while its facet faces away by up to thrice its bend.
+        wide, first = len(waves.currents) > 0, views.first[task]
+        bends = 3.0 if wide else 1.0
+        chosen = _choose(facets, own, antennas, row, first, views.seen, bends, x, y, z)
         count = len(chosen.facet)
+        sharp = wide and len(facets.semi_axes) > 0
+        level, lit = np.empty(count_vertices if sharp else 0), np.ones(count)
         # What each antenna sees of them.
         view = np.empty((count_antennas, 5, count))
         for antenna in range(count_antennas):
@@ -318,13 +362,18 @@ def integrate(begin, end, facets, views, waves, out):
             strength = terms.strength
             both, facing = facets.both_sides, view[t][3]
             _facing_both(facing, view[r][3], chosen.bend, both, strength)
-            if len(waves.currents) > 0:
-                _lit_by_tx(facing, chosen, both, waves.currents[task, pair], strength)
+            weight = 0.0
+            if wide:
+                currents = waves.currents[task, pair]
+                weight = currents[5]
+                if sharp:
+                    _polar_plane(antennas[t], facets.semi_axes[own], x, y, z, level)
+                _lit_by_tx(facing, chosen, both, level, currents, lit, strength)
             _light(view[t], view[r], chosen, far[t], far[r], offset, waves.spreading, terms)
             pieces = count
-            if edges:
-                tx_edge, rx_edge = views.edge[row[t]], views.edge[row[r]]
-                pieces = _cut(view[t], view[r], tx_edge, rx_edge, chosen.facet, rows)
+            if edges or sharp:
+                given = views.edge, (row[t], row[r]), chosen, level, lit, weight
+                pieces = _cut(view[t], view[r], *given, rows)
             mean, u, v = rows[0, :pieces], rows[1, :pieces], rows[2, :pieces]
             strength = rows[3, :pieces]
             # The series is for small phases: others go last, by the phase at the highest frequency.

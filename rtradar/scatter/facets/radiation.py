@@ -80,7 +80,9 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], counts: Indices | int) -> F
     spheres = [geodesic_sphere(frequency) for frequency in frequencies.tolist()]
     faces, ends = joined(spheres)
     points = np.concatenate([own for own, _ in spheres])
-    axes = np.repeat(np.asarray(semi_axes, dtype=np.float64), np.diff(ends[:, 0]), axis=0)
+    # A copy, for a read-only array is another type to Numba.
+    own = np.array(semi_axes, dtype=np.float64)
+    axes = np.repeat(own, np.diff(ends[:, 0]), axis=0)
     # The normal of the ellipsoid at a vertex is along the place over the squared semi-axes.
     vertices, smooth = points * axes, points / axes
     smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
@@ -93,7 +95,8 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], counts: Indices | int) -> F
     square = (points[faces] ** 2).sum(axis=(1, 2)) + (points[faces].sum(axis=1) ** 2).sum(axis=1)
     stretched = np.linalg.norm(normals * axes[faces[:, 0]], axis=1)
     rise = (1 - square / 12) / 2 * stretched
-    return Facets(vertices, faces, normals, areas, np.sqrt(swing / 8), rise, ends)
+    bend = np.sqrt(swing / 8)
+    return Facets(vertices, faces, normals, areas, bend, rise, ends, semi_axes=own)
 
 
 def joined(parts: Sequence[tuple[Sized, Indices]]) -> tuple[NDArray[np.int32], Indices]:
@@ -328,8 +331,8 @@ def with_obliquity(
     # normals are.
     along, across = driven_currents(to_tx, to_rx, polarization)
     across = np.einsum("...ji,...nj->...ni", frames, across)
-    parts = [fade * along[..., None], fade * across, (1 - fade) * factor[..., None]]
-    currents = np.concatenate(parts, axis=-1).reshape(-1, apart.shape[-1], 5)
+    parts = [fade * along[..., None], fade * across, (1 - fade) * factor[..., None], fade]
+    currents = np.concatenate(parts, axis=-1).reshape(-1, apart.shape[-1], 6)
     return waves._replace(currents=currents), np.ones_like(factor)
 
 

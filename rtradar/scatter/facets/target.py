@@ -352,8 +352,8 @@ def visible_fractions(
     if not few.any():
         return np.ones_like(few)
 
-    def count(wavenumber: float, wide: bool) -> Indices:
-        return _for_directions(4 * body_facets(target.semi_axes, wavenumber), wide)
+    def count(wavenumber: float) -> Indices:
+        return np.minimum(4 * body_facets(target.semi_axes, wavenumber), MAXIMUM_FACETS)
 
     return _block_by_block(*given, count, visible)
 
@@ -369,25 +369,25 @@ def _block_by_block(
     pairs: tuple[Array, Array, Array],
     polarization: Polarization,
     variant: str,
-    count: Callable[[float, bool], Indices | int],
+    count: Callable[[float], Indices | int],
     find: Callable[..., NDArray[Any]],
 ) -> NDArray[np.complex128]:
     """Return what `radiated` or `visible` finds of each part (n, part), near and far apart alike.
 
-    ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber, wide)``
-    gives the numbers of facets of the parts (part,), or one for all, that either kind needs.
+    ``pairs`` are Tx and Rx (n, 3) [m] and wavenumbers (n,) [rad/m]; ``count(wavenumber)`` gives the
+    numbers of facets of the parts (part,), or one for all, that the largest of these needs.
     """
     tx, rx, wavenumber = pairs
     parts = np.arange(len(target.centres))
     found = np.empty((len(tx), len(parts)), dtype=np.complex128)
-    # Pairs whose Tx and Rx are far apart need more facets, so they are summed apart.
+    # Pairs whose Tx and Rx are near each other need less of what is seen, so they are summed apart.
     to_tx, to_rx = (antennas[:, None] - target.centres for antennas in (tx, rx))
     apart = directions_apart(to_tx, to_rx).max(axis=1)
     for wide in (False, True):
         some = np.flatnonzero((apart > NEAR) == wide)
         if not len(some):
             continue
-        enough = count(float(wavenumber[some].max()), wide)
+        enough = count(float(wavenumber[some].max()))
         shadows = FacetShadows(select(variant), target.semi_axes, enough)
         facets = shadows.facets
         # As many pairs at once as memory for their visibility allows.
@@ -414,14 +414,7 @@ def _block_by_block(
     return found
 
 
-def _for_directions(enough: Indices | int, wide: bool) -> Indices:
-    """Return more facets for pairs far apart: their current does not fade at the terminator."""
-    return np.minimum(4 * enough if wide else enough, MAXIMUM_FACETS)
-
-
-def _enough_facets(
-    target: Ellipsoids, facets: int | None, wavenumber: float, wide: bool
-) -> Indices | int:
+def _enough_facets(target: Ellipsoids, facets: int | None, wavenumber: float) -> int:
     """Facets per part: those asked for, or as many as the thickest part takes."""
     # The thickest part decides, by its middle semi-axis.
     ka = wavenumber * float(np.median(target.semi_axes, axis=1).max())
@@ -438,4 +431,4 @@ def _enough_facets(
             f"physical optics of a part with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs {needed} "
             f"facets an ellipsoid; {cure}"
         )
-    return _for_directions(needed, wide) if facets is None else facets
+    return needed if facets is None else facets

@@ -12,7 +12,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.scatter.facets import Views, Waves
+from rtradar.kernels.scatter.facets import Facets, Views, Waves
 from rtradar.kernels.scatter.triangles import positive_fraction
 from rtradar.scatter import build_model
 from rtradar.scatter.common.polarization import Polarization, copolar
@@ -20,6 +20,7 @@ from rtradar.scatter.facets.radiation import (
     body_facets,
     ellipsoid_facets,
     facet_integral,
+    facet_normals,
     mesh_facets,
 )
 from rtradar.scatter.facets.target import facet_scattering
@@ -135,6 +136,42 @@ def test_of_a_facet_that_an_edge_cuts_the_lit_piece_is_integrated_exactly(
     scale *= abs(facets.normals[0] @ antenna) / np.linalg.norm(antenna)
     # By many points, of which an edge takes half a row at the most.
     assert abs(got - 1j * scale * mean_over_triangle(-k * path, edge)) < 4e-3 * scale
+
+
+@settings(max_examples=40)
+@given(seeds, st.floats(-1, 1))
+def test_of_a_facet_that_the_terminator_cuts_the_lit_piece_is_integrated_exactly(
+    seed: int, size: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    axes, place = rng.uniform(0.5, 2, 3), directions(rng, 1)[0]
+    # A facet about a place of an ellipsoid to which the Tx is tangential.
+    outward = place / axes / np.linalg.norm(place / axes)
+    tx = place * axes + 1e9 * np.cross(outward, directions(rng, 1)[0])
+    ball = place + 0.1 * np.cross(place, rng.normal(size=(3, 3)))
+    corners = axes * ball / np.linalg.norm(ball, axis=1, keepdims=True)
+    if np.linalg.det(corners) < 0:
+        corners = corners[::-1].copy()
+    faces, each = np.array([[0, 1, 2]], dtype=np.int32), np.zeros(1, dtype=int)
+    ends, (normals, areas) = np.array([[0, 0], [3, 1]]), facet_normals(corners, faces)
+    facets = Facets(
+        corners, faces, normals, areas, np.ones(1), np.zeros(1), ends, semi_axes=axes[None]
+    )
+    antennas, pair = np.stack([tx, 1e9 * directions(rng, 1)[0]]), np.array([[0, 1]])
+    path = np.linalg.norm(corners - antennas[:, None], axis=2).sum(axis=0)
+    k = 10**size / np.ptp(path)
+    carrier = np.linalg.norm(antennas, axis=1).sum()
+    # Of the currents only what does not fall to 0 at the terminator by itself.
+    vector = rng.normal(size=3)
+    currents = np.array([[[0, *vector, 0, 1]]], dtype=float)
+    waves = Waves(pair, np.full((1, 1), carrier), np.array([[k]]), False, currents)
+    views = Views(each, antennas[None], np.array([[0, 1]]), each, np.ones((2, 1), np.float32))
+    got = facet_integral(facets, views, waves)[0, 0, 0]
+    # Lit is where the normal of the ellipsoid faces the Tx.
+    edge = np.sum(corners / axes**2 * (tx - corners), axis=1) / 1e9
+    scale = k / np.sqrt(np.pi) * areas[0] * np.linalg.norm(vector)
+    mean = mean_over_triangle(-k * (path - carrier), edge) * (vector @ normals[0])
+    assert abs(got - 1j * k / np.sqrt(np.pi) * areas[0] * mean) < 4e-3 * scale
 
 
 @settings(max_examples=20)
