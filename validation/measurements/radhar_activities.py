@@ -251,7 +251,9 @@ def measure(quick: bool) -> list[Row]:
         return []
     count, seconds = (1, 5.0) if quick else (24, 10.0)
     of_actors = [(take.activity, simulated(take)) for take in actors(count, seconds)]
-    of_people = [(take.activity, simulated(take)) for take in people(0 if quick else count, seconds)]
+    of_people = [
+        (take.activity, simulated(take)) for take in people(0 if quick else count, seconds)
+    ]
     return rows_from(of_actors, of_people)
 
 
