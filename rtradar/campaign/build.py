@@ -249,8 +249,7 @@ def build_dataset(
     folder = out.resolve()
     with exclusive_lock(folder):
         sweep(folder)
-        # Index and origin come first: they say what belongs to the data set, also while samples are
-        # missing.
+        # Index and origin come first: they say what belongs here while samples are missing.
         missing, damaged = missing_of(plans, folder)
         write_index(folder, [plan.identity for plan in plans])
         write_made(spec, read, folder)

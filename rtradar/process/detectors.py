@@ -252,14 +252,7 @@ def ti_oob(
         chip = replace(
             radar.chip or Chip(), **{key: own for key, own in given.items() if own is not None}
         )
-    n_cycles = len(cube)
-    window = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)
-    spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)  # (doppler, tx, rx, range)
-    velocity = np.fft.ifftshift(radar.velocity_mps(n_cycles))
-    # The Tx transmit one after the other, while targets move on: their phases are turned back.
-    turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
-    still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
-    spectra = tell_apart(spectra * still[:, :, None, None], radar)
+    spectra, n_cycles = _spectra(cube, radar, window_functions), len(cube)
     level_db = _heat_map(spectra)
     detected = np.ones(level_db.shape, dtype=np.bool_)
     if chip.cfar_axes != "range":
@@ -279,6 +272,19 @@ def ti_oob(
     order = np.lexsort((column, row))
     values = spectra[doppler[order], :, :, row[order]]
     return mask, _sines(values, radar)
+
+
+def _spectra(
+    cube: NDArray[np.complexfloating], radar: Radar, window_functions: WindowFunctions
+) -> NDArray[np.complexfloating]:
+    """Spectra (doppler, tx, rx, range) of range spectra, as if all Tx had transmitted at once."""
+    window = weights(window_functions.doppler, len(cube)).astype(cube.real.dtype)
+    spectra = scipy.fft.fft(cube * window[:, None, None, None], axis=0)
+    velocity = np.fft.ifftshift(radar.velocity_mps(len(cube)))
+    # The Tx transmit one after the other, while targets move on: their phases are turned back.
+    turns = np.outer(velocity * (2 / radar.wavelength_m), radar.tx_delay_s)
+    still = np.exp(-2j * np.pi * turns).astype(spectra.dtype)
+    return tell_apart(spectra * still[:, :, None, None], radar)
 
 
 def _heat_map(spectra: NDArray[np.complexfloating]) -> _Reals:
