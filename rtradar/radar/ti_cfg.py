@@ -251,7 +251,8 @@ def _chip(path: Path, commands: _Commands, virtual: int) -> Chip:
         first = 0 if count == 7 else 1
         axis = ("range", "doppler")[line.whole(first, 0, 1, "the direction of CFAR")]
         mode = line.whole(first + 1, 0, 2, "the mode of CFAR")
-        cells, guard = (line.whole(first + k, 1 - (k == 3), 64, "the cells") for k in (2, 3))
+        cells = line.whole(first + 2, 1, 64, "the number of noise cells")
+        guard = line.whole(first + 3, 0, 64, "the number of guard cells")
         both = 2 if mode == 0 else 1
         if 2 ** line.whole(first + 4, 0, 8, "the divisor of the noise") != both * cells:
             _warn(path, f"line {line.number}: the noise is the mean of its cells here")

@@ -18,10 +18,9 @@ points in a frame that move, spread of distance, of speed and of level. As the r
 it, clutter is not removed, CFAR is over range alone (``cfarCfg 0 2 8 4 3 0 768``: the smaller of
 both sides, 8 noise and 4 guard cells, 9 dB), and peaks are grouped over Doppler alone
 (``peakGrouping 1 0 1``). Points that stand still are the room in the files, and are left out in
-both. Levels are magnitudes, of which the driver keeps 10 log10(1 + level): the cells beside a
-strong still echo have half of its level, as a Hann window makes them, where logarithms would be
-nearly the same. The profile is ``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes and
-threshold are those of TI's mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
+both. Levels are taken for magnitudes, of which the driver keeps 10 log10(1 + level). The profile is
+``cfg/archive/1443_3d_original.cfg`` of ti_mmwave_rospkg; modes and threshold are those of TI's
+mmWave SDK user guide (mode 2 is CFAR_CASO, 512 dB / 6).
 
 Without the folder only the grids of simulated points are judged.
 
@@ -63,6 +62,7 @@ class Cloud(NamedTuple):
     level_db: NDArray[np.float64]
     frames: int
     beside: tuple[float, float]
+    in_a_row: float  # still cells that follow each other over range, median
 
     @property
     def distance(self) -> NDArray[np.float64]:
@@ -71,21 +71,23 @@ class Cloud(NamedTuple):
 
 def recorded(activity: str) -> tuple[Cloud, NDArray[np.float64]]:
     """Points of an activity that move, and distance over column "range" of all far ones."""
-    parts, frames, ratios, codes = [], 0, [], []
+    parts, frames, ratios, codes, still = [], 0, [], [], []
     for file in sorted(Path(os.environ["RTRADAR_MEASURED"], "radhar").glob(f"*{activity}*.npz")):
         with np.load(file) as stored:
             points, frame = stored["points"].astype(np.float64), stored["frame"].astype(np.int64)
         good = (points[:, 3] > 0) & (points[:, 3] < 6)  # two have a garbled number
         points, frame = points[good], frame[good] - frame.min() + frames
         frames += len(np.unique(frame))
-        codes.append(codes_of(frame, points[:, 3], points[:, 4])[points[:, 4] != 0])
+        every = codes_of(frame, points[:, 3], points[:, 4])
+        codes.append(every[points[:, 4] != 0])
+        still.append(every[points[:, 4] == 0])
         far = points[points[:, 3] > 2]
         ratios.append(np.linalg.norm(far[:, :3], axis=1) / far[:, 3])
         parts.append(points[points[:, 4] != 0])
     found = np.concatenate(parts)
     level_db = 20 * np.log10(10 ** (found[:, 7] / 10) - 1)
-    beside = with_neighbours(np.concatenate(codes))
-    return Cloud(found[:, :3], found[:, 4], level_db, frames, beside), np.concatenate(ratios)
+    beside, row = with_neighbours(np.concatenate(codes)), in_a_row(np.concatenate(still))
+    return Cloud(found[:, :3], found[:, 4], level_db, frames, beside, row), np.concatenate(ratios)
 
 
 def codes_of(
@@ -109,6 +111,13 @@ def with_neighbours(codes: NDArray[np.int64]) -> tuple[float, float]:
     return over_range, over_doppler
 
 
+def in_a_row(codes: NDArray[np.int64]) -> float:
+    """How many still cells follow each other over range, median."""
+    only = np.unique(codes)
+    ends = np.flatnonzero(np.diff(only, append=only[-1] + 1) != 100)
+    return float(np.median(np.diff(ends, prepend=-1)))
+
+
 def simulated(activity: str, seconds: float) -> Cloud:
     name, place, heading = ACTIVITIES[activity]
     radar = dataclasses.replace(rt.Radar.preset("radhar"), position_m=(0.0, 0.0, 1.0))
@@ -125,12 +134,14 @@ def simulated(activity: str, seconds: float) -> Cloud:
     moving = cloud.velocity != 0
     frame = np.unique(cloud.time, return_inverse=True)[1].astype(np.int64)
     distance = np.linalg.norm(cloud.points - radar.position_m, axis=1)
+    codes = codes_of(frame, distance, cloud.velocity)
     return Cloud(
         cloud.points[moving] - radar.position_m,
         cloud.velocity[moving],
         10 * np.log10(cloud.power[moving]),
         int(result.summary["windows"]),
-        with_neighbours(codes_of(frame[moving], distance[moving], cloud.velocity[moving])),
+        with_neighbours(codes[moving]),
+        in_a_row(codes[~moving]),
     )
 
 
@@ -148,6 +159,7 @@ def grid_rows(name: str, cloud: Cloud) -> Iterator[Row]:
     yield judged(name, "99 % from the grid of azimuth", "1/32", float(off), 0.08, says=says)
     over_range, over_doppler = cloud.beside
     yield reported(name, "moving cells with a neighbour in range", "1", over_range)
+    yield reported(name, "still cells in a row over range, median", "1", cloud.in_a_row)
     says = "recorded and simulated peaks are grouped over Doppler: cells with a neighbour there"
     # The chip lists a second direction of a cell at the end, and compares rounded levels, so that
     # two of the same level may stay.
