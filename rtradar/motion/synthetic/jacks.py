@@ -311,7 +311,10 @@ class _Jumper:
 
 
 def jumping_jack(duration_s: float, subject: Subject, activity: str = "jumping_jack") -> PosesAt:
-    """Jumping jacks, or jumps with both legs on the spot, facing +x."""
+    """Jumping jacks, facing +x.
+
+    The ``activity`` "jump" has both legs together, on the spot.
+    """
     return _Jumper(subject, "hop" if subject.style == "hop" else activity, duration_s).poses
 
 
