@@ -138,8 +138,13 @@ def _write_arrays(group: Any, collection: Collection) -> None:
             said = f"number of points of the {cloud}; what follows them is NaN"
             _put(group, count, shapes[:, 0], ["sample"], long_name=said)
         _stream(group, name, shape, ("sample", *ARRAYS[name].dims), collection)
-        if name == "spatial" and any("source_names" in row for row in collection.provenance):
-            own = "spatial_source"
+        beside = []  # of each point
+        if name == "spatial":
+            sources = any("source_names" in row for row in collection.provenance)
+            whole = all(row.get("whole_clouds") for row in collection.provenance)
+            beside += ["spatial_source"] * sources
+            beside += ["spatial_time", "spatial_velocity"] * whole
+        for own in beside:
             _stream(group, own, shape[:1], ("sample", *ARRAYS[own].dims), collection)
     # An axis that is the same for all samples is stored once.
     for name in axes:

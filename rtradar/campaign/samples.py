@@ -52,6 +52,7 @@ _OTHERS_STREAM, _TRIES = 3, 1000
 _SPATIAL_STREAM = 2  # differs from the random streams of noise and RDT cloud with the same seed
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _SLOW_BAR: Any = {"unit": "interval", "disable": None, "leave": False, "delay": 2.0}
+_MOUNT = ("radar_up_m", "radar_pitch_deg", "noise_db")
 _BODY = ("build", "height_m")  # drawn once for each synthetic subject
 _LATER_FIELDS = (
     "multiplexing", "carrier_step_hz", "doppler_bands", "transmit_power_dbm", "noise_figure_db",
@@ -156,7 +157,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
     later = {"keep": list(spec.keep), "angles": spec.angles, "clouds": spec.clouds}
-    common |= {key: value for key, value in later.items() if value not in ([], True)}
+    later = {key: value for key, value in later.items() if value not in ([], True)}
+    common |= later | ({"whole_clouds": True} if spec.whole_clouds else {})
     # Every interval under every combination.
     planned = [
         _plan(interval, combination, spec, common)
@@ -192,10 +194,12 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
     assert take_s is not None  # the specification was checked
     for take in actor.seeds:
         subject = actor.subjects[take % len(actor.subjects)]
-        seed = _seed(spec.run.seed, actor.label, take)
-        body = _draw(spec, _seed("subject", subject))
-        drawn = _draw(spec, seed) | {key: body[key] for key in _BODY}
-        name = f"synthetic:{actor.label}:{spec.run.seed}:{take}"
+        style = (actor.style,) if actor.style else ()
+        seed = _seed(spec.run.seed, actor.label, take, *style)
+        ranges = {**spec.drawn, **actor.drawn}
+        body = _draw(ranges, _seed("subject", subject))
+        drawn = _draw(ranges, seed) | {key: body[key] for key in _BODY}
+        name = ":".join(map(str, ("synthetic", actor.label, *style, spec.run.seed, take)))
         motion: dict[str, Any] = {
             "recording": name,
             "recording_digest": "",
@@ -205,6 +209,7 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
             "licence": _SYNTHETIC_LICENCE,
             "take": seed,
             "take_s": take_s,
+            **({"style": actor.style} if style else {}),
             "side": "left" if np.random.default_rng(stream(seed, 1)).integers(2) else "right",
             **{key: drawn[key] for key in ("tempo", "amplitude", *_BODY)},
             "seed": seed,
@@ -234,13 +239,13 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
             "start_s": start_s,
             "duration_s": duration_s,
         }
-        yield _Interval(recorded.label, parameters, _draw(spec, seed), motion)
+        yield _Interval(recorded.label, parameters, _draw(spec.drawn, seed), motion)
         for copy in range(spec.augmented.copies if spec.augmented else 0):
             assert spec.augmented is not None
             own = _seed(spec.run.seed, content, start_s, copy)
             drawn = spec.augmented.draw(own, start_s, duration_s, motion.duration_s)
             yield _Interval(
-                recorded.label, parameters | {"seed": own} | drawn, _draw(spec, own), motion
+                recorded.label, parameters | {"seed": own} | drawn, _draw(spec.drawn, own), motion
             )
 
 
@@ -252,7 +257,7 @@ def _plan(
     # The room, the radar as it is turned there, and the person's place with its offset.
     if spec.random_rooms:
         scene = replace(Scene.random(_seed("room", seed)), name="random")
-    radar = scene.turn(each.radar)
+    radar = _mounted(scene.turn(each.radar), scene, drawn)
     place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
     scene = replace(scene, person_position_m=place)
     # All that decides the sample, as plain values: its id is their hash.
@@ -272,6 +277,21 @@ def _plan(
     if spec.others is not None:
         parameters["others"] = _drawn_others(spec.others, seed, place)
     return SamplePlan(interval.label, parameters, radar, scene, interval.motion)
+
+
+def _mounted(radar: Radar, scene: Scene, drawn: Mapping[str, float]) -> Radar:
+    """Return a radar of this scene with what is drawn of its mount and its noise."""
+    up_m, pitch_deg, noise_db = (drawn[key] for key in _MOUNT)
+    if not (up_m or pitch_deg or noise_db):
+        return radar
+    x, y, z = scene.radar_place(radar)
+    noise = None if radar.noise_figure_db is None else round(radar.noise_figure_db + noise_db, 4)
+    return replace(
+        radar,
+        position_m=(x, y, round(z + up_m, 4)),
+        pitch_deg=round(radar.pitch_deg + pitch_deg, 4),
+        noise_figure_db=noise,
+    )
 
 
 def _drawn_others(others: Others, seed: int, place: tuple[float, float]) -> list[dict[str, Any]]:
@@ -313,13 +333,13 @@ def _radar_parameters(radar: Radar) -> dict[str, Any]:
     return values | {"position_m": list(values["position_m"])}
 
 
-def _draw(spec: Spec, seed: int) -> dict[str, float]:
+def _draw(ranges: Mapping[str, tuple[float, float]], seed: int) -> dict[str, float]:
     """Draw one value from every range, each independent of the other ranges."""
     places = np.random.default_rng(stream(seed, 0)).random(len(DRAWN))
     # Four decimals are enough, and are read as the same number everywhere.
     return {
         key: round(low + (high - low) * float(place), 4)
-        for (key, (low, high)), place in zip(spec.drawn.items(), places, strict=True)
+        for (key, (low, high)), place in zip(ranges.items(), places, strict=True)
     }
 
 
@@ -375,7 +395,9 @@ def make_sample(plan: SamplePlan) -> Made:
     # A uniform sample of the spatial cloud, in the order of time, with who returned each point.
     places = clouds.spatial.points
     kept = np.arange(len(places))
-    if len(places) > SPATIAL_POINTS:
+    if values.get("whole_clouds"):
+        maps |= {"spatial_time": clouds.spatial.time, "spatial_velocity": clouds.spatial.velocity}
+    elif len(places) > SPATIAL_POINTS:
         random = np.random.default_rng(stream(values["seed"], _SPATIAL_STREAM))
         kept = np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))
     if sources and clouds.spatial.source is not None:
@@ -387,8 +409,8 @@ def make_sample(plan: SamplePlan) -> Made:
 
 def _actor_motion(label: str, values: Mapping[str, Any]) -> Motion:
     """Make the whole take, because the path of a walk depends on its length."""
-    keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
-    traits: dict[str, Any] = {key: values[key] for key in keys}
+    keys = ("height_m", "build", "tempo", "amplitude", "side", "take", "style")
+    traits: dict[str, Any] = {key: values[key] for key in keys if key in values}
     return synthetic_motion(
         label, seed=values["subject_seed"], duration_s=values["take_s"], **traits
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from rtradar.campaign.intervals import Augmented, Intervals
 from rtradar.campaign.kept import sizes
@@ -32,8 +32,14 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "amplitude": ((0.8, 1.1), 0.3, 1.25),
     "build": ((0.8, 1.25), 0.4, 2.5),
     "height_m": ((1.55, 1.95), 0.8, 2.5),
+    "radar_up_m": ((0.0, 0.0), -10.0, 10.0),
+    "radar_pitch_deg": ((0.0, 0.0), -90.0, 90.0),
+    "noise_db": ((0.0, 0.0), -20.0, 60.0),
 }
-"""Quantities drawn at random: default range, smallest and largest allowed value."""
+"""Quantities drawn at random: default range, smallest and largest allowed value.
+
+The last three are added to the height, the pitch and the noise figure of the radar. New ones come
+last, so that the values of the others stay as they are."""
 
 EACH: Mapping[str, list[Any]] = {
     "radar": ["paper-12ghz"],
@@ -48,7 +54,10 @@ EACH: Mapping[str, list[Any]] = {
 
 _NUMBERS: Mapping[str, Any] = {
     "heading_deg": Annotated[float, Limits(*DRAWN["heading_deg"][1:])],
-    "snr_db": Annotated[float, Limits(*DRAWN["snr_db"][1:])],
+    "snr_db": Annotated[
+        float | Literal["physical"],
+        Limits(*DRAWN["snr_db"][1:], 'it must be a number from -100 to 200, or "physical"'),
+    ],
     "person_position_m": Annotated[tuple[float, float], Limits(-100, 100)],
     "radar_position_m": Annotated[tuple[float, float, float], Limits(-100, 100)],
 }
@@ -64,11 +73,17 @@ RUN_KEYS = (
 
 
 class Actor(NamedTuple):
-    """Takes of synthetic actors, by the seeds of the takes and the numbers of the subjects."""
+    """Takes of synthetic actors, by the seeds of the takes and the numbers of the subjects.
+
+    Without a style every subject has one of its own. ``drawn`` has their own ranges of what is
+    drawn, beside those of the data set.
+    """
 
     label: str
     seeds: Sequence[int]
     subjects: Sequence[int]
+    style: str = ""
+    drawn: Mapping[str, tuple[float, float]] = {}
 
 
 class Recorded(NamedTuple):
@@ -94,7 +109,7 @@ class Combination(NamedTuple):
     scene: Scene
     fidelity: str
     heading_deg: float | None
-    snr_db: float | None
+    snr_db: float | str | None
 
 
 _MOST_OTHERS, APART_M = 8, 1.0
@@ -130,10 +145,11 @@ class Spec(NamedTuple):
     """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`.
 
     ``keep`` are the kinds of arrays that samples hold beside clouds, in the order of `KEPT`.
-    Without ``angles`` spatial clouds are empty, without ``clouds`` all clouds. With ``skip_short``
-    recordings that are too short for an interval are left out. With ``random_rooms`` every interval
-    has a room of its own, which is drawn. Of ``shard``, (number, count), only every count-th sample
-    is made.
+    Without ``angles`` spatial clouds are empty, without ``clouds`` all clouds; with
+    ``whole_clouds`` they are whole, with the time and the velocity of each point. With
+    ``skip_short`` recordings that are too short for an interval are left out. With
+    ``random_rooms`` every interval has a room of its own, which is drawn. Of ``shard``, (number,
+    count), only every count-th sample is made.
     """
 
     run: RunSettings
@@ -149,6 +165,7 @@ class Spec(NamedTuple):
     skip_short: bool = False
     random_rooms: bool = False
     clouds: bool = True
+    whole_clouds: bool = False
     shard: tuple[int, int] = (1, 1)
 
 
@@ -253,6 +270,9 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     # A radar may be a table with a base; only files below the folder of the specification may be
     # named.
     table = value if key == "radar" and isinstance(value, Mapping) else {"base": value}
+    if "name" in table and not table.keys() & {"base", "board"}:
+        with prefixed(f"[each] {key}: "):
+            return load(table)  # a radar that is whole
     source = read_value(str, "[each] ", key, table.get("base", table.get("board")))
     if source.endswith((".toml", ".cfg")):
         if inside(folder, source) is None:

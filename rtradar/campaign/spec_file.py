@@ -34,6 +34,7 @@ from rtradar.campaign.spec import (
 from rtradar.clouds.sample_files import MADE_FROM, UNKNOWN, write_durably
 from rtradar.description import MOST_FILES, check_files, path_from, versions
 from rtradar.errors import InputError, prefixed
+from rtradar.motion.synthetic import STYLES
 from rtradar.process import WindowFunctions
 from rtradar.recordings import SAID, said_of
 from rtradar.settings import RunSettings
@@ -57,7 +58,7 @@ _Thing = TypeVar("_Thing")
 RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5)}
 """Limits of settings of a run, narrower than those of the settings themselves."""
 
-_SWITCHES = ("angles", "skip_short", "random_rooms", "clouds")
+_SWITCHES = ("angles", "skip_short", "random_rooms", "clouds", "whole_clouds")
 _RUN = annotations_of(RunSettings)
 _TOP: dict[str, Any] = {
     **{key: _RUN[key] for key in ("seed", *RUN_KEYS)},
@@ -80,6 +81,8 @@ _SYNTHETIC: dict[str, Any] = {
     "count": _MANY,
     "seeds": _SEVERAL,
     "subjects": _MANY | _SEVERAL,
+    "style": str,
+    "drawn": Any,
 }
 _RECORDING: dict[str, Any] = {
     **dict.fromkeys(("file", "label", "subject", "licence", "skeleton"), str),
@@ -187,7 +190,6 @@ def _spec(table: Table, folder: Path) -> Spec:
     wrong = Complaints()
     top = _values(_TOP, "", table, wrong)
     drawn_table, each = (wrong.of(table_at, key, table) or {} for key in ("drawn", "each"))
-    wrong.lines += wrong_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
     wrong.lines += wrong_keys("[each] ", each, (), tuple(EACH))
     wrong.lines += [
         f"{key} is under [each] and under [drawn]; give it once"
@@ -209,16 +211,15 @@ def _spec(table: Table, folder: Path) -> Spec:
             "[windows] duration_s is missing; synthetic actors have no end of their own"
         )
     lists = lists_of(each, folder, wrong)
-    drawn = {
-        key: wrong.of(read_range, "[drawn] ", key, drawn_table.get(key, usual), least, most)
-        or (0.0, 0.0)
-        for key, (usual, least, most) in DRAWN.items()
-    }
+    usual: dict[str, Any] = {key: bounds for key, (bounds, _, _) in DRAWN.items()}
+    drawn = _ranges("[drawn] ", {**usual, **drawn_table}, wrong)
     keep = tuple(kind for kind in KEPT if kind in top.get("keep", ()))
     if table.get("clouds") is False and not table.get("keep"):
         wrong.lines.append("clouds = false, and keep is empty; nothing would be left")
     if table.get("angles") is False and "range_azimuth" in keep:
         wrong.lines.append("angles = false, and keep has range_azimuth; leave one of them out")
+    if table.get("whole_clouds") and not (table.get("angles", True) and table.get("clouds", True)):
+        wrong.lines.append("whole_clouds = true needs spatial clouds; leave angles and clouds out")
     if table.get("random_rooms") and each.keys() & {"scene", "radar_position_m"}:
         wrong.lines.append(
             "random_rooms = true draws rooms and where the radar stands; leave scene and "
@@ -243,6 +244,16 @@ def _spec(table: Table, folder: Path) -> Spec:
     return Spec(
         run, intervals, combinations, drawn, actors, recordings, keep, others, augmented, **switches
     )
+
+
+def _ranges(where: str, table: Table, wrong: Complaints) -> dict[str, tuple[float, float]]:
+    """Return the ranges of a table of what is drawn at random; complain about all else."""
+    wrong.lines += wrong_keys(where, table, (), tuple(DRAWN))
+    return {
+        key: wrong.of(read_range, where, key, table[key], least, most) or (0.0, 0.0)
+        for key, (_, least, most) in DRAWN.items()
+        if key in table
+    }
 
 
 def _values(
@@ -302,9 +313,10 @@ def _folder(named: str, beside: Path) -> Path:
 
 
 def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
-    found: dict[str, Actor] = {}
+    found: dict[tuple[str, str], Actor] = {}
     for where, one in wrong.of(tables_at, "synthetic", table) or ():
-        given = {"label": "", "subjects": 10, **_values(_SYNTHETIC, where, one, wrong, ("label",))}
+        usual: dict[str, Any] = {"label": "", "subjects": 10, "style": ""}
+        given = usual | _values(_SYNTHETIC, where, one, wrong, ("label",))
         if ("count" in one) == ("seeds" in one):
             wrong.lines.append(f"{where}: give count or seeds, one of them")
         for key, value in given.items():
@@ -315,12 +327,18 @@ def _actors(table: Table, wrong: Complaints) -> tuple[Actor, ...]:
             range(own) if isinstance(own, int) else own
             for own in (given.get("seeds", given.get("count", 0)), given["subjects"])
         )
-        actor = Actor(given["label"], seeds, subjects)
-        if actor.label and actor.label in found:
+        own = _ranges(f"{where}drawn: ", wrong.of(table_at, "drawn", one, where) or {}, wrong)
+        actor = Actor(given["label"], seeds, subjects, given["style"], own)
+        if actor.label and (actor.label, actor.style) in found:
             wrong.lines.append(
                 f"[[synthetic]] label = '{actor.label}' is given twice; give its takes together"
             )
-        found[actor.label] = actor
+        if actor.label and actor.style and actor.style not in STYLES.get(actor.label, ()):
+            wrong.lines.append(
+                f"{where}style = {brief(actor.style)}; allowed for {actor.label}: "
+                f"{', '.join(STYLES.get(actor.label, ())) or 'none'}"
+            )
+        found[actor.label, actor.style] = actor
     return tuple(found.values())
 
 

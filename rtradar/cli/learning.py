@@ -1,4 +1,4 @@
-"""``rtradar dataset``, ``train``, ``evaluate`` and ``predict``: labelled clouds, classifiers."""
+"""``rtradar dataset``, ``train``, ``evaluate``, ``recogniser`` and ``predict``: classifiers."""
 
 from __future__ import annotations
 
@@ -9,6 +9,27 @@ from typing import Any
 
 from rtradar.cli.values import say
 from rtradar.errors import InputError
+
+
+def recogniser_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
+    """Do ``rtradar recogniser build``."""
+    from rtradar.campaign.recogniser import build_recogniser, card_in_words
+
+    made = build_recogniser(
+        options.radar,
+        options.activities,
+        options.out,
+        unknown=options.unknown,
+        scene=options.scene,
+        motions=options.motions,
+        takes=options.takes,
+        window_s=options.window,
+        clutter_removal=options.clutter_removal,
+        seed=options.seed,
+        workers=options.workers,
+    )
+    yield made.card
+    say(options, f"{card_in_words(made)}\n\nsee {options.out}")
 
 
 def dataset_init(options: argparse.Namespace) -> None:
@@ -113,13 +134,14 @@ def evaluate(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
 
 def predict(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar predict``."""
-    from rtradar.recognition import predict_run
+    from rtradar.recognition import predict as answer_to
 
-    answer = predict_run(options.folder)
+    answer = answer_to(options.place, options.weights)
     yield answer
     chances = sorted(answer["probabilities"].items(), key=lambda one: -one[1])
     shown = ", ".join(f"{name} {chance:.0%}" for name, chance in chances)
-    windows = f"{answer['windows']} window{'' if answer['windows'] == 1 else 's'}"
+    count = len(answer["windows"])
+    windows = f"{count} window{'' if count == 1 else 's'}"
     say(options, f"{answer['activity']} ({shown}; {windows})")
     for warning in answer["warnings"]:
         print(f"rtradar: warning: {warning}", file=sys.stderr)

@@ -120,6 +120,28 @@ def window(text: str) -> str | tuple[str, float]:
     return (name, number(value)) if colon else name
 
 
+def words(text: str) -> list[str]:
+    """Read names, such as stand,sit."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+words.__name__ = "list of names, such as stand,sit"
+
+
+def classes(text: str) -> dict[str, list[str]]:
+    """Read classes, each with the actors that show it."""
+    found = {}
+    for part in words(text):
+        name, _, actors = part.partition("=")
+        if not name or name in found:
+            raise ValueError
+        found[name] = [actor for actor in actors.split("+") if actor] or [name]
+    return found
+
+
+classes.__name__ = "list of classes, such as walk,punch=punch+boxing"
+
+
 def place_at(text: str) -> dict[str, Any]:
     """Read where a person is, x and y [m], and the heading [degree] if there is one."""
     x, y, *heading = (number(part) for part in text.split(","))

@@ -342,6 +342,31 @@ class Collection:
         """
         return read_sample(self.paths[index], "spatial")
 
+    def whole_cloud(self, index: int) -> NDArray[np.float64]:
+        """Read the spatial cloud of a data set with ``whole_clouds``, as a radar's board lists it.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (m, 5) float64
+            Time of the frame [s], world coordinates x, y and z [m] and velocity [m/s].
+
+        Raises
+        ------
+        InputError
+            If its file is damaged, or holds no times and velocities.
+        """
+        if not self.provenance[index].get("whole_clouds"):
+            raise InputError(
+                f"collection {self._name} has no whole clouds; build it with whole_clouds = true"
+            )
+        names = ("spatial_time", "spatial", "spatial_velocity")
+        return np.column_stack([read_sample(self.paths[index], name) for name in names])
+
     def spatial_source(self, index: int) -> NDArray[np.int64] | None:
         """Read who returned each point of the spatial cloud.
 

@@ -1,13 +1,14 @@
-"""Recognition of activities with weights that come with the package; NumPy alone runs them.
+"""Recognition of activities by weights that have learnt from simulated people; NumPy alone runs it.
 
-They have learnt from synthetic actors only (``validation/measurements/shipped_weights.py``). What a
-person does in a run is recognised in windows of its cloud, and averaged.
+Weights that come with the package know the RDT clouds of runs
+(``validation/measurements/shipped_weights.py``); ``rtradar recogniser build`` makes those that know
+what the board of one's own radar lists.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,94 +16,179 @@ import numpy as np
 
 from rtradar.description import made_from
 from rtradar.errors import InputError
-from rtradar.recognition.recogniser import EDGE_S, OTHER, WEIGHTS, WINDOW_S, Recogniser, cut_windows
+from rtradar.recognition.board_files import COLUMNS, beside_cells, read_points
+from rtradar.recognition.points import Grid, Points, step_of
+from rtradar.recognition.recogniser import (
+    EDGE_S,
+    NOBODY,
+    UNKNOWN,
+    WEIGHTS,
+    WINDOW_S,
+    Array,
+    Recogniser,
+    cut_windows,
+    starts_of,
+)
 from rtradar.system.checks import is_real, printable
 from rtradar.system.files import read_arrays, read_json
 
-__all__ = ["Recogniser", "predict_run"]
-
+__all__ = ["COLUMNS", "NOBODY", "UNKNOWN", "Grid", "Points", "Recogniser", "predict", "read_points"]
 
 _TOLERANCE = 0.2  # relative difference of a radar's resolution that is not worth a warning
 _FEW_POINTS, _UNSURE = 64, 0.5
+_BESIDE = 0.2  # fraction of the velocities that may lie between the cells
 _NEEDED = "name a folder that 'rtradar run --out DIR' or 'rtradar process' made"
 
 
-def predict_run(folder: Path) -> dict[str, Any]:
-    """Say which activity the RDT cloud of a run shows.
+def predict(place: Path, weights: Path | None = None) -> dict[str, Any]:
+    """Say which activity the cloud of a run shows, or the points that a board has listed.
 
     Parameters
     ----------
-    folder : path
-        Folder of a run, of which ``cloud_rdt.npz`` and ``summary.json`` are read.
+    place : path
+        Folder of a run, of which ``summary.json`` is read and ``cloud_rdt.npz``, or, for weights of
+        points, ``cloud_xyz.npz``; or a file of points, see `read_points`.
+    weights : path, optional
+        Weights that ``rtradar recogniser build`` has made; by default those of the package, which
+        know RDT clouds.
 
     Returns
     -------
     dict
-        Plain JSON values: ``activity``, ``probabilities`` by activity, the means over all windows
-        if it is one of those, ``windows`` (their number), ``warnings``, a list of sentences, and
-        ``made_from``: the files of the run and the weights with their digests, and versions.
+        Plain JSON values: ``activity``, ``probabilities`` by class, the means over all windows,
+        ``windows``, for each its ``start_s``, ``probabilities`` and ``activity``, ``warnings``, a
+        list of sentences, and ``made_from``: the files and the weights with their digests, and
+        versions. Beside the activities there are the class `UNKNOWN` and, of points, `NOBODY`.
+        ``reading`` says which axis of a file of points is ahead.
 
     Raises
     ------
     InputError
-        If the folder holds no run, a file is damaged, or the cloud is empty.
+        If the folder holds no run, a file is damaged, a cloud is empty, or the weights are not for
+        what is given.
     """
-    points, summary = _read(folder)
-    recogniser = Recogniser.shipped()
-    windows = cut_windows(points, summary["capture_s"])
-    mean = recogniser.probabilities(windows).mean(axis=0)
-    chances = dict(zip(recogniser.classes, mean.tolist(), strict=True))
-    none_of_them = chances.pop(OTHER)
-    chances = {name: chance / (1 - none_of_them) for name, chance in chances.items()}
-    warnings = [*_of_radar(summary, recogniser.card), *_of_scene(summary, recogniser.card)]
-    if summary["capture_s"] < WINDOW_S + 2 * EDGE_S - 1e-6:
-        warnings.append(
-            f"the capture has {summary['capture_s']:.2f} s, "
-            f"less than the {WINDOW_S + 2 * EDGE_S:.1f} s of those that were learnt from"
+    recogniser = Recogniser.shipped() if weights is None else Recogniser.load(weights)
+    grid, folder = recogniser.grid, place.is_dir()
+    if grid is None and not folder and place.exists():
+        raise InputError(
+            f"'{place}': these weights know RDT clouds of runs; give a folder of one, or weights "
+            "for your board (--weights, made by rtradar recogniser build)"
         )
-    if (few := float(np.median([len(window) for window in windows]))) < _FEW_POINTS:
-        warnings.append(
-            f"windows have {few:.0f} points, fewer than {_FEW_POINTS}; "
-            "give shorter intervals (rtradar run --duration)"
-        )
+    # Windows of the cloud, and what is not as it was when the weights were made.
+    windows: Sequence[Array | Points]
+    files, warnings, reading = [place], list[str](), {}
+    if grid is None:
+        points, summary = _read(place, "cloud_rdt.npz")
+        windows = cut_windows(points, summary["capture_s"])
+        starts = starts_of(summary["capture_s"]).tolist()
+        warnings += _of_rdt(summary, windows)
+    else:
+        summary = None
+        if folder:
+            table, summary = _read(place, "cloud_xyz.npz")
+            table, step_s = _in_axes(table, summary)
+            own = Points.on_grid(table, grid, summary["capture_s"], step_s)
+        else:
+            table, said = read_points(place, grid)
+            own = Points.on_grid(table, grid)
+            reading = {"reading": said}
+            warnings += _of_table(table, grid)
+        starts, windows = (list(part) for part in zip(*own.windows(grid), strict=True))
+        if own.frames < grid.frames:
+            warnings.append(f"it is shorter than the {grid.window_s:g} s of a window")
+    if folder:
+        files = [place / ("cloud_rdt.npz" if grid is None else "cloud_xyz.npz"), place / "run.toml"]
+    if summary is not None:
+        warnings += [*_of_radar(summary, recogniser.card), *_of_scene(summary, recogniser.card)]
     if (distance := recogniser.distance(windows)) > 1:
         warnings.append(
             f"the motion is unlike any that was learnt from ({distance:.1f} times the distance "
             "within which 199 of 200 lie)"
         )
-    if none_of_them > _UNSURE:
-        warnings.append(
-            f"it is probably none of {', '.join(chances)} (probability {none_of_them:.2f}), but "
-            "something else that a person does"
-        )
-    if max(chances.values()) < _UNSURE:
+    # The answers of all windows, and their mean.
+    chances = recogniser.probabilities(windows)
+    listed = [
+        {"start_s": round(start, 6)} | _answer(recogniser.classes, own)
+        for start, own in zip(starts, chances, strict=True)
+    ]
+    answer = _answer(recogniser.classes, chances.mean(axis=0))
+    if max(answer["probabilities"].values()) < _UNSURE:
         warnings.append(f"no activity has a probability of {_UNSURE:g}")
+    made = made_from(*files, WEIGHTS if weights is None else weights)
+    return answer | {"windows": listed, "warnings": warnings, "made_from": made} | reading
+
+
+def _answer(names: Sequence[str], chances: Array) -> dict[str, Any]:
     return {
-        "activity": max(chances, key=lambda name: chances[name]),
-        "probabilities": chances,
-        "windows": len(windows),
-        "warnings": warnings,
-        "made_from": made_from(folder / "cloud_rdt.npz", folder / "run.toml", WEIGHTS),
+        "activity": names[int(chances.argmax())],
+        "probabilities": dict(zip(names, chances.tolist(), strict=True)),
     }
 
 
-def _read(folder: Path) -> tuple[np.ndarray[Any, np.dtype[np.float64]], dict[str, Any]]:
-    """Read the cloud and the summary of a run, checked as far as they are used."""
+def _read(folder: Path, name: str) -> tuple[Array, dict[str, Any]]:
+    """Read a cloud and the summary of a run, checked as far as they are used.
+
+    Of ``cloud_xyz.npz`` these are columns of time, places and velocity.
+    """
     try:
         summary = read_json(folder / "summary.json")
-        points = np.asarray(read_arrays(folder / "cloud_rdt.npz")["points"], dtype=np.float64)
+        arrays = read_arrays(folder / name)
+        points = np.asarray(arrays["points"], dtype=np.float64)
         known = isinstance(summary["parameters"], dict) and is_real(summary["capture_s"])
-        cloud = points.ndim == 2 and points.shape[1] == 3 and np.isfinite(points).all()
-        if not known or not cloud or not 0 < summary["capture_s"] < 1e6:
+        cloud = points.ndim == 2 and points.shape[1] == 3
+        if name == "cloud_xyz.npz" and cloud:
+            points = np.column_stack([arrays["time"], np.nan_to_num(points), arrays["velocity"]])
+        if not (known and cloud and np.isfinite(points).all() and 0 < summary["capture_s"] < 1e6):
             raise ValueError
     except OSError as error:
         name = Path(error.filename or folder).name
         raise InputError(f"'{folder}' holds no run ({name}: {error.strerror}); {_NEEDED}") from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"a file of '{folder}' is damaged; make the run anew") from None
-    if not len(points):
+    if not len(points) and name == "cloud_rdt.npz":
         raise InputError(f"the cloud of '{folder}' is empty; make the run with a higher SNR")
     return points, summary
+
+
+def _in_axes(table: Array, summary: Mapping[str, Any]) -> tuple[Array, float]:
+    """Turn places in the world into those in the axes of the radar; also its step of frames [s]."""
+    from rtradar.radar import Radar
+
+    try:
+        radar = Radar(**{"name": "?", **summary["parameters"]["radar"]})
+    except (InputError, KeyError, TypeError):
+        raise InputError(
+            "the summary does not say where the radar was; make the run anew"
+        ) from None
+    places = (table[:, 1:4] - radar.position_m) @ radar.axes
+    return np.column_stack([table[:, 0], places, table[:, 4]]), radar.frame_hop_s
+
+
+def _of_rdt(summary: Mapping[str, Any], windows: Sequence[Array]) -> Iterator[str]:
+    """Warn of a short capture and of few points."""
+    if summary["capture_s"] < WINDOW_S + 2 * EDGE_S - 1e-6:
+        yield (
+            f"the capture has {summary['capture_s']:.2f} s, "
+            f"less than the {WINDOW_S + 2 * EDGE_S:.1f} s of those that were learnt from"
+        )
+    if (few := float(np.median([len(window) for window in windows]))) < _FEW_POINTS:
+        yield (
+            f"windows have {few:.0f} points, fewer than {_FEW_POINTS}; "
+            "give shorter intervals (rtradar run --duration)"
+        )
+
+
+def _of_table(table: Array, grid: Grid) -> Iterator[str]:
+    """Warn of frames and cells of another radar."""
+    step_s = step_of(table[:, 0], grid)
+    every = max(1, round(grid.frame_s / step_s))
+    if abs(math.log(step_s * every / grid.frame_s)) > math.log1p(_TOLERANCE):
+        yield f"frames follow each other by {step_s:.3g} s, not by {grid.frame_s:.3g}"
+    if (beside := beside_cells(table, grid)) > _BESIDE:
+        yield (
+            f"{beside:.0%} of the velocities lie between the cells of {grid.velocity_bin_mps:.3g} "
+            "m/s: another profile of the radar"
+        )
 
 
 def _of_radar(summary: Mapping[str, Any], card: Mapping[str, Any]) -> Iterator[str]:
@@ -148,11 +234,11 @@ def _of_scene(summary: Mapping[str, Any], card: Mapping[str, Any]) -> Iterator[s
     scene = parameters.get("scene")
     if scene is None:
         yield "measured samples: the weights have learnt from simulated ones only"
-    elif scene != "free-space":
+    elif scene != "free-space" and "grid" not in card:
         yield f"scene '{printable(str(scene))}': the weights have learnt in free space"
     people = summary.get("people")
     if isinstance(people, list) and len(people) > 1:
         yield f"{len(people)} people: the weights have learnt from one alone"
-    snr_db, (least, most) = parameters.get("snr_db"), card["snr_db"]
+    snr_db, (least, most) = parameters.get("snr_db"), card.get("snr_db", (-math.inf, math.inf))
     if isinstance(snr_db, float | int) and not least - 3 <= snr_db <= most + 10:
         yield f"SNR {snr_db:g} dB: the weights have learnt from {least:g} to {most:g} dB"

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.recognition.points import Grid, Points, describe_points
 from rtradar.system.files import atomic_file, read_arrays
 
 Array = NDArray[np.float64]
@@ -69,12 +71,16 @@ def cut_windows(points: Array, length_s: float) -> list[Array]:
 
     A shorter capture is one window. Windows may be empty.
     """
+    times = points[:, 0]
+    return [points[(times >= start) & (times < start + WINDOW_S)] for start in starts_of(length_s)]
+
+
+def starts_of(length_s: float) -> Array:
+    """Return when each window of a capture of this length begins (window,) [s]."""
     first, last = EDGE_S, max(length_s - EDGE_S, EDGE_S)
     rest = max(last - first - WINDOW_S, 0.0)
     count = 1 + math.ceil(rest / HOP_S - 1e-6)
-    starts = first + (rest * np.arange(count) / (count - 1) if count > 1 else np.zeros(1))
-    times = points[:, 0]
-    return [points[(times >= start) & (times < start + WINDOW_S)] for start in starts]
+    return first + (rest * np.arange(count) / (count - 1) if count > 1 else np.zeros(1))
 
 
 def describe(points: Array) -> Array:
@@ -205,8 +211,8 @@ def _correlation(one: Array, other: Array) -> float:
 WEIGHTS = Path(__file__).with_name("weights.npz")
 """Weights that come with the package."""
 
-OTHER = "other"
-"""Class of what is none of the activities."""
+UNKNOWN, NOBODY = "unknown", "nobody"
+"""Classes of what is none of the activities, and of a window that shows no person."""
 
 LEAST_POINTS = 24
 """Number of points of a window below which it says nothing."""
@@ -231,10 +237,11 @@ class Recogniser:
         Arrays ``roots (tree,)``; ``feature``, ``threshold``, ``below`` and ``above (node,)``, of
         which the first is -1 in a leaf; ``chances (node, class)``.
     card : dict
-        ``classes``, the activities and `OTHER`, ``temperature`` by which the logarithms of
-        probabilities are divided, ``radar`` (`range_bin_m`, `velocity_bin_mps`,
-        `max_velocity_mps`), ``snr_db`` (least, most), ``usual`` (``mean``, ``inverse_covariance``,
-        ``most`` distance of outlines), and texts.
+        ``classes``, the activities, `UNKNOWN` and perhaps `NOBODY`; ``temperature`` by which the
+        logarithms of probabilities are divided; ``radar`` (``range_bin_m``, ``velocity_bin_mps``,
+        ``max_velocity_mps``, frames); ``usual`` (``mean``, ``inverse_covariance``, ``most``
+        distance of the first numbers); ``grid``, the fields of a `Grid`, where it knows the points
+        of a board instead of RDT clouds; and texts.
     """
 
     forest: dict[str, NDArray[Any]]
@@ -273,22 +280,37 @@ class Recogniser:
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """Names of the activities, and `OTHER`."""
+        """Names of the activities, and `UNKNOWN` and `NOBODY`."""
         return tuple(self.card["classes"])
 
-    def probabilities(self, windows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    @property
+    def grid(self) -> Grid | None:
+        """Cells and windows of the points of a board; None where RDT clouds are recognised."""
+        return Grid(**self.card["grid"]) if "grid" in self.card else None
+
+    def probabilities(self, windows: Sequence[Array | Points]) -> NDArray[np.float64]:
         """Return the probability of each class for each window of a cloud, (window, class).
 
-        A window of fewer than `LEAST_POINTS` points gives all classes the same.
+        A window of too few points shows nobody; where that is no class, all have the same.
         """
-        found = np.full((len(windows), len(self.classes)), 1 / len(self.classes))
+        nobody = [name == NOBODY for name in self.classes]
+        nothing = np.array(nobody, dtype=np.float64) if any(nobody) else 1 / len(nobody)
+        found = np.zeros((len(windows), len(nobody)))
         for place, window in enumerate(windows):
-            if len(window) >= LEAST_POINTS:
-                chances = self.of_description(describe(window))
-                logits = np.log(np.maximum(chances, 1e-3)) / self.card["temperature"]
-                scaled = np.exp(logits - logits.max())
-                found[place] = scaled / scaled.sum()
+            numbers = self.describe(window)
+            if numbers is None:
+                found[place] = nothing
+                continue
+            logits = np.log(np.maximum(self.of_description(numbers), 1e-3))
+            scaled = np.exp((logits - logits.max()) / self.card["temperature"])
+            found[place] = scaled / scaled.sum()
         return found
+
+    def describe(self, window: Array | Points) -> Array | None:
+        """Describe a window of what is recognised; None where it has too few points."""
+        if isinstance(window, Points):
+            return describe_points(window)
+        return describe(window) if len(window) >= LEAST_POINTS else None
 
     def of_description(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the mean probability (class,) of all trees for what `describe` gives."""
@@ -300,15 +322,16 @@ class Recogniser:
             nodes = np.where(inner, following, nodes)
         return np.asarray(self.forest["chances"][nodes].astype(np.float64).mean(axis=0))
 
-    def distance(self, windows: list[NDArray[np.float64]]) -> float:
+    def distance(self, windows: Sequence[Array | Points]) -> float:
         """Return how unusual the windows are: 1 for one of 200 of those that were learnt from.
 
-        It is the median Mahalanobis distance of their outlines, relative to that limit.
+        It is the median Mahalanobis distance of their first numbers (of an RDT cloud the outline),
+        relative to that limit; NaN where no window has enough points.
         """
         usual = self.card["usual"]
-        found = [outline(window) for window in windows if len(window) >= LEAST_POINTS]
+        found = [numbers for own in windows if (numbers := self.describe(own)) is not None]
         if not found:
-            return np.inf
-        away = np.array(found) - usual["mean"]
+            return math.nan
+        away = np.array(found)[:, : len(usual["mean"])] - usual["mean"]
         squares = np.einsum("wi,ij,wj->w", away, usual["inverse_covariance"], away)
         return float(np.median(np.sqrt(squares)) / usual["most"])

@@ -14,6 +14,8 @@ import rtradar as rt
 from rtradar.campaign.intervals import Augmented, mirrored, vary
 from rtradar.campaign.samples import SamplePlan, counts, make_sample, plan_samples, scene_digest
 from rtradar.campaign.spec_file import read_spec
+from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import write_index, write_sample
 from rtradar.errors import InputError
 from rtradar.motion import synthetic_motion
 from rtradar.motion.skeleton import NODES
@@ -459,3 +461,70 @@ def test_real_recordings_are_of_all_activities(
     told = counts(plan_samples(read_spec(validation_folder() / "real_recordings.toml")))
     assert tuple(told["label"]) == FOUR
     assert told["source"] == {"recorded": 92}
+
+
+MOUNT = """
+[each]
+radar = ["iwr1443"]
+fidelity = ["analytic"]
+snr_db = ["physical"]
+[drawn]
+radar_up_m = [0.1, 0.3]
+radar_pitch_deg = [-20.0, -10.0]
+noise_db = [5.0, 10.0]
+"""
+
+
+def test_where_a_radar_is_put_up_and_its_noise_are_drawn(tmp_path: Path) -> None:
+    found = planned(tmp_path, "[windows]\nduration_s = 0.1\n" + MOUNT + actors(4, "stand"))
+    board = rt.Radar.preset("iwr1443")
+    usual = rt.Scene.load("free-space").radar_place(board)
+    radars = [plan.radar for plan in found]
+    for radar, plan in zip(radars, found, strict=True):
+        assert radar.position_m[:2] == usual[:2]
+        assert 0.1 <= radar.position_m[2] - usual[2] <= 0.3001
+        assert -20 <= radar.pitch_deg <= -10
+        assert 5 <= (radar.noise_figure_db or 0) - (board.noise_figure_db or 0) <= 10
+        assert plan.parameters["radar_position_m"] == list(radar.position_m)
+        assert plan.parameters["snr_db"] == "physical"
+    assert len({radar.pitch_deg for radar in radars}) == 4
+
+
+def test_actors_may_have_a_style_and_ranges_of_their_own(tmp_path: Path) -> None:
+    own = 'style = "hop"\ndrawn = { offset_x_m = [2.0, 3.0] }\n'
+    found = planned(tmp_path, HEAD + actors(2, "jump") + actors(2, "jump") + own)
+    hops = [plan for plan in found if plan.parameters.get("style") == "hop"]
+    others = [plan for plan in found if "style" not in plan.parameters]
+    assert (len(hops), len(others)) == (2, 2)
+    assert all(2 <= plan.parameters["person_position_m"][0] <= 3 for plan in hops)
+    assert all(abs(plan.parameters["person_position_m"][0]) <= 0.5 for plan in others)
+    # What was planned before there were styles keeps its identity.
+    before = planned(tmp_path, HEAD + actors(2, "jump"))
+    assert [plan.identity for plan in before] == [plan.identity for plan in others]
+    for text, words in (
+        ('style = "crawl"\n', "style = 'crawl'; allowed for jump: high, hop"),
+        ("drawn = { tempi = [1, 2] }\n", "drawn: unknown key 'tempi'"),
+    ):
+        with pytest.raises(InputError, match=words):
+            planned(tmp_path, HEAD + actors(2, "jump") + text)
+
+
+def test_whole_clouds_have_the_time_and_the_velocity_of_each_point(tmp_path: Path) -> None:
+    text = "whole_clouds = true\n" + HEAD + '[each]\nfidelity = ["analytic"]\n' + actors(1, "kick")
+    (plan,) = planned(tmp_path, text)
+    made = make_sample(plan.packed())
+    write_sample(tmp_path, plan.identity, made.sample, made.spatial, made.maps)
+    write_index(tmp_path, [plan.identity])
+    found = Collection(tmp_path).whole_cloud(0)
+    assert found.shape == (made.sample.provenance["xyz_points_found"], 5)
+    assert (np.diff(found[:, 0]) >= 0).all()
+    np.testing.assert_array_equal(found[:, 1:4], made.spatial)
+    assert np.abs(found[:, 4]).max() > 2  # a foot
+    with pytest.raises(InputError, match="whole_clouds = true needs spatial clouds"):
+        planned(tmp_path, "angles = false\n" + text)
+    (plain,) = planned(tmp_path, text.replace("whole_clouds = true\n", ""))
+    made = make_sample(plain.packed())
+    write_sample(tmp_path, plain.identity, made.sample, made.spatial, made.maps)
+    write_index(tmp_path, [plain.identity])
+    with pytest.raises(InputError, match="has no whole clouds"):
+        Collection(tmp_path).whole_cloud(0)

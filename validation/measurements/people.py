@@ -35,7 +35,7 @@ from rtradar.classify.study import classes_of
 from rtradar.classify.training import Examples, predict, train_network
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import Recogniser
-from rtradar.recognition.recogniser import OTHER, cut_windows, describe
+from rtradar.recognition.recogniser import UNKNOWN, cut_windows, describe
 
 
 class Merged(Collection):
@@ -362,9 +362,9 @@ def others(out: Path) -> None:
     """
     recogniser, found = Recogniser.shipped(), dict[tuple[str, str], list[tuple[int, bool, bool]]]()
     clouds = Collection(*recordings(out).folders, *recordings(out, "_others").folders)
-    windows, place = windows_of(clouds), recogniser.classes.index(OTHER)
+    windows, place = windows_of(clouds), recogniser.classes.index(UNKNOWN)
     chances = recogniser.probabilities(windows)
-    names = [name for name in recogniser.classes if name != OTHER]
+    names = [name for name in recogniser.classes if name != UNKNOWN]
     answers = np.delete(chances, place, axis=1).argmax(axis=1).tolist()
     other = chances[:, place] > 0.5
     sources = [str(name).split("_")[0] for name in clouds.column("subject")]

@@ -330,7 +330,9 @@ def _returns(
         *furniture_returns(mi, radar, scene),
         *rough_returns(radar, scene, occluders),
     )
-    return tuple((ClutterItem.of(echoes, radar), echoes) for echoes in found)
+    # What lies outside of every antenna's pattern, or behind all else, returns nothing.
+    some = (echoes for echoes in found if echoes.n_echoes)
+    return tuple((ClutterItem.of(echoes, radar), echoes) for echoes in some)
 
 
 class Clutter:
