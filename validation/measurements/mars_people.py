@@ -106,6 +106,20 @@ class Comparison:
         return cls(person, ours, points.of(np.isin(points.frame, ours.seen)))
 
     @property
+    def halves(self) -> tuple[Comparison, Comparison]:
+        """The frames of the first half of each take, and those of the second."""
+        person = self.person
+        lengths = np.diff(person.starts)
+        middle = np.repeat(person.starts[:-1] + lengths // 2, lengths)
+        early = self.ours.seen < middle[self.ours.seen]
+        first, second = (self._of(self.ours.seen[own]) for own in (early, ~early))
+        return first, second
+
+    def _of(self, seen: Ints) -> Comparison:
+        ours, theirs = (points.of(np.isin(points.frame, seen)) for points in self.both)
+        return Comparison(self.person, Prediction(ours, seen), theirs)
+
+    @property
     def both(self) -> tuple[Points, Points]:
         return self.ours.points, self.theirs
 
