@@ -28,13 +28,17 @@ MAX_SNR_DB = 200.0
 
 @dataclass(frozen=True)
 class Breathing:
-    """Breathing of a person: the chest moves forward and back as a sine of time.
+    """Breathing of a person, and heartbeat: the chest moves forward and back as sines of time.
 
     The front of the chest moves by ``amplitude_mm * sin(2 pi rate_hz t + phase)``, with t from the
-    start of the interval that is simulated. In quiet breathing the chest walls of adults move by 4
+    start of the interval that is simulated, and by that of the heart, which begins at phase 0. In
+    quiet breathing the chest walls of adults move by 4
     to 12 mm from end to end (A. De Groote et al., Chest wall motion during tidal breathing, J.
     Appl. Physiol. 83 (1997) 1531-1537), an amplitude of 2 to 6 mm, and less under clothes or in
-    shallow breath, 12 to 20 times a minute at rest, 0.2 to 0.33 Hz, and faster after exercise.
+    shallow breath, 12 to 20 times a minute at rest, 0.2 to 0.33 Hz, and faster after exercise. The
+    heart moves the skin of the chest by 0.2 to 0.5 mm from end to end, 50 to 90 times a minute at
+    rest (G. Ramachandran and M. Singh, Three-dimensional reconstruction of cardiac displacement
+    patterns on the chest wall, Med. Biol. Eng. Comput. 27 (1989) 525-530).
 
     Parameters
     ----------
@@ -44,6 +48,10 @@ class Breathing:
         Breaths per second [Hz], 0 to 5.
     phase_deg : float
         Phase at the start, -360 to 360 [degree]; at 0 the person begins to breathe in.
+    heart_mm : float
+        Amplitude of the heartbeat [mm], 0 to 10; 0 is none.
+    heart_hz : float
+        Heartbeats per second [Hz], 0 to 5.
 
     Raises
     ------
@@ -54,16 +62,19 @@ class Breathing:
     amplitude_mm: Annotated[float, Limits(0, 50)]
     rate_hz: Annotated[float, Limits(0, 5)]
     phase_deg: Angle = 0.0
+    heart_mm: Annotated[float, Limits(0, 10)] = 0.0
+    heart_hz: Annotated[float, Limits(0, 5)] = 1.2
 
     def __post_init__(self) -> None:
         check_fields(self, "breathing: ")
 
 
-class _Seed(TypedDict, total=False):
+class _OfBoth(TypedDict, total=False):
     seed: int
+    slow_time: str
 
 
-class SimulationOptions(_Seed, total=False):
+class SimulationOptions(_OfBoth, total=False):
     """The options that `simulate` takes by name; `RunSettings` documents them."""
 
     fidelity: str
@@ -82,7 +93,7 @@ class SimulationOptions(_Seed, total=False):
     noise_power_m2: float | None
 
 
-class ProcessingOptions(_Seed, total=False):
+class ProcessingOptions(_OfBoth, total=False):
     """The options that `process_samples` takes by name; `RunSettings` documents them."""
 
     pfa: float
@@ -185,6 +196,7 @@ class RunSettings:
     doppler_window: _Window = "hann"
     spectrogram_window_s: Annotated[float | None, _SECONDS] = None
     spectrogram_overlap: Annotated[float, Limits(0, 0.999)] = 0.95
+    slow_time: Annotated[str, Limits(allowed=("frame", "capture"))] = "frame"
     noise_power_m2: Annotated[float | None, _POWER] = None
 
     def __post_init__(self) -> None:

@@ -347,9 +347,11 @@ def _breath(breathing: Breathing, positions: _Array, frames: _Array, times: Arra
     left = positions[:, NODES.index("l_shoulder")] - positions[:, NODES.index("r_shoulder")]
     ahead = np.cross(left[:, None], frames[:, _CHEST][..., 2])
     ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
-    turned = 2 * np.pi * breathing.rate_hz * np.asarray(times, np.float64)
-    breath = np.sin(turned + np.radians(breathing.phase_deg))
-    return np.asarray(1e-3 * breathing.amplitude_mm * breath[:, None, None] * ahead)
+    turned = 2 * np.pi * np.asarray(times, np.float64)
+    breath = np.sin(breathing.rate_hz * turned + np.radians(breathing.phase_deg))
+    heart = np.sin(breathing.heart_hz * turned)
+    moved_mm = breathing.amplitude_mm * breath + breathing.heart_mm * heart
+    return np.asarray(1e-3 * moved_mm[:, None, None] * ahead)
 
 
 # -- meshes ----------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +26,7 @@ from rtradar.description import MOST_FILES, path_from, plain, versions
 from rtradar.errors import InputError
 from rtradar.motion.synthetic import STYLES
 from rtradar.radar import Radar
+from rtradar.radar.array import UsualPlace
 from rtradar.recognition import NOBODY, UNKNOWN, Grid, Points, Recogniser
 from rtradar.recognition.points import describe_points, without_person
 from rtradar.recognition.recogniser import OUTLINE
@@ -49,18 +51,21 @@ _DRAWN = {
     "offset_x_m": [-1.2, -0.2],
     "offset_y_m": [-0.3, 0.3],
     "height_m": [1.55, 1.95],
+    "amplitude": [0.5, 1.1],
     "radar_up_m": [-0.25, 0.25],
     "radar_pitch_deg": [-5.0, 12.0],
     "noise_db": [8.0, 28.0],
 }
-"""What is drawn for each window: people 1.5 to 3 m before the radar and turned to it. Its noise is
-higher than its figure says, by what a chip loses to its own leakage, its quantisation and what
-stands before its antennas."""
+"""What is drawn for each window: people 1.5 to 3 m before the radar and turned to it, some of whom
+move little. Its noise is higher than its figure says, by what a chip loses to its own leakage, its
+quantisation and what stands before its antennas."""
 
 _FARTHER = {"offset_x_m": [-0.3, 0.5], "heading_deg": [-180.0, 180.0]}
 _SUBJECTS, _FOLDS, _USUAL, _RIDGE = 200, 5, 0.995, 1e-2
 _OF_POINTS = {"n_estimators": 500, "min_samples_leaf": 3, "max_features": 0.3}
 _OF_CLOUDS = {"n_estimators": 300, "min_samples_leaf": 2}
+_NUMBER = re.compile(r"-?\d[\d.]*")
+_LIMITS = 5  # warnings that are shown, of those of the most samples
 _LONGER_S = 6.0  # than a window is a take, in which the window lies anywhere
 
 
@@ -150,6 +155,7 @@ def build_recogniser(
         "unknown": list(unknown),
         "samples": dict(Counter(samples.column("source").tolist())),
         "scene": scene or "rooms at random",
+        "limits": dict(_limits(samples)),
         "seed": seed,
         "versions": versions(),
     }
@@ -220,7 +226,11 @@ def _common(
     board = radar.multiplexing in ("tdm", "bpm") and watts
     radar = dataclasses.replace(radar, frame_period_s=grid.frame_s) if board else radar
     length_s = round(grid.frames * grid.frame_s + radar.frame_duration_s, 6)
-    each: dict[str, Any] = {"radar": [plain(radar)], "fidelity": ["analytic"]}
+    # Without a place of its own the radar stands where the scene has it.
+    given = plain(radar)
+    if isinstance(radar.position_m, UsualPlace):
+        del given["position_m"]
+    each: dict[str, Any] = {"radar": [given], "fidelity": ["analytic"]}
     drawn: dict[str, Any] = dict(_DRAWN)
     if watts:
         each["snr_db"] = ["physical"]
@@ -438,6 +448,12 @@ def best_temperature(probabilities: Array, truth: NDArray[np.int64]) -> float:
     return float(np.exp(minimize_scalar(loss, bounds=(-3.0, 3.0), method="bounded").x))
 
 
+def _limits(samples: Collection) -> Counter[str]:
+    """Count the samples of each warning, whatever its numbers are."""
+    texts = (row.get("limits", []) for row in samples.provenance)
+    return Counter(one for own in texts for one in {_NUMBER.sub("...", text) for text in own})
+
+
 def card_in_words(made: Recogniser) -> str:
     """Describe weights of points in a few lines of text."""
     return "\n".join(_lines(made.card))
@@ -450,4 +466,6 @@ def _lines(card: Mapping[str, Any]) -> Iterator[str]:
     counted = ", ".join(f"{count} {name}" for name, count in card["samples"].items())
     yield f"learnt from {sum(card['windows'].values())} windows of {card['people']} people"
     yield f"samples: {counted}, in {card['scene']}; no recording of a radar"
+    for text, count in sorted(card["limits"].items(), key=lambda one: -one[1])[:_LIMITS]:
+        yield f"warned of in {count} of {sum(card['samples'].values())} samples: {text}"
     yield f"actors: {json.dumps(card['actors'])}; {UNKNOWN}: {', '.join(card['unknown'])}"

@@ -58,7 +58,7 @@ _LATER_FIELDS = (
     "multiplexing", "carrier_step_hz", "doppler_bands", "transmit_power_dbm", "noise_figure_db",
     "noise_temperature_k", "tx_antenna", "rx_antenna", "idle_s", "adc_start_s", "adc_rate_hz",
     "tx_positions_m", "rx_positions_m", "tx_order", "yaw_deg", "pitch_deg", "roll_deg",
-    "frame_period_s", "path_times_s",
+    "frame_period_s", "cycle_period_s", "path_times_s",
     "path_m", "path_angles_deg", "receiver", "chip",
 )  # fmt: skip
 """Radar fields added later, left out at their defaults, so that ids of older samples stay."""

@@ -28,7 +28,7 @@ def recogniser_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]
         seed=options.seed,
         workers=options.workers,
     )
-    yield made.card
+    yield {key: value for key, value in made.card.items() if key != "usual"}
     say(options, f"{card_in_words(made)}\n\nsee {options.out}")
 
 

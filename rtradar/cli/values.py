@@ -163,17 +163,22 @@ place_in_space.__name__ = "place X,Y,Z [m]"
 
 
 def breathing(text: str) -> Breathing:
-    """Read the amplitude [mm] and the rate [Hz] of a person's breath."""
+    """Read the amplitude [mm] and the rate [Hz] of a person's breath, and perhaps of the heart."""
     from rtradar.settings import Breathing
 
-    amplitude_mm, rate_hz = (number(part) for part in text.split(","))
+    amplitude_mm, rate_hz, *heart = (number(part) for part in text.split(","))
+    if len(heart) not in (0, 2):
+        raise ValueError
+    of_heart = dict(zip(("heart_mm", "heart_hz"), heart, strict=False))
     try:
-        return Breathing(amplitude_mm, rate_hz)
+        return Breathing(amplitude_mm, rate_hz, **of_heart)
     except InputError as wrong:
         raise argparse.ArgumentTypeError(str(wrong)) from None
 
 
-breathing.__name__ = "amplitude [mm] and rate [Hz], such as 3,0.25"
+breathing.__name__ = (
+    "amplitude [mm] and rate [Hz], such as 3,0.25, or with the heart 3,0.25,0.3,1.2"
+)
 
 
 def decibels(text: str) -> float | str:

@@ -75,6 +75,7 @@ def prepare(
     scene, everyone = people_in(scene, moving)
     _refuse_together(radar, scene, settings)
     processing = Processing.of(radar, settings)
+    radar = processing.radar
     # People, objects and the radar at their places in the world.
     with stage_line("preparing"), processing.stages.time("motion"):
         body = body_of_people(everyone, settings)

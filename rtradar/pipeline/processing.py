@@ -112,6 +112,8 @@ class Processing:
     def of(cls, radar: Radar, settings: RunSettings) -> Processing:
         """Build the processing that these settings name; InputError if a name is unknown."""
         window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
+        if settings.slow_time == "capture":
+            radar = radar.over_capture()
         detect = _detect_of(settings, radar, window_functions)
         removal = clutter_removal(settings.clutter_removal, radar)
         return cls(radar, settings, detect, removal, window_functions)
@@ -330,7 +332,7 @@ def bytes_of_maps(radar: Radar, n_chirps: float, *, sources: bool = False) -> fl
     # Frames in the capture, and steps of the range-time map, of which each frame with a gap begins
     # one.
     frames = max(n_chirps / radar.n_tx - radar.cycles_per_frame, 0) / radar.hop_cycles + 1
-    steps = n_chirps * radar.chirp_interval_s / RANGE_TIME_S + radar.in_frames * frames
+    steps = radar.duration_of(int(n_chirps)) / RANGE_TIME_S + radar.in_frames * frames
     power, mask = np.dtype(np.float32).itemsize, np.dtype(np.uint8).itemsize
     if sources:
         mask += np.dtype(np.int16).itemsize

@@ -23,6 +23,7 @@ from rtradar.process.frames import SlidingRangeTime, SlidingWindows, range_time
 from rtradar.process.power_maps import power_map
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
+from rtradar.process.vital_signs import VitalSigns, vital_signs
 from rtradar.process.window_functions import WindowFunctions
 from rtradar.radar.display import measured_angles
 from rtradar.system.registries import DETECTORS
@@ -39,6 +40,7 @@ __all__ = [
     "SlidingSpectrogram",
     "SlidingWindows",
     "Spectrogram",
+    "VitalSigns",
     "WindowFunctions",
     "angle",
     "angle_grid",
@@ -62,5 +64,6 @@ __all__ = [
     "spectrogram",
     "takes_channels",
     "ti_oob",
+    "vital_signs",
     "window_cycles",
 ]

@@ -128,6 +128,9 @@ def _of_frames(r: Radar) -> _Rules:
     yield whole, "chirps", {"step": r.n_tx * r.n_doppler_bands, "also": also}
     fits = r.frame_period_s is None or active_s <= r.frame_period_s * (1 + 1e-12)
     yield fits, "period", {"chirps": chirps, "active_s": active_s}
+    yield r.frame_period_s is None or r.cycle_period_s is None, "one_period", {}
+    fits = r.cycle_active_s <= r.cycle_duration_s * (1 + 1e-12)
+    yield fits, "cycle_period", {"n": r.n_tx}
     samples = chirps * r.n_rx * r.samples_per_chirp
     told = {"samples": samples, "most": _MOST_SAMPLES_PER_FRAME}
     yield samples <= _MOST_SAMPLES_PER_FRAME, "frame", told

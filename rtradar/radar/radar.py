@@ -91,6 +91,9 @@ class Radar(Schedule):
     frame_period_s : float, optional
         Time from the start of a frame to the start of the next [s], where chirps are transmitted in
         frames with a gap between them. By default they go on without a gap.
+    cycle_period_s : float, optional
+        Time from the start of a cycle to the start of the next [s], where a gap follows each. By
+        default there is none. `over_capture` makes it of a ``frame_period_s``.
     chirps_per_frame : int, optional
         Number of chirps in one frame, counted over all Tx, a multiple of their number. By default
         what ``frame_duration_s`` holds.
@@ -173,7 +176,7 @@ class Radar(Schedule):
         if isinstance(self.chirps_per_frame, FollowingCount):
             following["chirps_per_frame"] = FollowingCount(whole)
         elif self.cycles_in_frame_duration * self.n_tx != whole:
-            following["frame_duration_s"] = whole * self.chirp_interval_s
+            following["frame_duration_s"] = self.cycles_per_frame * self.cycle_duration_s
         if self.frame_period_s is not None:
             following["frame_hop_s"] = self.frame_period_s
         for field, value in following.items():

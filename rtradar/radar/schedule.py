@@ -14,6 +14,7 @@ from typing import Annotated, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.errors import InputError
 from rtradar.radar.array import MOST_CHIRPS, Array
 from rtradar.radar.waveform import MOST, positive
 from rtradar.system.fields import Limits
@@ -33,6 +34,7 @@ class Schedule(Array):
     frame_duration_s: Annotated[float, positive()] = 0.1
     frame_hop_s: Annotated[float, positive()] = 0.025
     frame_period_s: Annotated[float | None, positive()] = None
+    cycle_period_s: Annotated[float | None, positive()] = None
     chirps_per_frame: Annotated[int, Limits(1, MOST_CHIRPS)] = None  # type: ignore[assignment]
     multiplexing: Literal["tdm", "fdm", "ddm", "bpm"] = "tdm"
     carrier_step_hz: Annotated[float | None, positive()] = None
@@ -47,6 +49,13 @@ class Schedule(Array):
     def in_frames(self) -> bool:
         """Whether chirps come in frames of their own, with a gap between them."""
         return self.frame_period_s is not None
+
+    @property
+    def burst_chirps(self) -> int | None:
+        """Number of chirps that follow each other without a gap; None if all do."""
+        if self.in_frames:
+            return self.chirps_per_frame
+        return None if self.cycle_period_s is None else self.n_tx
 
     @property
     def at_once(self) -> bool:
@@ -64,7 +73,17 @@ class Schedule(Array):
 
     @property
     def cycle_duration_s(self) -> float:
-        """Time until the Tx transmit as before [s]: n_tx chirps under TDM and BPM, else one."""
+        """Time until the Tx transmit as before [s]: n_tx chirps under TDM and BPM, else one.
+
+        With a ``cycle_period_s`` it is that.
+        """
+        if self.cycle_period_s is not None:
+            return self.cycle_period_s
+        return self.cycle_active_s
+
+    @property
+    def cycle_active_s(self) -> float:
+        """Time that the chirps of a cycle take [s], without a gap behind them."""
         return self.chirp_period_s if self.at_once else self.n_tx * self.chirp_period_s
 
     @property
@@ -138,6 +157,12 @@ class Schedule(Array):
     @property
     def gaps_text(self) -> str:
         """What is known of time where there are gaps between frames; empty where there are none."""
+        if self.cycle_period_s is not None:
+            return (
+                f"one cycle of {1e3 * self.cycle_active_s:.3g} ms every "
+                f"{1e3 * self.cycle_period_s:.3g} ms; velocities beyond "
+                f"{self.max_velocity_mps:.3g} m/s fold back"
+            )
         if self.frame_period_s is None:
             return ""
         active_s = self.cycles_per_frame * self.cycle_duration_s
@@ -244,23 +269,65 @@ class Schedule(Array):
         frame_s, numbers = self._in_frame(np.asarray(chirps, dtype=np.int64))
         if self.at_once:
             numbers = numbers - numbers % self.n_tx
-        return np.asarray(frame_s / self.chirp_interval_s + numbers) if self.in_frames else numbers
+        gaps = self.burst_chirps is not None
+        return np.asarray(frame_s / self.chirp_interval_s + numbers) if gaps else numbers
 
     @cached_property
     def gapless(self) -> Self:
         """The radar without gaps between its frames, whose cycles begin at places of `slots_of`."""
-        if not self.in_frames:
+        if self.burst_chirps is None:
             return self
-        return dataclasses.replace(self, frame_period_s=None)
+        count = int(self.chirps_per_frame)  # whatever a shorter cycle has room for
+        return dataclasses.replace(
+            self, frame_period_s=None, cycle_period_s=None, chirps_per_frame=count
+        )
+
+    def over_capture(self, cycles: int = 128) -> Self:
+        """The radar whose slow time goes on from frame to frame: one cycle in each period.
+
+        Of frames of several cycles the first one counts.
+
+        Parameters
+        ----------
+        cycles : int
+            Number of cycles of a window, in place of those of a frame; windows overlap by three
+            quarters.
+
+        Returns
+        -------
+        Radar
+            With a ``cycle_period_s`` in place of the ``frame_period_s``.
+
+        Raises
+        ------
+        InputError
+            Where the chirps have no gaps.
+        """
+        if self.cycle_period_s is not None:
+            return self
+        if self.frame_period_s is None:
+            raise InputError(
+                "slow_time = capture: the chirps of the radar have no gaps, and their slow time "
+                "goes on as it is; leave it out, or give frame_period_s"
+            )
+        period_s = self.frame_period_s
+        return dataclasses.replace(
+            self,
+            frame_period_s=None,
+            cycle_period_s=period_s,
+            chirps_per_frame=cycles * self.n_tx,
+            frame_hop_s=cycles / 4 * period_s,
+        )
 
     def _in_frame(
         self, numbers: NDArray[np.int64], *, cycles: bool = False
     ) -> tuple[NDArray[np.float64] | float, NDArray[np.int64]]:
         """Start of the frame of each chirp or cycle [s], and its number within it."""
-        if self.frame_period_s is None:
+        if self.burst_chirps is None:
             return 0.0, numbers
-        frame, within = np.divmod(numbers, self.cycles_per_frame * (1 if cycles else self.n_tx))
-        return frame * self.frame_period_s, within
+        per = self.burst_chirps // (self.n_tx if cycles else 1)
+        frame, within = np.divmod(numbers, per)
+        return frame * (self.frame_period_s or self.cycle_duration_s), within
 
     def cycle_times(self, cycles: NDArray[np.integer]) -> NDArray[np.float64]:
         """Give the starts of some cycles.
@@ -311,7 +378,7 @@ class Schedule(Array):
             Time from the start of the first chirp to the end of the last [s].
         """
         if self.frame_period_s is None:
-            return n_chirps * self.chirp_interval_s
+            return n_chirps / self.n_tx * self.cycle_duration_s
         # Up to the end of the last chirp: the gap after the last frame does not count.
         frames, more = divmod(max(n_chirps - 1, 0), self.chirps_per_frame)
         return frames * self.frame_period_s + (more + 1) * self.chirp_interval_s

@@ -188,7 +188,7 @@ def ghosts_within(
     said = {"ghosts": len(some.part), "changing": 0}
     exact = said | {"anchors_apart_s": None, "error_m2": 0.0}
     # A cubic over a gap between frames would be far off.
-    if len(some.frequency) > MOST_NODES or radar.in_frames:
+    if len(some.frequency) > MOST_NODES or radar.burst_chirps is not None:
         return None, exact
     tilt, curve = (
         (np.abs(own) ** 2).mean(axis=(0, 1))

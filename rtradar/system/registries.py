@@ -270,7 +270,7 @@ MODELS = Registry(
 
 ACTIVITY_NAMES = (
     "walk", "kick", "punch", "jumping_jack", "stand", "sit", "bend", "squat", "wave", "jump",
-    "fall", "walk_in_place", "boxing",
+    "fall", "walk_in_place", "boxing", "lie",
 )  # fmt: skip
 """What synthetic actors can do; `rtradar.motion.ACTIVITIES` says how."""
 

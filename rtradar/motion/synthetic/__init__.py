@@ -24,7 +24,7 @@ from rtradar.motion.synthetic.figure import (
 )
 from rtradar.motion.synthetic.gait import walk
 from rtradar.motion.synthetic.jacks import jumping_jack
-from rtradar.motion.synthetic.on_the_spot import bend, fall, sit, squat, stand, wave
+from rtradar.motion.synthetic.on_the_spot import bend, fall, lie, sit, squat, stand, wave
 from rtradar.motion.synthetic.strikes import kick, punch
 from rtradar.recordings import SYNTHETIC, Source
 from rtradar.system.checks import brief
@@ -68,6 +68,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "fall": fall,
     "walk_in_place": _walk_in_place,
     "boxing": _boxing,
+    "lie": lie,
 }
 """Activities of the actors, by name."""
 

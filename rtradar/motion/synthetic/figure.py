@@ -75,6 +75,8 @@ STYLES: Mapping[str, tuple[str, ...]] = {
     "punch": ("jab", "cross", "hook", "uppercut", "lunge"),
     "boxing": ("outfighter", "infighter", "steady"),
     "jump": ("high", "hop"),
+    "sit": ("still",),
+    "lie": ("floor", "bed"),
 }
 """Ways to do an activity, by its name; without a style a subject has a way of its own."""
 

@@ -1,4 +1,4 @@
-"""Synthetic actors on the spot: who stands, sits down, bends, squats, waves and falls, in balance.
+"""Synthetic actors on the spot: who stands, sits, bends, squats, waves, falls and lies, in balance.
 
 In quiet standing the body rotates about the ankles, forward and back, an inverted pendulum that the
 calf muscles hold as a spring; sideways the hips move over both feet, and the trunk stays upright
@@ -49,6 +49,9 @@ from rtradar.motion.synthetic.figure import (
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+BED_M = 0.5
+"""Height of a bed [m]."""
 
 AHEAD = 0.025
 """Centre of mass ahead of the ankles of who stands, relative to the height: 4 cm."""
@@ -293,7 +296,7 @@ def _balanced(
 
 
 def sit(duration_s: float, subject: Subject) -> PosesAt:
-    """Sit down on a seat, stay, and stand up again."""
+    """Sit down on a seat, stay, and stand up again; the style ``still`` stays on it."""
     own, height = subject.traits("sit"), subject.height_m
     done = repetitions(subject, own, duration_s, extent=0.0)
     lean, rests = math.radians(own.lean), math.radians(own.rests)
@@ -313,6 +316,8 @@ def sit(duration_s: float, subject: Subject) -> PosesAt:
         return found
 
     def poses(t: Array) -> Pose:
+        if subject.style == "still":
+            return pose(np.ones(len(t)), np.full(len(t), -own.seat_behind * height))
         bent = done(t)
         seated = np.full(len(t), -own.seat_behind * height)
         # The feet carry until the seat does.
@@ -375,6 +380,36 @@ def fall(duration_s: float, subject: Subject) -> PosesAt:
     def poses(t: Array) -> Pose:
         # What is above the hips follows them.
         return falling(subject, own, done(t), done(t - own.late / subject.tempo))
+
+    return poses
+
+
+def lie(_: float, subject: Subject) -> PosesAt:
+    """Lie on the back and keep still, feet ahead; on a bed, `BED_M` high, or on the floor."""
+    own, height = subject.traits("lie"), subject.height_m
+    level = BED_M if subject.style == "bed" else 0.0
+
+    def poses(t: Array) -> Pose:
+        still, whole = np.zeros(len(t)), np.ones(len(t))
+        flat = soles(subject, len(t), own.feet, 0.0)
+        trunk, head = (about(y=still - math.radians(angle)) for angle in (90.0, own.head))
+        # The legs are all but stretched, and the toes point upward.
+        ankles = {
+            side: place + xyz((ROOT - HIP + LEGS) * height, 0.0, level + own.heels * height)
+            for side, place in flat.ankles.items()
+        }
+        feet = {side: about(y=still - math.radians(own.toes_up)) for side in SIDES}
+        arms = _arms(subject, trunk, whole, (0, 0), (own.spread,) * 2, (own.elbow,) * 2)
+        return replace(
+            flat,
+            root=xyz(still, 0.0, level + own.lying * height),
+            pelvis=trunk,
+            thorax=trunk,
+            head=head,
+            ankles={side: place - xyz(0.0, 0.0, ANKLE * height) for side, place in ankles.items()},
+            feet=feet,
+            arms=arms,
+        )
 
     return poses
 

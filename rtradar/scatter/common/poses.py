@@ -263,8 +263,8 @@ def keyframe_before(
 
 
 def chirps_by_steps(radar: Radar, n_chirps: int, step: int) -> NDArray[np.int64]:
-    """Every chirp that begins a step, and at least one of every frame."""
-    return np.arange(0, n_chirps, min(step, radar.chirps_per_frame) if radar.in_frames else step)
+    """Every chirp that begins a step, and at least one behind every gap."""
+    return np.arange(0, n_chirps, min(step, radar.burst_chirps or step))
 
 
 class KeyframeCache(Generic[_Key, _Value]):
