@@ -20,7 +20,7 @@ _Levels = Annotated[tuple[float, ...], Limits(-300, 0)]
 
 @dataclass(frozen=True, kw_only=True)
 class Antenna:
-    """One antenna element, in the radar's axes: boresight along x, y to the left, z up.
+    """One antenna element, in axes of its own: boresight along x, y to the left, z up.
 
     Parameters
     ----------
@@ -39,6 +39,9 @@ class Antenna:
         Cuts of ``table``: ascending angles [deg] and the power there relative to the peak [dB], 0
         or less. A cut that is left out is flat.
 
+    angles_deg : (float, float, float)
+        Yaw, pitch and roll by which the antenna is turned in the radar's axes [deg].
+
     Raises
     ------
     InputError
@@ -52,6 +55,7 @@ class Antenna:
     azimuth_db: _Levels = ()
     elevation_deg: _Angles = ()
     elevation_db: _Levels = ()
+    angles_deg: Annotated[tuple[float, float, float], Limits(-360, 360)] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         check_fields(self, "antenna: ")
@@ -120,6 +124,8 @@ class Antenna:
             Ratio of powers, 0 to 1.
         """
         unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        if any(self.angles_deg):
+            unit = unit @ rotation(np.array(self.angles_deg))
         if self.exponent is not None:
             ahead = unit[..., 0]
             return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)
@@ -139,6 +145,21 @@ class Antenna:
             elevation_deg = np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1)))
             level += np.interp(elevation_deg, self.elevation_deg, self.elevation_db)
         return np.asarray(10 ** (level / 10))
+
+
+def rotation(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations (..., 3, 3) of axes by (..., 3) yaw, pitch and roll [deg].
+
+    About x by roll, then up by pitch, then left by yaw.
+    """
+    (cy, cp, cr), (sy, sp, sr) = (
+        np.moveaxis(part(np.radians(angles_deg)), -1, 0) for part in (np.cos, np.sin)
+    )
+    # Columns of Rz(yaw) Ry(-pitch) Rx(roll), written out.
+    boresight = [cp * cy, cp * sy, sp]
+    left = [-cr * sy - sr * sp * cy, cr * cy - sr * sp * sy, sr * cp]
+    up = [sr * sy - cr * sp * cy, -sr * cy - cr * sp * sy, cr * cp]
+    return np.stack([np.stack(axis, axis=-1) for axis in (boresight, left, up)], axis=-1)
 
 
 # -- receivers ------------------------------------------------------------------------------------

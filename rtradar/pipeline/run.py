@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Unpack
+from typing import TYPE_CHECKING, Any, BinaryIO, Unpack, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from rtradar.description import (
 from rtradar.errors import InputError
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.experiment import Experiment
+from rtradar.pipeline.links import links_of
 from rtradar.pipeline.output.pictures import draw_pictures, room_of
 from rtradar.pipeline.output.snapshots import snapshots
 from rtradar.pipeline.output.summary import cost, finished, room_findings, summary_of
@@ -60,7 +61,7 @@ if TYPE_CHECKING:
 _MOMENTS = 100, 20.0  # of the moving body on the page, and as many a second at most
 
 
-@takes_settings
+@overload
 def run(
     motion: Moving,
     radar: Radar | str | Path,
@@ -69,8 +70,33 @@ def run(
     out: str | Path | None = None,
     overwrite: bool = False,
     pictures: bool = False,
+    links: str = "own",
     **options: Unpack[RunOptions],
-) -> Result:
+) -> Result: ...
+@overload
+def run(
+    motion: Moving,
+    radar: list[Radar | str | Path] | list[Radar] | list[str] | tuple[Radar | str | Path, ...],
+    scene: Scene | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    pictures: bool = False,
+    links: str = "own",
+    **options: Unpack[RunOptions],
+) -> dict[str, Result]: ...
+@takes_settings
+def run(
+    motion: Moving,
+    radar: Radar | str | Path | Sequence[Radar | str | Path],
+    scene: Scene | str | Path | None = None,
+    *,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    pictures: bool = False,
+    links: str = "own",
+    **options: Unpack[RunOptions],
+) -> Result | dict[str, Result]:
     """Simulate people before a radar: maps, clouds and a summary, in memory or in a folder.
 
     Parameters
@@ -79,10 +105,16 @@ def run(
         Who moves: a recording, which the run places where the scene has its person, people with
         places of their own, or several of these, and objects beside those of the scene. Text is
         the path of a recording, or ``synthetic:`` and an activity.
-    radar : Radar, str or path
-        Radar, which the scene puts at its position, or what `Radar.load` takes.
+    radar : Radar, str or path, or list of them
+        Radar, which the scene puts at its position, or what `Radar.load` takes. Several radars see
+        the same people at the same times, each with a name and, but for one, a place of its own.
     scene : Scene, str or path, optional
         Walls and furniture around the person, or what `Scene.load` takes; free space if left out.
+    links : {"own", "all"}
+        Of several radars, whether each receives what it has sent itself, or also what each other
+        has: the link ``a>b`` has the Tx of a and the Rx, the axes and the chirps of b, and ranges
+        that are half of the path from Tx to Rx. Both clocks agree, and what goes from Tx to Rx
+        straight is left out.
     out : path, optional
         Folder for maps, clouds, pictures, report and summary, which is made if it does not exist.
         The files of an earlier run that its ``summary.json`` lists are replaced or removed; all
@@ -98,7 +130,8 @@ def run(
 
     Returns
     -------
-    Result
+    Result, or dict of Result
+        Of several radars by the names of the links; in folders of these names, if at all.
 
     Raises
     ------
@@ -122,7 +155,10 @@ def run(
     (3, None)
     """
     settings = settings_of("run", RunOptions, options)
-    parts = given_parts(motion, radar, scene, settings)
+    if isinstance(radar, list | tuple):
+        place = None if out is None else check_path("out", out)
+        return _run_links(motion, radar, scene, settings, links, place, overwrite, pictures)
+    parts = given_parts(motion, cast("Radar | str | Path", radar), scene, settings)
     if out is not None:
         return run_into(check_path("out", out), *parts, settings, overwrite, pictures)
     if settings.save_if:
@@ -132,6 +168,30 @@ def run(
         )
     forget_peak_memory()
     return results_of(prepare(*parts, settings, in_memory=True))
+
+
+def _run_links(
+    motion: Moving,
+    radars: Sequence[Radar | str | Path],
+    scene: Scene | str | Path | None,
+    settings: RunSettings,
+    links: str,
+    out: Path | None,
+    overwrite: bool,
+    pictures: bool,
+) -> dict[str, Result]:
+    """Run each link of several radars; see `run`."""
+    # People and scene are loaded once; all links are checked before the first runs.
+    loaded = [given_parts([], one, None, settings)[1] for one in radars]
+    people, _, room = given_parts(motion, loaded[0] if loaded else "", scene, settings)
+    found = {}
+    for name, radar in links_of(loaded, room, links).items():
+        if out is None:
+            forget_peak_memory()
+            found[name] = results_of(prepare(people, radar, room, settings, in_memory=True))
+        else:
+            found[name] = run_into(out / name, people, radar, room, settings, overwrite, pictures)
+    return found
 
 
 def run_into(

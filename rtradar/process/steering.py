@@ -423,7 +423,8 @@ def _excess_m(direction: _Reals, places_m: _Reals, range_m: _Reals | float | Non
     if range_m is None:
         return np.asarray(-along)
     square = range_m**2 - 2 * range_m * along + (places_m**2).sum(axis=1)
-    return np.asarray(np.sqrt(square) - range_m)
+    # Directions beyond the horizon, which a search may try, have no real path.
+    return np.asarray(np.sqrt(np.maximum(square, 0.0)) - range_m)
 
 
 def _phasors(excess_m: _Reals, carrier_hz: _Reals) -> NDArray[np.complex64]:

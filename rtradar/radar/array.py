@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.front_end import rotation
 from rtradar.radar.waveform import MOST, Waveform, positive
 from rtradar.system.fields import Angle, Limits
 
@@ -187,7 +188,7 @@ class Array(Waveform):
         angles, positions = self.path_at(times)
         if not self.is_moving:
             return np.broadcast_to(self.axes, (len(positions), 3, 3)), positions
-        return _rotation(angles), positions
+        return rotation(angles), positions
 
     def antennas_at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Give the places of all antennas at some times.
@@ -248,7 +249,7 @@ class Array(Waveform):
 
         A vector of the radar's axes is ``axes @ vector`` in the world's.
         """
-        return _rotation(np.array([self.yaw_deg, self.pitch_deg, self.roll_deg]))
+        return rotation(np.array([self.yaw_deg, self.pitch_deg, self.roll_deg]))
 
     @cached_property
     def rx_of_tx(self) -> NDArray[np.int64]:
@@ -348,21 +349,6 @@ def _runs(places: NDArray[np.float64]) -> list[NDArray[np.int64]]:
         runs.append(np.arange(begin, end))
         begin = end
     return runs
-
-
-def _rotation(angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotations (..., 3, 3) of the radar's axes by (..., 3) yaw, pitch and roll.
-
-    About x by roll, then up by pitch, then left by yaw.
-    """
-    (cy, cp, cr), (sy, sp, sr) = (
-        np.moveaxis(part(np.radians(angles_deg)), -1, 0) for part in (np.cos, np.sin)
-    )
-    # Columns of Rz(yaw) Ry(-pitch) Rx(roll), written out.
-    boresight = [cp * cy, cp * sy, sp]
-    left = [-cr * sy - sr * sp * cy, cr * cy - sr * sp * sy, sr * cp]
-    up = [sr * sy - cr * sp * cy, -sr * cy - cr * sp * sy, cr * cp]
-    return np.stack([np.stack(axis, axis=-1) for axis in (boresight, left, up)], axis=-1)
 
 
 GRATING_DB = -3.0
