@@ -77,7 +77,7 @@ print(comparison.table())
 
 # What does not exist is refused; an ignored error that is none would be one.
 print(rt.simulat)  # type: ignore[attr-defined]
-rt.run(motion, radar, fidelty="specular")  # type: ignore[call-arg]
+rt.run(motion, radar, fidelty="specular")  # type: ignore[call-overload]
 rt.simulate(motion, radar, pfa=1e-4)  # type: ignore[call-arg]
 rt.process_samples("x", radar)  # type: ignore[arg-type]
 result.plot.nothing()  # type: ignore[attr-defined]

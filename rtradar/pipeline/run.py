@@ -111,7 +111,7 @@ def run(
     scene : Scene, str or path, optional
         Walls and furniture around the person, or what `Scene.load` takes; free space if left out.
     links : {"own", "all"}
-        Of several radars, whether each receives what it has sent itself, or also what each other
+        Whether each of several radars receives what it has sent itself, or also what each other
         has: the link ``a>b`` has the Tx of a and the Rx, the axes and the chirps of b, and ranges
         that are half of the path from Tx to Rx. Both clocks agree, and what goes from Tx to Rx
         straight is left out.
@@ -131,7 +131,8 @@ def run(
     Returns
     -------
     Result, or dict of Result
-        Of several radars by the names of the links; in folders of these names, if at all.
+        A dict, by the names of the links, where several radars are given; the folders in ``out``
+        have these names, too.
 
     Raises
     ------
