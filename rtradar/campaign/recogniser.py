@@ -12,7 +12,9 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -69,32 +71,9 @@ _LIMITS = 5  # warnings that are shown, of those of the most samples
 _LONGER_S = 6.0  # than a window is a take, in which the window lies anywhere
 
 
-class Taught(NamedTuple):
-    """Numbers (window, number) of windows, the class of each, and who was seen."""
-
-    numbers: Array
-    classes: NDArray[np.str_]
-    people: NDArray[np.str_]
-
-
-def build_recogniser(
-    radar: str | Radar,
-    activities: Mapping[str, Sequence[str]],
-    out: Path,
-    *,
-    unknown: Sequence[str] = ("stand", "sit"),
-    scene: str | None = None,
-    motions: Path | None = None,
-    takes: int = 60,
-    window_s: float = 4.0,
-    clutter_removal: str = "none",
-    seed: int = 0,
-    workers: int | None = None,
-) -> Recogniser:
-    """Make weights for the points that the board of a radar lists, by simulated people alone.
-
-    Samples are made in a folder beside ``out``, named as that is without its ending; a build that
-    was stopped goes on with those that are missing.
+@dataclass(frozen=True, kw_only=True)
+class RecogniserPlan:
+    """What a recogniser shall know, and by whom it is taught.
 
     Parameters
     ----------
@@ -103,8 +82,6 @@ def build_recogniser(
     activities : mapping
         Classes, each with the actors that show it (``{"jump": ("jump:hop", "jump")}``), a style
         behind a colon; labels of recordings are classes or such names.
-    out : path
-        File of the weights, ``.npz``, which is replaced.
     unknown : sequence of str
         Actors that are none of the activities.
     scene : str, optional
@@ -119,6 +96,96 @@ def build_recogniser(
         What the board does about what stands still, see `RunSettings`.
     seed : int
         Seed of all that is drawn.
+
+    Raises
+    ------
+    InputError
+        Where something has no meaning.
+    """
+
+    radar: str | Radar
+    activities: Mapping[str, Sequence[str]]
+    unknown: Sequence[str] = ("stand", "sit")
+    scene: str | None = None
+    motions: Path | None = None
+    takes: int = 60
+    window_s: float = 4.0
+    clutter_removal: str = "none"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.radar, str):
+            object.__setattr__(self, "radar", Radar.load(self.radar))
+        if len(self.activities) < 2:
+            raise InputError("--activities: give at least two, such as walk,boxing")
+        if not 1.0 <= self.window_s <= 60.0:
+            raise InputError(f"--window {self.window_s:g}; 1 to 60 s are allowed")
+        if self.takes < _FOLDS:
+            raise InputError(
+                f"--takes {self.takes}; at least {_FOLDS} are needed, to test on some of them"
+            )
+        for label in self.activities:
+            if label in (UNKNOWN, NOBODY):
+                raise InputError(f"--activities: '{label}' is a class of every recogniser")
+        owners: dict[str, str] = {}
+        for label, names in [*self.activities.items(), (UNKNOWN, self.unknown)]:
+            for name in names:
+                actor, _, style = name.partition(":")
+                if actor not in ACTIVITY_NAMES:
+                    raise InputError(f"'{name}' is no actor; there are {', '.join(ACTIVITY_NAMES)}")
+                if style and style not in STYLES.get(actor, ()):
+                    allowed = ", ".join(STYLES.get(actor, ())) or "none"
+                    raise InputError(f"'{name}': styles of {actor} are {allowed}")
+                if owners.setdefault(actor, label) != label:
+                    raise InputError(
+                        f"actor '{actor}' is of two classes, {owners[actor]} and {label}"
+                    )
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Cells of the radar, and those of its frames that are looked at."""
+        assert isinstance(self.radar, Radar)  # as it was loaded
+        every = max(1, math.ceil(FRAME_S / self.radar.frame_hop_s - 0.01))
+        return Grid(
+            frame_s=every * self.radar.frame_hop_s,
+            range_bin_m=self.radar.range_bin_m,
+            velocity_bin_mps=self.radar.velocity_bin_mps,
+            max_range_m=self.radar.max_range_m,
+            window_s=self.window_s,
+        )
+
+    @cached_property
+    def class_of(self) -> Mapping[str, str]:
+        """The class of each actor and of each label of a recording."""
+        pairs = [(name, label) for label, names in self.activities.items() for name in names]
+        found = {name.partition(":")[0]: label for name, label in pairs}
+        return (
+            found
+            | {label: label for label in self.activities}
+            | dict.fromkeys((name.partition(":")[0] for name in self.unknown), UNKNOWN)
+        )
+
+
+class Taught(NamedTuple):
+    """Numbers (window, number) of windows, the class of each, and who was seen."""
+
+    numbers: Array
+    classes: NDArray[np.str_]
+    people: NDArray[np.str_]
+
+
+def build_recogniser(plan: RecogniserPlan, out: Path, *, workers: int | None = None) -> Recogniser:
+    """Make weights for the points that the board of a radar lists, by simulated people alone.
+
+    Samples are made in a folder beside ``out``, named as that is without its ending; a build that
+    was stopped goes on with those that are missing.
+
+    Parameters
+    ----------
+    plan : RecogniserPlan
+        What shall be known.
+    out : path
+        File of the weights, ``.npz``, which is replaced.
     workers : int, optional
         Processes that share the cores; by default one a core.
 
@@ -130,49 +197,8 @@ def build_recogniser(
     Raises
     ------
     InputError
-        Where something has no meaning, or scikit-learn or Dask are missing.
+        Where a sample cannot be made, or scikit-learn or Dask are missing.
     """
-    radar = Radar.load(radar) if isinstance(radar, str) else radar
-    _checked(activities, unknown, out, window_s, takes)
-    grid = _grid_of(radar, window_s)
-    folder = out.with_suffix("")
-    class_of = {
-        name.partition(":")[0]: label for label, names in activities.items() for name in names
-    }
-    class_of |= {label: label for label in activities} | dict.fromkeys(unknown, UNKNOWN)
-    # Data sets of actors and of recorded people, which are one but for who is in it.
-    common = _common(radar, grid, scene, clutter_removal, seed)
-    tables = {"actors": common | _actors(common, (*activities.values(), unknown), takes)}
-    if motions is not None:
-        tables["people"] = common | _recordings(motions, class_of)
-    folders = [folder / name for name in tables]
-    for place, table in zip(folders, tables.values(), strict=True):
-        _build(table, place, workers)
-    samples = Collection(*folders)
-    made = train_recogniser(taught_by(samples, grid, class_of), radar, grid, seed=seed)
-    more: dict[str, Any] = {
-        "actors": {label: list(names) for label, names in activities.items()},
-        "unknown": list(unknown),
-        "samples": dict(Counter(samples.column("source").tolist())),
-        "scene": scene or "rooms at random",
-        "limits": dict(_limits(samples)),
-        "seed": seed,
-        "versions": versions(),
-    }
-    out.parent.mkdir(parents=True, exist_ok=True)
-    made = Recogniser(made.forest, made.card | more)
-    made.save(out)
-    return made
-
-
-def _checked(
-    activities: Mapping[str, Sequence[str]],
-    unknown: Sequence[str],
-    out: Path,
-    window_s: float,
-    takes: int,
-) -> None:
-    """Refuse classes and actors that have no meaning, before anything is computed."""
     try:
         import sklearn  # noqa: F401
     except ImportError:
@@ -182,46 +208,37 @@ def _checked(
         ) from None
     if out.suffix != ".npz":
         raise InputError(f"--out {out}: weights are a file .npz")
-    if len(activities) < 2:
-        raise InputError("--activities: give at least two, such as walk,boxing")
-    if not 1.0 <= window_s <= 60.0:
-        raise InputError(f"--window {window_s:g}; 1 to 60 s are allowed")
-    if takes < _FOLDS:
-        raise InputError(f"--takes {takes}; at least {_FOLDS} are needed, to test on some of them")
-    every = [name for names in activities.values() for name in names] + list(unknown)
-    for name in every:
-        actor, _, style = name.partition(":")
-        if actor not in ACTIVITY_NAMES:
-            raise InputError(f"'{name}' is no actor; there are {', '.join(ACTIVITY_NAMES)}")
-        if style and style not in STYLES.get(actor, ()):
-            allowed = ", ".join(STYLES.get(actor, ())) or "none"
-            raise InputError(f"'{name}': styles of {actor} are {allowed}")
-    for label in activities:
-        if label in (UNKNOWN, NOBODY):
-            raise InputError(f"--activities: '{label}' is a class of every recogniser")
-    owners: dict[str, str] = {}
-    for label, names in [*activities.items(), (UNKNOWN, unknown)]:
-        for actor in {name.partition(":")[0] for name in names}:
-            if owners.setdefault(actor, label) != label:
-                raise InputError(f"actor '{actor}' is of two classes, {owners[actor]} and {label}")
+    # Data sets of actors and of recorded people, which are one but for who is in it.
+    common = _common(plan)
+    tables = {"actors": common | _actors(plan, common)}
+    if plan.motions is not None:
+        tables["people"] = common | _recordings(plan.motions, plan.class_of)
+    folders = [out.with_suffix("") / name for name in tables]
+    for place, table in zip(folders, tables.values(), strict=True):
+        _build(table, place, workers)
+    samples = Collection(*folders)
+    assert isinstance(plan.radar, Radar)
+    taught = taught_by(samples, plan.grid, plan.class_of)
+    made = train_recogniser(taught, plan.radar, plan.grid, seed=plan.seed)
+    more: dict[str, Any] = {
+        "actors": {label: list(names) for label, names in plan.activities.items()},
+        "unknown": list(plan.unknown),
+        "samples": dict(Counter(samples.column("source").tolist())),
+        "scene": plan.scene or "rooms at random",
+        "limits": dict(_limits(samples)),
+        "seed": plan.seed,
+        "versions": versions(),
+    }
+    out.parent.mkdir(parents=True, exist_ok=True)
+    made = Recogniser(made.forest, made.card | more)
+    made.save(out)
+    return made
 
 
-def _grid_of(radar: Radar, window_s: float) -> Grid:
-    """Cells of a radar, and those of its frames that are looked at."""
-    every = max(1, math.ceil(FRAME_S / radar.frame_hop_s - 0.01))
-    return Grid(
-        frame_s=every * radar.frame_hop_s,
-        range_bin_m=radar.range_bin_m,
-        velocity_bin_mps=radar.velocity_bin_mps,
-        max_range_m=radar.max_range_m,
-        window_s=window_s,
-    )
-
-
-def _common(
-    radar: Radar, grid: Grid, scene: str | None, clutter_removal: str, seed: int
-) -> dict[str, Any]:
-    """Table of a data set without people; see `build_recogniser`."""
+def _common(plan: RecogniserPlan) -> dict[str, Any]:
+    """Table of a data set without people; see `RecogniserPlan`."""
+    radar, grid = plan.radar, plan.grid
+    assert isinstance(radar, Radar)
     watts = radar.transmit_power_dbm is not None
     board = radar.multiplexing in ("tdm", "bpm") and watts
     radar = dataclasses.replace(radar, frame_period_s=grid.frame_s) if board else radar
@@ -237,16 +254,16 @@ def _common(
     else:
         del drawn["noise_db"]
         drawn["snr_db"] = [10.0, 25.0]
-    if scene is not None:
-        each["scene"] = [scene]
+    if plan.scene is not None:
+        each["scene"] = [plan.scene]
     return {
-        "seed": seed,
+        "seed": plan.seed,
         "order": 0,
-        "random_rooms": scene is None,
+        "random_rooms": plan.scene is None,
         "whole_clouds": True,
         "skip_short": True,
         "body_material": "skin",
-        "clutter_removal": clutter_removal,
+        "clutter_removal": plan.clutter_removal,
         "detector": "ti-oob" if board else "os-cfar",
         "windows": {"duration_s": length_s, "place": "random"},
         "each": each,
@@ -254,15 +271,13 @@ def _common(
     }
 
 
-def _actors(
-    common: Mapping[str, Any], classes: Iterable[Sequence[str]], takes: int
-) -> dict[str, Any]:
+def _actors(plan: RecogniserPlan, common: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a data set of actors, so many takes of each class."""
     synthetic: list[dict[str, Any]] = []
-    for names in classes:
+    for names in (*plan.activities.values(), plan.unknown):
         for number, name in enumerate(names):
             actor, _, style = name.partition(":")
-            count = len(range(number, takes, len(names)))
+            count = len(range(number, plan.takes, len(names)))
             own: dict[str, Any] = {"label": actor, "count": count, "subjects": _SUBJECTS}
             own |= {"style": style} if style else {}
             own |= {"drawn": _FARTHER} if actor in TRAVELLING else {}

@@ -13,12 +13,11 @@ from rtradar.errors import InputError
 
 def recogniser_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar recogniser build``."""
-    from rtradar.campaign.recogniser import build_recogniser, card_in_words
+    from rtradar.campaign.recogniser import RecogniserPlan, build_recogniser, card_in_words
 
-    made = build_recogniser(
-        options.radar,
-        options.activities,
-        options.out,
+    plan = RecogniserPlan(
+        radar=options.radar,
+        activities=options.activities,
         unknown=options.unknown,
         scene=options.scene,
         motions=options.motions,
@@ -26,8 +25,8 @@ def recogniser_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]
         window_s=options.window,
         clutter_removal=options.clutter_removal,
         seed=options.seed,
-        workers=options.workers,
     )
+    made = build_recogniser(plan, options.out, workers=options.workers)
     yield {key: value for key, value in made.card.items() if key != "usual"}
     say(options, f"{card_in_words(made)}\n\nsee {options.out}")
 

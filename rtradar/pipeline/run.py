@@ -112,9 +112,7 @@ def run(
         Walls and furniture around the person, or what `Scene.load` takes; free space if left out.
     links : {"own", "all"}
         Whether each of several radars receives what it has sent itself, or also what each other
-        has: the link ``a>b`` has the Tx of a and the Rx, the axes and the chirps of b, and ranges
-        that are half of the path from Tx to Rx. Both clocks agree, and what goes from Tx to Rx
-        straight is left out.
+        has: the link ``a>b`` has the Tx of a, and all else of b. The way straight is left out.
     out : path, optional
         Folder for maps, clouds, pictures, report and summary, which is made if it does not exist.
         The files of an earlier run that its ``summary.json`` lists are replaced or removed; all
@@ -131,8 +129,7 @@ def run(
     Returns
     -------
     Result, or dict of Result
-        A dict, by the names of the links, where several radars are given; the folders in ``out``
-        have these names, too.
+        A dict by the names of the links, as of the folders in ``out``, where there are several.
 
     Raises
     ------

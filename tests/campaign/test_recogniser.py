@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.campaign.recogniser import build_recogniser
+from rtradar.campaign.recogniser import RecogniserPlan, build_recogniser
 from rtradar.cli import main
 from rtradar.errors import InputError
 from rtradar.motion.formats import save_motion
@@ -29,7 +29,8 @@ def radar() -> rt.Radar:
 
 def built(radar: rt.Radar, out: Path, **options: Any) -> Recogniser:
     usual: dict[str, Any] = {"unknown": ["stand"], "scene": "free-space", "takes": 5}
-    return build_recogniser(radar, CLASSES, out, **usual | {"window_s": 2.0} | options)
+    usual |= {"radar": radar, "activities": CLASSES, "window_s": 2.0}
+    return build_recogniser(RecogniserPlan(**usual | options), out)
 
 
 def test_a_recogniser_is_built_goes_on_and_names_a_run_and_a_file(
@@ -98,9 +99,10 @@ def test_a_recogniser_is_built_goes_on_and_names_a_run_and_a_file(
 def test_what_cannot_be_learnt_is_refused_at_once(
     radar: rt.Radar, tmp_path: Path, options: dict[str, Any], words: str
 ) -> None:
-    given = {"activities": CLASSES, "out": tmp_path / "w.npz"} | options
+    given = {"radar": radar, "activities": CLASSES, "out": tmp_path / "w.npz"} | options
+    out = given.pop("out")
     with pytest.raises(InputError, match=words):
-        build_recogniser(radar, given.pop("activities"), given.pop("out"), **given)
+        build_recogniser(RecogniserPlan(**given), out)
     assert not list(tmp_path.iterdir())
 
 

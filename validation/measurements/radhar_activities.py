@@ -31,7 +31,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.campaign.recogniser import Taught, build_recogniser, taught_by, train_recogniser
+from rtradar.campaign.recogniser import (
+    RecogniserPlan,
+    Taught,
+    build_recogniser,
+    taught_by,
+    train_recogniser,
+)
 from rtradar.clouds.collection import Collection
 from rtradar.recognition import NOBODY, UNKNOWN, Grid, Points, Recogniser
 from rtradar.recognition.points import describe_points, of_person, without_person
@@ -218,9 +224,9 @@ def measure(quick: bool) -> list[Row]:
     people = None if quick or "RTRADAR_JOINTS" not in os.environ else PEOPLE
     with temporary_folder() as folder:
         out = folder / "radhar.npz"
-        recogniser = build_recogniser(
-            "radhar", ACTIVITIES, out, motions=people, takes=5 if quick else 60
-        )
+        takes = 5 if quick else 100
+        plan = RecogniserPlan(radar="radhar", activities=ACTIVITIES, motions=people, takes=takes)
+        recogniser = build_recogniser(plan, out)
         places = [out.with_suffix("") / name for name in ("actors", "people")]
         return rows_from(recogniser, [place for place in places if place.is_dir()])
 
