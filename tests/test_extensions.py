@@ -44,7 +44,11 @@ def files_of_the_how_to() -> dict[str, str]:
 def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None = None) -> None:
     """What pip installs of a package: its modules, and beside them its name and entry points."""
     folder.mkdir()
-    project = tomllib.loads(files["pyproject.toml"])["project"]
+    whole = tomllib.loads(files["pyproject.toml"])
+    project, modules = whole["project"], whole["tool"]["setuptools"]["py-modules"]
+    assert len(files) == 1 or {f"{name}.py" for name in modules} == files.keys() - {
+        "pyproject.toml"
+    }
     about = folder / f"{project['name']}-{project['version']}.dist-info"
     about.mkdir()
     (about / "METADATA").write_text(

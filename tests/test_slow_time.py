@@ -106,14 +106,20 @@ def test_breath_and_heart_are_read_beside_what_stands_still(
     noise = random.normal(size=(cycles, 12, 2)) @ [1, 1j]
     spectra = np.zeros((cycles, 12, 64), np.complex64)
     spectra[:, :, 20] = series + 0.01 * noise
+    spectra[:, :, 40] = 0.01 * noise
     found = vital_signs(spectra.reshape(-1, 4, 64), radar)
     assert found.range_m == pytest.approx(radar.range_m[20])
     assert found.breath_hz == pytest.approx(breath_hz, rel=0.01)
     assert found.breath_m == pytest.approx(1e-3 * breath_mm, rel=0.02)
+    assert found.explained > 0.95
     # A heart at a harmonic of the breath is one with it.
     if min(abs(heart_hz - k * breath_hz) for k in range(1, 7)) > 0.05:
         assert found.heart_hz == pytest.approx(heart_hz, rel=0.02)
         assert found.heart_m == pytest.approx(2e-4, rel=0.1)
+    nowhere = vital_signs(spectra.reshape(-1, 4, 64), radar, range_m=float(radar.range_m[40]))
+    assert nowhere.explained < 0.5
+    with pytest.raises(InputError, match="the radar's ranges end at"):
+        vital_signs(spectra.reshape(-1, 4, 64), radar, range_m=1e3)
     chosen = vital_signs(spectra.reshape(-1, 4, 64), radar, range_m=float(radar.range_m[20]))
     np.testing.assert_array_equal(chosen.way_m, found.way_m)
 

@@ -11,6 +11,7 @@ import dataclasses
 import json
 import math
 import re
+import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,8 +25,9 @@ from numpy.typing import NDArray
 from rtradar.campaign.build import build_dataset
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.collection import Collection
+from rtradar.clouds.sample_files import INDEX, read_index, sample_path, write_index
 from rtradar.description import MOST_FILES, path_from, plain, versions
-from rtradar.errors import InputError
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.synthetic import STYLES
 from rtradar.radar import Radar
 from rtradar.radar.array import UsualPlace
@@ -67,6 +69,7 @@ _SUBJECTS, _FOLDS, _USUAL, _RIDGE = 200, 5, 0.995, 1e-2
 _OF_POINTS = {"n_estimators": 500, "min_samples_leaf": 3, "max_features": 0.3}
 _OF_CLOUDS = {"n_estimators": 300, "min_samples_leaf": 2}
 _NUMBER = re.compile(r"-?\d[\d.]*")
+_ENOUGH = 0.9  # of the samples must be made
 _LIMITS = 5  # warnings that are shown, of those of the most samples
 _LONGER_S = 6.0  # than a window is a take, in which the window lies anywhere
 
@@ -323,7 +326,20 @@ def _build(table: Mapping[str, Any], folder: Path, workers: int | None) -> None:
             own["files"] = [one | {"path": path_from(here, one["path"])} for one in own["files"]]
         spec = place / "recogniser.toml"
         spec.write_text(tomli_w.dumps(own), encoding="utf-8")
-        build_dataset(spec, folder, workers=workers)
+        try:
+            build_dataset(spec, folder, workers=workers)
+        except InputError as error:
+            _leave_out(folder, error)
+
+
+def _leave_out(folder: Path, error: InputError) -> None:
+    """Go on without the samples that cannot be made, such as of who stands in a wall, if few."""
+    every = read_index(folder) if (folder / INDEX).is_file() else []
+    there = [name for name in every if sample_path(folder, name).is_file()]
+    if len(there) < _ENOUGH * len(every) or len(there) == len(every):
+        raise error
+    warnings.warn(f"{error}: left out", ValidityWarning, stacklevel=3)
+    write_index(folder, there)
 
 
 def taught_by(samples: Collection, grid: Grid, class_of: Mapping[str, str]) -> Taught:
@@ -367,17 +383,25 @@ def train_recogniser(
     kept = np.array([count[name] >= _FOLDS for name in taught.classes.tolist()])
     taught = Taught(*(column[kept] for column in taught))
     names, truth = np.unique(taught.classes, return_inverse=True)
-    held_out = np.zeros((len(truth), len(names)))
+    held_out, away = np.zeros((len(truth), len(names))), np.zeros(len(truth))
+    first = taught.numbers[:, : None if grid else OUTLINE]
     folds = StratifiedGroupKFold(_FOLDS, shuffle=True, random_state=word(seed))
     for learn, ask in folds.split(taught.numbers, truth, taught.people):
         part = _forest(grid, seed).fit(taught.numbers[learn], truth[learn])
         held_out[np.ix_(ask, part.classes_)] = part.predict_proba(taught.numbers[ask])
+        away[ask] = distances(first[ask], *moments_of(first[learn]))
     right = held_out.argmax(axis=1) == truth
     card = {
         "classes": names.tolist(),
         "temperature": best_temperature(held_out, truth),
         "radar": limits_of(radar),
-        "usual": usual_of(taught.numbers[:, : None if grid else OUTLINE]),
+        "usual": dict(
+            zip(
+                ("mean", "inverse_covariance", "most"),
+                (*moments_of(first), float(np.quantile(away, _USUAL))),
+                strict=True,
+            )
+        ),
         "windows": dict(zip(names.tolist(), np.bincount(truth).tolist(), strict=True)),
         "people": len(set(taught.people.tolist())),
         "held_out": {
@@ -419,17 +443,19 @@ def arrays_of(forest: ExtraTreesClassifier) -> dict[str, NDArray[Any]]:
     }
 
 
-def usual_of(numbers: Array) -> dict[str, Any]:
-    """Return mean, inverse covariance and largest distance of all but few of some numbers."""
-    mean, covariance = numbers.mean(axis=0), np.cov(numbers.T)
-    inverse = np.linalg.inv(covariance + np.diag(_RIDGE * np.diag(covariance) + 1e-9))
+def moments_of(numbers: Array) -> tuple[Array, Array]:
+    """Return the mean and the inverse covariance of numbers (window, number)."""
+    covariance = np.cov(numbers.T)
+    # So that nearly dependent numbers, and those that few windows have, do no harm.
+    ridge = _RIDGE * np.diag(covariance) + 1e-9
+    inverse = np.asarray(np.linalg.inv(covariance + np.diag(ridge)), dtype=np.float64)
+    return numbers.mean(axis=0), inverse
+
+
+def distances(numbers: Array, mean: Array, inverse: Array) -> Array:
+    """Return the Mahalanobis distance of each window (window,)."""
     away = numbers - mean
-    distances = np.sqrt(np.einsum("wi,ij,wj->w", away, inverse, away))
-    return {
-        "mean": mean,
-        "inverse_covariance": inverse,
-        "most": float(np.quantile(distances, _USUAL)),
-    }
+    return np.asarray(np.sqrt(np.einsum("wi,ij,wj->w", away, inverse, away)))
 
 
 def limits_of(radar: Radar) -> dict[str, Any]:
@@ -479,8 +505,9 @@ def _lines(card: Mapping[str, Any]) -> Iterator[str]:
     known = ", ".join(f"{name} {part:.0%}" for name, part in card["held_out"].items())
     yield f"of people that were kept out it knows: {known}"
     counted = ", ".join(f"{count} {name}" for name, count in card["samples"].items())
-    yield f"learnt from {sum(card['windows'].values())} windows of {card['people']} people"
-    yield f"samples: {counted}, in {card['scene']}; no recording of a radar"
+    windows = ", ".join(f"{count} {name}" for name, count in card["windows"].items())
+    yield f"learnt from windows of {card['people']} people: {windows}"
+    yield f"from samples: {counted}, in {card['scene']}; no recording of a radar"
     for text, count in sorted(card["limits"].items(), key=lambda one: -one[1])[:_LIMITS]:
         yield f"warned of in {count} of {sum(card['samples'].values())} samples: {text}"
     yield f"actors: {json.dumps(card['actors'])}; {UNKNOWN}: {', '.join(card['unknown'])}"

@@ -135,7 +135,7 @@ def predict(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar predict``."""
     from rtradar.recognition import predict as answer_to
 
-    answer = answer_to(options.place, options.weights)
+    answer = answer_to(options.place, options.weights, ahead=options.ahead)
     yield answer
     chances = sorted(answer["probabilities"].items(), key=lambda one: -one[1])
     shown = ", ".join(f"{name} {chance:.0%}" for name, chance in chances)

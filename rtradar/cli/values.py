@@ -134,7 +134,7 @@ def classes(text: str) -> dict[str, list[str]]:
     for part in words(text):
         name, _, actors = part.partition("=")
         if not name or name in found:
-            raise ValueError
+            raise argparse.ArgumentTypeError(f"'{part}': each class needs a name, given once")
         found[name] = [actor for actor in actors.split("+") if actor] or [name]
     return found
 

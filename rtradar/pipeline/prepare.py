@@ -421,8 +421,8 @@ def _limits(model: RoomModel | None, radar: Radar, clutter: Clutter) -> tuple[Li
     if behind > 0:
         message = (
             f"clutter power is from behind the antennas, most of it from '{leader}', and so are "
-            "ghosts; elements on a board radiate ahead: give the radar an [antenna], such as "
-            "pattern = 'cosine' with exponent = 2"
+            "ghosts; elements on a board radiate ahead: give the radar a [tx_antenna] and an "
+            "[rx_antenna] that look less behind, such as pattern = 'cosine' with exponent = 2"
         )
         limits.append(Limit("clutter_behind", behind, message))
         if behind > _LEADS:

@@ -40,6 +40,9 @@ class VitalSigns:
         Rates [Hz].
     breath_m, heart_m : float
         Amplitudes along the line of sight, half of the way from end to end [m].
+    explained : float
+        Fraction of the way's variance, without a line, that the breath and its harmonics explain:
+        near 1 of who holds still, near 0 where nobody breathes.
     """
 
     time_s: _Reals
@@ -49,6 +52,7 @@ class VitalSigns:
     heart_hz: float
     breath_m: float
     heart_m: float
+    explained: float
 
 
 def vital_signs(
@@ -111,6 +115,11 @@ def vital_signs(
         power = cube.var(axis=0).sum(axis=0)
         cells = np.flatnonzero(power >= 10 ** (-_FAINTEST_DB / 10) * power.max()).tolist()
     else:
+        if not radar.range_m[0] <= range_m <= radar.range_m[-1]:
+            raise InputError(
+                f"vital signs: range_m = {range_m:g}; the radar's ranges end at "
+                f"{radar.range_m[-1]:.3g} m"
+            )
         cells = [int(np.abs(radar.range_m - range_m).argmin())]
     ways = {cell: _way(cube[:, :, cell], radar) for cell in cells}
     tried = {cell: _rate(time, way, breath_hz, []) for cell, way in ways.items()}
@@ -120,7 +129,14 @@ def vital_signs(
     heart = _rate(time, way, heart_hz, [breath * k for k in range(1, _HARMONICS + 1)])
     sizes = _fit(time, way, [breath, heart, *(breath * k for k in range(2, _HARMONICS + 1))])[0]
     return VitalSigns(
-        time, way - way.mean(), float(radar.range_m[cell]), breath, heart, *sizes[:2].tolist()
+        time_s=time,
+        way_m=way - way.mean(),
+        range_m=float(radar.range_m[cell]),
+        breath_hz=breath,
+        heart_hz=heart,
+        breath_m=float(sizes[0]),
+        heart_m=float(sizes[1]),
+        explained=1 - _left_over(time, way, breath),
     )
 
 
@@ -137,7 +153,8 @@ def _way(cell: NDArray[np.complexfloating], radar: Radar) -> _Reals:
 def _left_over(time: _Reals, way: _Reals, rate: float) -> float:
     """Part of a way that is neither a line nor a sine of this rate and its harmonics."""
     harmonics = [rate * k for k in range(1, _HARMONICS + 1)]
-    return _fit(time, way, harmonics)[1] / max(_fit(time, way, [])[1], 1e-30)
+    whole = _fit(time, way, [])[1]
+    return _fit(time, way, harmonics)[1] / whole if whole > 0 else 1.0
 
 
 def _angle(values: NDArray[np.complex128]) -> _Reals:

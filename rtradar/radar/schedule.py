@@ -307,8 +307,8 @@ class Schedule(Array):
             return self
         if self.frame_period_s is None:
             raise InputError(
-                "slow_time = capture: the chirps of the radar have no gaps, and their slow time "
-                "goes on as it is; leave it out, or give frame_period_s"
+                "the chirps of the radar have no gaps, and their slow time goes on as it is; leave "
+                "slow_time = capture out, or give frame_period_s"
             )
         period_s = self.frame_period_s
         return dataclasses.replace(

@@ -40,7 +40,9 @@ _BESIDE = 0.2  # fraction of the velocities that may lie between the cells
 _NEEDED = "name a folder that 'rtradar run --out DIR' or 'rtradar process' made"
 
 
-def predict(place: Path, weights: Path | None = None) -> dict[str, Any]:
+def predict(
+    place: Path, weights: Path | None = None, *, ahead: str | None = None
+) -> dict[str, Any]:
     """Say which activity the cloud of a run shows, or the points that a board has listed.
 
     Parameters
@@ -51,6 +53,8 @@ def predict(place: Path, weights: Path | None = None) -> dict[str, Any]:
     weights : path, optional
         Weights that ``rtradar recogniser build`` has made; by default those of the package, which
         know RDT clouds.
+    ahead : {"x", "y"}, optional
+        Axis of a file of points that points away from the radar, see `read_points`.
 
     Returns
     -------
@@ -89,7 +93,7 @@ def predict(place: Path, weights: Path | None = None) -> dict[str, Any]:
             table, step_s = _in_axes(table, summary)
             own = Points.on_grid(table, grid, summary["capture_s"], step_s)
         else:
-            table, said = read_points(place, grid)
+            table, said = read_points(place, grid, ahead)
             own = Points.on_grid(table, grid)
             reading = {"reading": said}
             warnings += _of_table(table, grid)

@@ -33,7 +33,7 @@ _MOST_BYTES = 1_000_000_000
 _AHEAD = 0.99  # of the points, which lie before the radar
 
 
-def read_points(path: Path, grid: Grid) -> tuple[Array, str]:
+def read_points(path: Path, grid: Grid, ahead: str | None = None) -> tuple[Array, str]:
     """Read points that a board has listed.
 
     Parameters
@@ -44,6 +44,10 @@ def read_points(path: Path, grid: Grid) -> tuple[Array, str]:
     grid : Grid
         Cells of the radar. Files of the visualiser count frames instead of telling their times, and
         those of older chips velocities in cells.
+
+    ahead : {"x", "y"}, optional
+        Axis of a table that points away from the radar, x as in ROS with y to the left, or y as TI
+        has it with x to the right; by default that along which all points are positive.
 
     Returns
     -------
@@ -71,20 +75,27 @@ def read_points(path: Path, grid: Grid) -> tuple[Array, str]:
         ) from None
     if not len(table):
         raise InputError(f"'{path}' has no points; give a recording that has some")
-    return (table, said) if said else _turned(path, table)
+    table, said = (table, said) if said else _turned(path, table, ahead)
+    away_m = np.linalg.norm(np.nan_to_num(table[:, 1:4]), axis=1)
+    if (median_m := float(np.median(away_m))) > grid.max_range_m:
+        raise InputError(
+            f"'{path}': points lie {median_m:.3g} m away, beyond the {grid.max_range_m:.3g} m of "
+            "the radar; give them in metres"
+        )
+    return table, said
 
 
-def _turned(path: Path, table: Array) -> tuple[Array, str]:
+def _turned(path: Path, table: Array, ahead: str | None) -> tuple[Array, str]:
     """Turn a table of which it is unknown whether x (as ROS has it) or y (as TI) is ahead."""
-    ahead = [float((table[:, column] > 0).mean()) >= _AHEAD for column in (1, 2)]
-    if ahead == [True, False]:
+    positive = [float((table[:, column] > 0).mean()) >= _AHEAD for column in (1, 2)]
+    if ahead == "x" or (ahead is None and positive == [True, False]):
         return table, "x is ahead and y to the left"
-    if ahead == [False, True]:
+    if ahead == "y" or (ahead is None and positive == [False, True]):
         return _of_ti(table), "y is ahead and x to the right"
-    both = "both x and y are" if all(ahead) else "neither x nor y is"
+    both = "both x and y are" if all(positive) else "neither x nor y is"
     raise InputError(
         f"'{path}': {both} positive in {_AHEAD:.0%} of the points, so that it is unknown which is "
-        "ahead of the radar; give x ahead and y to the left, or y ahead and x to the right"
+        "ahead of the radar; say it (--ahead x, as in ROS, or --ahead y, as TI has it)"
     )
 
 

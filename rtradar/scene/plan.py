@@ -224,7 +224,8 @@ def name_parts(
     if left_out:
         style: dict[str, Any] = {"fontsize": STYLE["font.size"], "color": theme.text, "ha": "right"}
         style |= {"transform": axes.transAxes, "in_layout": False}
-        axes.text(0.99, 0.015, f"{left_out} pieces are not named", **style)
+        said = "1 piece is not named" if left_out == 1 else f"{left_out} pieces are not named"
+        axes.text(0.99, 0.015, said, **style)
 
 
 def plan_note(scene: Scene) -> str:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.campaign.recogniser import RecogniserPlan, build_recogniser
+from rtradar.campaign.recogniser import RecogniserPlan, _leave_out, build_recogniser
 from rtradar.cli import main
+from rtradar.clouds.sample_files import read_index, write_index
 from rtradar.errors import InputError
 from rtradar.motion.formats import save_motion
 from rtradar.recognition import NOBODY, UNKNOWN, Recogniser, predict
@@ -104,6 +105,22 @@ def test_what_cannot_be_learnt_is_refused_at_once(
     with pytest.raises(InputError, match=words):
         build_recogniser(RecogniserPlan(**given), out)
     assert not list(tmp_path.iterdir())
+
+
+def test_few_samples_that_cannot_be_made_are_left_out(tmp_path: Path) -> None:
+    write_index(tmp_path, [f"s{number}" for number in range(20)])
+    for number in range(19):
+        (tmp_path / f"s{number}.npz").touch()
+    error = InputError("somebody stands in a wall")
+    with pytest.warns(rt.ValidityWarning, match="in a wall: left out"):
+        _leave_out(tmp_path, error)
+    assert len(read_index(tmp_path)) == 19
+    for number in range(10):
+        (tmp_path / f"s{number}.npz").unlink()
+    with pytest.raises(InputError, match="in a wall"):
+        _leave_out(tmp_path, error)
+    with pytest.raises(InputError, match="in a wall"):
+        _leave_out(tmp_path / "none", error)
 
 
 def test_recordings_must_be_of_the_classes(radar: rt.Radar, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import struct
 from pathlib import Path
 from typing import Any
@@ -125,7 +126,17 @@ def test_what_might_be_ahead_either_way_is_refused(
     tmp_path: Path, shift: float, words: str
 ) -> None:
     rows = table() + np.array([0, min(shift, 0.0), shift, 0, 0])
-    with pytest.raises(InputError, match=f"{words}.* unknown which is ahead"):
+    path = written(tmp_path, rows)
+    with pytest.raises(InputError, match=f"{words}.* unknown which is ahead.*--ahead x"):
+        read_points(path, GRID)
+    grid = dataclasses.replace(GRID, max_range_m=20.0)
+    np.testing.assert_array_equal(read_points(path, grid, "x")[0], rows)
+    np.testing.assert_array_equal(read_points(path, grid, "y")[0][:, 1], rows[:, 2])
+
+
+def test_points_in_another_unit_are_refused(tmp_path: Path) -> None:
+    rows = table() * [1, 1000, 1000, 1000, 1]
+    with pytest.raises(InputError, match=r"m away, beyond the 6 m of the radar; give them in met"):
         read_points(written(tmp_path, rows), GRID)
 
 

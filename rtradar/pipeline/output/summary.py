@@ -31,7 +31,8 @@ _SINGLE_REFLECTIONS = {
     "name": "single_reflections",
     "share": None,
     "message": "what parts of a body reflect to one another is left out, which near each other "
-    "changes both by decibels; bounces=2 (--model-option bounces=2) adds it",
+    "changes both by decibels; specular and physical-optics add it with bounces=2 (--model-option "
+    "bounces=2)",
 }
 """A limit of every run without it, whose share only such a run could tell."""
 _REST_BINS = 2
