@@ -106,6 +106,10 @@ DATA_SET_KEYS = {
             "`false` makes no clouds, which saves most of the time where only `keep` is wanted",
             "`true`",
         ),
+        "whole_clouds": (
+            "`true` keeps all spatial points, with the time and the velocity of each",
+            "`false`",
+        ),
         "random_rooms": (
             "`true` draws a room for each interval, as [`rt.Scene.random`](scenes.md) does, in "
             "place of a `scene` under `[each]`",
@@ -166,11 +170,16 @@ DATA_SET_KEYS = {
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {
         "label": (
-            f"{', '.join(f'`{activity}`' for activity in ACTIVITIES)}; each at most once",
+            f"{', '.join(f'`{activity}`' for activity in ACTIVITIES)}; each at most once in a style",
             "must be given",
         ),
         "count": ("number of takes; `count` or `seeds` is needed", ""),
         "seeds": ("list of the seeds of the takes", ""),
+        "style": (
+            "one of the activity's styles, of `rtradar list activities`",
+            "the subject's own",
+        ),
+        "drawn": ("ranges of these actors, in place of those under `[drawn]`", ""),
         "subjects": (
             "number of subjects, or a list of their numbers; take k is of subject k modulo their "
             "number",

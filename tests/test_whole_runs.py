@@ -123,7 +123,14 @@ ON_A_RUN = {
     "paper": ["paper", "--quick"],
 }
 LONG = {"bench", "doctor", "paper"}  # half a minute, compiling of all levels, and minutes
-HERE = {"run", "dataset", "train", "evaluate", "predict"}  # commands of the tests above
+HERE = {
+    "run",
+    "dataset",
+    "train",
+    "evaluate",
+    "predict",
+    "recogniser",
+}  # commands of the tests above
 
 
 @pytest.mark.parametrize(

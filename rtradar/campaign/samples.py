@@ -330,6 +330,10 @@ def _radar_parameters(radar: Radar) -> dict[str, Any]:
     for field in fields(radar):
         if field.name in _LATER_FIELDS and values[field.name] == field.default:
             del values[field.name]
+        elif isinstance(own := values.get(field.name), dict) and not any(
+            own.get("angles_deg", [1])
+        ):
+            del own["angles_deg"]  # of an antenna that is not turned, as all were once
     return values | {"position_m": list(values["position_m"])}
 
 

@@ -214,7 +214,8 @@ def _steps(
     rows = _step_cycles(radar, step_s) * radar.n_tx
     begins = np.arange(0, n_chirps, rows)
     ends = np.minimum(begins + rows, n_chirps)
-    places = radar.slots_of(first_chirp + begins) + radar.slots_of(first_chirp + ends - 1) + 1
+    last = radar.slots_of(first_chirp + ends - 1) + (radar.n_tx if radar.at_once else 1)
+    places = radar.slots_of(first_chirp + begins) + last
     centres = places / 2 * radar.chirp_interval_s
     return list(zip(begins.tolist(), ends.tolist(), strict=True)), centres
 

@@ -490,6 +490,16 @@ def test_where_a_radar_is_put_up_and_its_noise_are_drawn(tmp_path: Path) -> None
     assert len({radar.pitch_deg for radar in radars}) == 4
 
 
+def test_antennas_that_are_not_turned_leave_the_names_of_samples_as_they_were(
+    tmp_path: Path,
+) -> None:
+    text = HEAD + '[each]\nradar = ["iwr1443"]\nfidelity = ["analytic"]\n' + actors(1, "walk")
+    (plan,) = planned(tmp_path, text)
+    antenna = plan.parameters["radar_parameters"]["tx_antenna"]
+    assert "angles_deg" not in antenna
+    assert plan.radar.tx_antenna == rt.Antenna(**antenna)
+
+
 def test_actors_may_have_a_style_and_ranges_of_their_own(tmp_path: Path) -> None:
     own = 'style = "hop"\ndrawn = { offset_x_m = [2.0, 3.0] }\n'
     found = planned(tmp_path, HEAD + actors(2, "jump") + actors(2, "jump") + own)

@@ -150,7 +150,9 @@ def test_options_of_another_function_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="process_samples has no option 'snr_db'; allowed: seed"):
         rt.process_samples(samples, small, snr_db=10.0)  # type: ignore[call-arg]
-    with pytest.raises(InputError, match="simulate has no option 'pfa'; allowed: seed, fidelity"):
+    with pytest.raises(
+        InputError, match="simulate has no option 'pfa'; allowed: seed, slow_time, fidelity"
+    ):
         rt.simulate(kick, small, pfa=1e-4)  # type: ignore[call-arg]
     with pytest.raises(InputError, match="run has no option 'fidelty'"):
         rt.run(kick, small, fidelty="analytic")  # type: ignore[call-arg]
