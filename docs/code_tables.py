@@ -170,7 +170,7 @@ DATA_SET_KEYS = {
     "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
     "[[synthetic]]": {
         "label": (
-            f"{', '.join(f'`{activity}`' for activity in ACTIVITIES)}; each at most once in a style",
+            f"{', '.join(f'`{activity}`' for activity in ACTIVITIES)}; once in a style",
             "must be given",
         ),
         "count": ("number of takes; `count` or `seeds` is needed", ""),

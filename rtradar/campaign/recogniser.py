@@ -55,14 +55,13 @@ _DRAWN = {
     "offset_x_m": [-1.2, -0.2],
     "offset_y_m": [-0.3, 0.3],
     "height_m": [1.55, 1.95],
-    "amplitude": [0.5, 1.1],
     "radar_up_m": [-0.25, 0.25],
     "radar_pitch_deg": [-5.0, 12.0],
     "noise_db": [8.0, 28.0],
 }
-"""What is drawn for each window: people 1.5 to 3 m before the radar and turned to it, some of whom
-move little. Its noise is higher than its figure says, by what a chip loses to its own leakage, its
-quantisation and what stands before its antennas."""
+"""What is drawn for each window: people 1.5 to 3 m before the radar and turned to it. Its noise is
+higher than its figure says, by what a chip loses to its own leakage, its quantisation and what
+stands before its antennas."""
 
 _FARTHER = {"offset_x_m": [-0.3, 0.5], "heading_deg": [-180.0, 180.0]}
 _SUBJECTS, _FOLDS, _USUAL, _RIDGE = 200, 5, 0.995, 1e-2

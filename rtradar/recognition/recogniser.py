@@ -217,7 +217,7 @@ UNKNOWN, NOBODY = "unknown", "nobody"
 LEAST_POINTS = 24
 """Number of points of a window below which it says nothing."""
 
-_MOST_BYTES = 5_000_000
+_MOST_BYTES = 200_000_000  # unpacked; a build of a hundred takes has 10 MB
 _TYPES = {
     "roots": "i4", "feature": "i2", "threshold": "f4", "below": "i4", "above": "i4",
     "chances": "f2",

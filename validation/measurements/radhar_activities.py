@@ -224,7 +224,7 @@ def measure(quick: bool) -> list[Row]:
     people = None if quick or "RTRADAR_JOINTS" not in os.environ else PEOPLE
     with temporary_folder() as folder:
         out = folder / "radhar.npz"
-        takes = 5 if quick else 100
+        takes = 5 if quick else 60
         plan = RecogniserPlan(radar="radhar", activities=ACTIVITIES, motions=people, takes=takes)
         recogniser = build_recogniser(plan, out)
         places = [out.with_suffix("") / name for name in ("actors", "people")]
