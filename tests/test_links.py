@@ -63,15 +63,14 @@ def test_a_link_is_a_radar_with_the_antennas_of_two(walk: rt.Motion) -> None:
     )
 
 
-@pytest.mark.parametrize("yaw_deg", [0.0, 40.0])
-def test_both_ways_of_a_link_are_one(walk: rt.Motion, yaw_deg: float) -> None:
+def test_both_ways_of_a_link_are_one(walk: rt.Motion) -> None:
     # One antenna on each end, which looks more into some directions than into others.
     pattern = {"pattern": "cosine", "exponent": 4.0}
     fields: dict[str, Any] = {"rx_positions_m": [[0.0, 0.0, 0.0]]}
     fields |= {"tx_antenna": pattern, "rx_antenna": pattern}
     radars = [
-        board("left", LEFT, yaw_deg=-yaw_deg, **fields),
-        board("right", RIGHT, yaw_deg=yaw_deg, **fields),
+        board("left", LEFT, yaw_deg=-40.0, **fields),
+        board("right", RIGHT, yaw_deg=40.0, **fields),
     ]
     found = rt.run(walk, radars, links="all", **OPTIONS)
     there, back = (

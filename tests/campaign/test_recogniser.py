@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.campaign.recogniser import RecogniserPlan, _leave_out, build_recogniser
+from rtradar.campaign.recogniser import _OF_POINTS, RecogniserPlan, _leave_out, build_recogniser
 from rtradar.cli import main
 from rtradar.clouds.sample_files import read_index, write_index
 from rtradar.errors import InputError
@@ -35,8 +35,9 @@ def built(radar: rt.Radar, out: Path, **options: Any) -> Recogniser:
 
 
 def test_a_recogniser_is_built_goes_on_and_names_a_run_and_a_file(
-    radar: rt.Radar, tmp_path: Path
+    radar: rt.Radar, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setitem(_OF_POINTS, "n_estimators", 25)  # as good here as hundreds
     out, spec = tmp_path / "weights.npz", tmp_path / "set.toml"
     save_motion(tmp_path / "march.motion", rt.synthetic_motion("walk_in_place", duration_s=3.0))
     spec.write_text('[[recordings]]\nfile = "march.motion"\nlabel = "walk"\nsubject = "she"\n')
