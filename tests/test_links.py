@@ -119,6 +119,19 @@ def test_what_is_no_link_is_refused(radars: list[rt.Radar], links: str, words: s
         links_of(radars, rt.Scene(), links)
 
 
+def test_errors_of_one_board_and_unlike_frames_have_no_link() -> None:
+    left, right = board("left", LEFT), board("right", RIGHT)
+    noisy = dataclasses.replace(right, receiver=rt.Receiver(iq_phase_deg=1.0))
+    with pytest.raises(InputError, match=r"of a \[receiver\] are those of one board"):
+        link_of(left, noisy)
+    framed = [
+        dataclasses.replace(one, frame_period_s=0.1, chirps_per_frame=count)
+        for one, count in ((left, 100), (right, 200))
+    ]
+    with pytest.raises(InputError, match="chirps_per_frame = 100 and 200"):
+        link_of(*framed)
+
+
 def test_one_place_of_a_scene_is_not_for_two() -> None:
     one, other = rt.Radar.preset("iwr1443"), rt.Radar.preset("iwr6843")
     with pytest.raises(InputError, match="iwr1443 and iwr6843 have no place of their own"):

@@ -124,6 +124,13 @@ def test_breath_and_heart_are_read_beside_what_stands_still(
     np.testing.assert_array_equal(chosen.way_m, found.way_m)
 
 
+def test_a_recording_of_several_cycles_a_frame_is_refused() -> None:
+    several = rt.Radar.load(BOARD | {"chirps_per_frame": 12})
+    samples = np.zeros((12 * 200, 4, 64), np.complex64)
+    with pytest.raises(InputError, match=r"has 4 cycles in each frame.*chirps_per_frame = 3"):
+        rt.process_samples(samples, several, slow_time="capture")
+
+
 def test_what_cannot_tell_a_breath_is_refused(radar: rt.Radar) -> None:
     slow = radar.over_capture()
     empty = np.zeros((3 * 100, 4, 64), np.complex64)

@@ -48,6 +48,10 @@ if TYPE_CHECKING:
 _PATIENCE_S = 30  # time within which a scheduler must answer, and its first worker join
 
 
+class UnmadeSamplesError(InputError):
+    """Some samples of a data set cannot be made; all others are there."""
+
+
 @contextmanager
 def dask_client(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
     """Yield a client of a cluster with at least one worker.
@@ -282,7 +286,7 @@ def _tell_troubles(done: Sequence[Outcome], plans: Sequence[SamplePlan], whole: 
     if bad:
         values = next(plan.parameters for plan in plans if plan.identity == bad[0].identity)
         where = f"{values['recording']} from {values['start_s']:g} s"
-        raise InputError(
+        raise UnmadeSamplesError(
             f"{len(bad)} of {len(plans)} samples cannot be made, the other "
             f"{whole + len(done) - len(bad)} are there; the first of them, {bad[0].identity} "
             f"({where}, {values['radar']}, {values['scene']}): {bad[0].trouble}"

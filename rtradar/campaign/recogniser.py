@@ -22,18 +22,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.campaign.build import build_dataset
+from rtradar.campaign.build import UnmadeSamplesError, build_dataset
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds.collection import Collection
-from rtradar.clouds.sample_files import INDEX, read_index, sample_path, write_index
+from rtradar.clouds.sample_files import read_index, sample_path, write_index
 from rtradar.description import MOST_FILES, path_from, plain, versions
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion.synthetic import STYLES
 from rtradar.radar import Radar
 from rtradar.radar.array import UsualPlace
 from rtradar.recognition import NOBODY, UNKNOWN, Grid, Points, Recogniser
-from rtradar.recognition.points import describe_points, without_person
-from rtradar.recognition.recogniser import OUTLINE
+from rtradar.recognition.points import describe_points, in_axes, without_person
+from rtradar.recognition.recogniser import OUTLINE, distances, with_temperature
 from rtradar.system.checks import brief, read_toml
 from rtradar.system.files import digest_of, temporary_folder
 from rtradar.system.registries import ACTIVITY_NAMES
@@ -79,8 +79,8 @@ class RecogniserPlan:
 
     Parameters
     ----------
-    radar : str or Radar
-        Radar: a name, a file, or the radar itself.
+    radar : Radar
+        Radar whose board lists the points.
     activities : mapping
         Classes, each with the actors that show it (``{"jump": ("jump:hop", "jump")}``), a style
         behind a colon; labels of recordings are classes or such names.
@@ -105,7 +105,7 @@ class RecogniserPlan:
         Where something has no meaning.
     """
 
-    radar: str | Radar
+    radar: Radar
     activities: Mapping[str, Sequence[str]]
     unknown: Sequence[str] = ("stand", "sit")
     scene: str | None = None
@@ -116,8 +116,6 @@ class RecogniserPlan:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if isinstance(self.radar, str):
-            object.__setattr__(self, "radar", Radar.load(self.radar))
         if len(self.activities) < 2:
             raise InputError("--activities: give at least two, such as walk,boxing")
         if not 1.0 <= self.window_s <= 60.0:
@@ -146,7 +144,6 @@ class RecogniserPlan:
     @cached_property
     def grid(self) -> Grid:
         """Cells of the radar, and those of its frames that are looked at."""
-        assert isinstance(self.radar, Radar)  # as it was loaded
         every = max(1, math.ceil(FRAME_S / self.radar.frame_hop_s - 0.01))
         return Grid(
             frame_s=every * self.radar.frame_hop_s,
@@ -219,7 +216,6 @@ def build_recogniser(plan: RecogniserPlan, out: Path, *, workers: int | None = N
     for place, table in zip(folders, tables.values(), strict=True):
         _build(table, place, workers)
     samples = Collection(*folders)
-    assert isinstance(plan.radar, Radar)
     taught = taught_by(samples, plan.grid, plan.class_of)
     made = train_recogniser(taught, plan.radar, plan.grid, seed=plan.seed)
     more: dict[str, Any] = {
@@ -240,7 +236,6 @@ def build_recogniser(plan: RecogniserPlan, out: Path, *, workers: int | None = N
 def _common(plan: RecogniserPlan) -> dict[str, Any]:
     """Table of a data set without people; see `RecogniserPlan`."""
     radar, grid = plan.radar, plan.grid
-    assert isinstance(radar, Radar)
     watts = radar.transmit_power_dbm is not None
     board = radar.multiplexing in ("tdm", "bpm") and watts
     radar = dataclasses.replace(radar, frame_period_s=grid.frame_s) if board else radar
@@ -327,33 +322,35 @@ def _build(table: Mapping[str, Any], folder: Path, workers: int | None) -> None:
         spec.write_text(tomli_w.dumps(own), encoding="utf-8")
         try:
             build_dataset(spec, folder, workers=workers)
-        except InputError as error:
+        except UnmadeSamplesError as error:
             _leave_out(folder, error)
 
 
-def _leave_out(folder: Path, error: InputError) -> None:
+def _leave_out(folder: Path, error: UnmadeSamplesError) -> None:
     """Go on without the samples that cannot be made, such as of who stands in a wall, if few."""
-    every = read_index(folder) if (folder / INDEX).is_file() else []
+    every = read_index(folder)
     there = [name for name in every if sample_path(folder, name).is_file()]
-    if len(there) < _ENOUGH * len(every) or len(there) == len(every):
+    if len(there) < _ENOUGH * len(every):
         raise error
     warnings.warn(f"{error}: left out", ValidityWarning, stacklevel=3)
     write_index(folder, there)
+
+
+def points_of(samples: Collection, index: int, grid: Grid) -> Points:
+    """Put the whole spatial cloud of a sample on a grid."""
+    row = samples.provenance[index]
+    radar = Radar(**{"name": "?", **row["radar_parameters"], "position_m": row["radar_position_m"]})
+    length_s = row["duration_s"] - radar.frame_duration_s
+    table = in_axes(samples.whole_cloud(index), radar)
+    return Points.on_grid(table, grid, length_s, radar.frame_hop_s)
 
 
 def taught_by(samples: Collection, grid: Grid, class_of: Mapping[str, str]) -> Taught:
     """Describe the windows of samples, and the same windows once the person has left."""
     numbers, classes, people = list[Array](), list[str](), list[str]()
     subjects = samples.column("subject").tolist()
-    for index, (label, row) in enumerate(
-        zip(samples.labels.tolist(), samples.provenance, strict=True)
-    ):
-        radar = Radar(**{"name": "?", **row["radar_parameters"]})
-        table = samples.whole_cloud(index)
-        table[:, 1:4] = (table[:, 1:4] - row["radar_position_m"]) @ radar.axes
-        length_s = row["duration_s"] - radar.frame_duration_s
-        points = Points.on_grid(table, grid, length_s, radar.frame_hop_s)
-        for _, window in points.windows(grid):
+    for index, label in enumerate(samples.labels.tolist()):
+        for _, window in points_of(samples, index, grid).windows(grid):
             for own, name in ((window, class_of[label]), (without_person(window), NOBODY)):
                 if (found := describe_points(own)) is not None:
                     numbers.append(found)
@@ -451,12 +448,6 @@ def moments_of(numbers: Array) -> tuple[Array, Array]:
     return numbers.mean(axis=0), inverse
 
 
-def distances(numbers: Array, mean: Array, inverse: Array) -> Array:
-    """Return the Mahalanobis distance of each window (window,)."""
-    away = numbers - mean
-    return np.asarray(np.sqrt(np.einsum("wi,ij,wj->w", away, inverse, away)))
-
-
 def limits_of(radar: Radar) -> dict[str, Any]:
     """Return what another radar must share for the weights to be good for it."""
     return {
@@ -467,13 +458,6 @@ def limits_of(radar: Radar) -> dict[str, Any]:
         "frame_duration_s": radar.frame_duration_s,
         "frame_hop_s": radar.frame_hop_s,
     }
-
-
-def with_temperature(probabilities: Array, temperature: float) -> Array:
-    """Divide the logarithms of probabilities (answer, class) by a temperature."""
-    logits = np.log(np.maximum(probabilities, 1e-12)) / temperature
-    scaled = np.exp(logits - logits.max(axis=1, keepdims=True))
-    return np.asarray(scaled / scaled.sum(axis=1, keepdims=True))
 
 
 def best_temperature(probabilities: Array, truth: NDArray[np.int64]) -> float:

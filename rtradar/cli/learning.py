@@ -14,9 +14,10 @@ from rtradar.errors import InputError
 def recogniser_build(options: argparse.Namespace) -> Iterator[Mapping[str, Any]]:
     """Do ``rtradar recogniser build``."""
     from rtradar.campaign.recogniser import RecogniserPlan, build_recogniser, card_in_words
+    from rtradar.radar import Radar
 
     plan = RecogniserPlan(
-        radar=options.radar,
+        radar=Radar.load(options.radar),
         activities=options.activities,
         unknown=options.unknown,
         scene=options.scene,

@@ -110,6 +110,16 @@ def link_of(sender: Radar, receiver: Radar) -> Radar:
             f"link '{name}': {sender.n_tx} and {receiver.n_tx} Tx; a link needs as many, whose "
             "chirps come at the same times"
         )
+    if sender.in_frames and sender.chirps_per_frame != receiver.chirps_per_frame:
+        raise InputError(
+            f"link '{name}': chirps_per_frame = {sender.chirps_per_frame} and "
+            f"{receiver.chirps_per_frame}; frames of a link must be alike"
+        )
+    if sender.receiver is not None or receiver.receiver is not None:
+        raise InputError(
+            f"link '{name}': leakage and phase noise of a [receiver] are those of one board; leave "
+            "it out, or take links = 'own'"
+        )
     if sender.is_moving or receiver.is_moving:
         raise InputError(f"link '{name}': a radar that moves has no links; take links = 'own'")
     places = (sender.tx - receiver.position_m) @ receiver.axes

@@ -95,6 +95,12 @@ def process_samples(
     forget_peak_memory()
     if unit not in ("m", "count"):
         raise InputError(f"unit = {brief(unit)}; it must be m, or count for the numbers of an ADC")
+    if settings.slow_time == "capture" and radar.in_frames and radar.cycles_per_frame > 1:
+        raise InputError(
+            f"slow_time = capture: a recording of radar '{radar.name}' has "
+            f"{radar.cycles_per_frame} cycles in each frame; keep the first of each, and give "
+            f"chirps_per_frame = {radar.n_tx}"
+        )
     given = replace(Processing.of(radar, settings), unit=unit)
     source = Samples(samples, given, in_memory=out is None)
     # A background is read only where the samples are sound.

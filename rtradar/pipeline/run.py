@@ -112,7 +112,7 @@ def run(
         Walls and furniture around the person, or what `Scene.load` takes; free space if left out.
     links : {"own", "all"}
         Whether each of several radars receives what it has sent itself, or also what each other
-        has: the link ``a>b`` has the Tx of a, and all else of b. The way straight is left out.
+        has: the link ``a>b`` has the Tx of a, and all else of b. What goes straight is left out.
     out : path, optional
         Folder for maps, clouds, pictures, report and summary, which is made if it does not exist.
         The files of an earlier run that its ``summary.json`` lists are replaced or removed; all

@@ -92,22 +92,7 @@ def vital_signs(
         Where the capture is too short, cycles come in frames, or a rate is beyond half of that of
         the cycles.
     """
-    if radar.in_frames:
-        raise InputError(
-            f"vital signs: radar '{radar.name}' has frames with gaps; take slow_time = 'capture'"
-        )
-    cycles = len(spectra) // radar.n_tx
-    length_s, least_s = cycles * radar.cycle_duration_s, _LEAST_BREATHS / breath_hz[0]
-    if cycles < _LEAST_CYCLES or length_s < least_s:
-        raise InputError(
-            f"vital signs: {cycles} cycles in {length_s:.3g} s; at least {_LEAST_CYCLES} in "
-            f"{least_s:g} s are needed, two breaths of the slowest rate"
-        )
-    if heart_hz[1] > (highest := 0.5 / radar.cycle_duration_s):
-        raise InputError(
-            f"vital signs: cycles follow each other too slowly for {heart_hz[1]:g} Hz; at most "
-            f"{highest:.3g} Hz can be told (heart_hz)"
-        )
+    cycles = _cycles(len(spectra), radar, breath_hz, heart_hz)
     cube = np.asarray(spectra[: cycles * radar.n_tx]).reshape(cycles, -1, spectra.shape[2])
     time = radar.cycle_times(np.arange(cycles)) + radar.cycle_active_s / 2
     # The cell, its way, and the breath in it.
@@ -123,7 +108,8 @@ def vital_signs(
         cells = [int(np.abs(radar.range_m - range_m).argmin())]
     ways = {cell: _way(cube[:, :, cell], radar) for cell in cells}
     tried = {cell: _rate(time, way, breath_hz, []) for cell, way in ways.items()}
-    cell = min(cells, key=lambda one: _left_over(time, ways[one], tried[one]))
+    left = {cell: _left_over(time, way, tried[cell]) for cell, way in ways.items()}
+    cell = min(cells, key=lambda one: left[one])
     way, breath = ways[cell], tried[cell]
     # Then the heart beside it and its harmonics.
     heart = _rate(time, way, heart_hz, [breath * k for k in range(1, _HARMONICS + 1)])
@@ -136,8 +122,31 @@ def vital_signs(
         heart_hz=heart,
         breath_m=float(sizes[0]),
         heart_m=float(sizes[1]),
-        explained=1 - _left_over(time, way, breath),
+        explained=1 - left[cell],
     )
+
+
+def _cycles(
+    n_chirps: int, radar: Radar, breath_hz: Sequence[float], heart_hz: Sequence[float]
+) -> int:
+    """Count the cycles of a capture; InputError where these cannot tell the rates."""
+    if radar.in_frames:
+        raise InputError(
+            f"vital signs: radar '{radar.name}' has frames with gaps; take slow_time = 'capture'"
+        )
+    cycles = n_chirps // radar.n_tx
+    length_s, least_s = cycles * radar.cycle_duration_s, _LEAST_BREATHS / breath_hz[0]
+    if cycles < _LEAST_CYCLES or length_s < least_s:
+        raise InputError(
+            f"vital signs: {cycles} cycles in {length_s:.3g} s; at least {_LEAST_CYCLES} in "
+            f"{least_s:g} s are needed, two breaths of the slowest rate"
+        )
+    if heart_hz[1] > (highest := 0.5 / radar.cycle_duration_s):
+        raise InputError(
+            f"vital signs: cycles follow each other too slowly for {heart_hz[1]:g} Hz; at most "
+            f"{highest:.3g} Hz can be told (heart_hz)"
+        )
+    return cycles
 
 
 def _way(cell: NDArray[np.complexfloating], radar: Radar) -> _Reals:

@@ -10,14 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rtradar.description import made_from
 from rtradar.errors import InputError
 from rtradar.recognition.board_files import COLUMNS, beside_cells, read_points
-from rtradar.recognition.points import Grid, Points, step_of
+from rtradar.recognition.points import Grid, Points, in_axes, step_of
 from rtradar.recognition.recogniser import (
     EDGE_S,
     NOBODY,
@@ -31,6 +31,9 @@ from rtradar.recognition.recogniser import (
 )
 from rtradar.system.checks import is_real, printable
 from rtradar.system.files import read_arrays, read_json
+
+if TYPE_CHECKING:
+    from rtradar.radar import Radar
 
 __all__ = ["COLUMNS", "NOBODY", "UNKNOWN", "Grid", "Points", "Recogniser", "predict", "read_points"]
 
@@ -72,38 +75,12 @@ def predict(
         what is given.
     """
     recogniser = Recogniser.shipped() if weights is None else Recogniser.load(weights)
-    grid, folder = recogniser.grid, place.is_dir()
-    if grid is None and not folder and place.exists():
+    if recogniser.grid is None and place.is_file():
         raise InputError(
             f"'{place}': these weights know RDT clouds of runs; give a folder of one, or weights "
             "for your board (--weights, made by rtradar recogniser build)"
         )
-    # Windows of the cloud, and what is not as it was when the weights were made.
-    windows: Sequence[Array | Points]
-    files, warnings, reading = [place], list[str](), {}
-    if grid is None:
-        points, summary = _read(place, "cloud_rdt.npz")
-        windows = cut_windows(points, summary["capture_s"])
-        starts = starts_of(summary["capture_s"]).tolist()
-        warnings += _of_rdt(summary, windows)
-    else:
-        summary = None
-        if folder:
-            table, summary = _read(place, "cloud_xyz.npz")
-            table, step_s = _in_axes(table, summary)
-            own = Points.on_grid(table, grid, summary["capture_s"], step_s)
-        else:
-            table, said = read_points(place, grid, ahead)
-            own = Points.on_grid(table, grid)
-            reading = {"reading": said}
-            warnings += _of_table(table, grid)
-        starts, windows = (list(part) for part in zip(*own.windows(grid), strict=True))
-        if own.frames < grid.frames:
-            warnings.append(f"it is shorter than the {grid.window_s:g} s of a window")
-    if folder:
-        files = [place / ("cloud_rdt.npz" if grid is None else "cloud_xyz.npz"), place / "run.toml"]
-    if summary is not None:
-        warnings += [*_of_radar(summary, recogniser.card), *_of_scene(summary, recogniser.card)]
+    files, starts, windows, warnings, reading = _asked(place, recogniser, ahead)
     if (distance := recogniser.distance(windows)) > 1:
         warnings.append(
             f"the motion is unlike any that was learnt from ({distance:.1f} times the distance "
@@ -120,6 +97,41 @@ def predict(
         warnings.append(f"no activity has a probability of {_UNSURE:g}")
     made = made_from(*files, WEIGHTS if weights is None else weights)
     return answer | {"windows": listed, "warnings": warnings, "made_from": made} | reading
+
+
+class _Asked(NamedTuple):
+    """Files that are asked about, their windows from their starts on [s], and what is said."""
+
+    files: list[Path]
+    starts: list[float]
+    windows: Sequence[Array | Points]
+    warnings: list[str]
+    reading: dict[str, str]
+
+
+def _asked(place: Path, recogniser: Recogniser, ahead: str | None) -> _Asked:
+    """Cut what is asked about into windows, and say where it is not as what was learnt from."""
+    grid, card = recogniser.grid, recogniser.card
+    if grid is None:
+        points, summary = _read(place, "cloud_rdt.npz")
+        windows = cut_windows(points, summary["capture_s"])
+        starts = starts_of(summary["capture_s"]).tolist()
+        said = [*_of_rdt(summary, windows), *_of_radar(summary, card), *_of_scene(summary, card)]
+        return _Asked([place / "cloud_rdt.npz", place / "run.toml"], starts, windows, said, {})
+    if place.is_dir():
+        table, summary = _read(place, "cloud_xyz.npz")
+        radar, reading = _radar_of(summary), {}
+        own = Points.on_grid(in_axes(table, radar), grid, summary["capture_s"], radar.frame_hop_s)
+        files = [place / "cloud_xyz.npz", place / "run.toml"]
+        said = [*_of_radar(summary, card), *_of_scene(summary, card)]
+    else:
+        table, read_as = read_points(place, grid, ahead)
+        own, files, reading = Points.on_grid(table, grid), [place], {"reading": read_as}
+        said = [*_of_table(table, grid)]
+    if own.frames < grid.frames:
+        said.append(f"it is shorter than the {grid.window_s:g} s of a window")
+    begun, cut = (list(part) for part in zip(*own.windows(grid), strict=True))
+    return _Asked(files, begun, cut, said, reading)
 
 
 def _answer(names: Sequence[str], chances: Array) -> dict[str, Any]:
@@ -154,18 +166,16 @@ def _read(folder: Path, name: str) -> tuple[Array, dict[str, Any]]:
     return points, summary
 
 
-def _in_axes(table: Array, summary: Mapping[str, Any]) -> tuple[Array, float]:
-    """Turn places in the world into those in the axes of the radar; also its step of frames [s]."""
+def _radar_of(summary: Mapping[str, Any]) -> Radar:
+    """Make the radar of a run, at its place."""
     from rtradar.radar import Radar
 
     try:
-        radar = Radar(**{"name": "?", **summary["parameters"]["radar"]})
+        return Radar(**{"name": "?", **summary["parameters"]["radar"]})
     except (InputError, KeyError, TypeError):
         raise InputError(
             "the summary does not say where the radar was; make the run anew"
         ) from None
-    places = (table[:, 1:4] - radar.position_m) @ radar.axes
-    return np.column_stack([table[:, 0], places, table[:, 4]]), radar.frame_hop_s
 
 
 def _of_rdt(summary: Mapping[str, Any], windows: Sequence[Array]) -> Iterator[str]:

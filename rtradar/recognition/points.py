@@ -12,10 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from rtradar.radar import Radar
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -133,10 +136,16 @@ class Points(NamedTuple):
             yield first * grid.frame_s, self.window(first, grid.frames)
 
 
-def step_of(times: Array, grid: Grid) -> float:
-    """Return the time between the frames of points [s], of which less than half are without any.
+def in_axes(table: Array, radar: Radar) -> Array:
+    """Turn x, y and z of a table (point, 5) from the world's axes into those of a radar [m]."""
+    places = (table[:, 1:4] - radar.position_m) @ radar.axes
+    return np.column_stack([table[:, 0], places, table[:, 4]])
 
-    Of a recording of one frame it is the grid's own.
+
+def step_of(times: Array, grid: Grid) -> float:
+    """Return the time between the frames of points [s]; of one frame it is the grid's own.
+
+    At least a quarter of the frames that have points must follow another one that has some.
     """
     apart = np.diff(np.unique(np.round(times, 6)))
     return float(np.quantile(apart, 0.25)) if len(apart) else grid.frame_s

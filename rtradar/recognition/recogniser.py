@@ -301,9 +301,8 @@ class Recogniser:
             if numbers is None:
                 found[place] = nothing
                 continue
-            logits = np.log(np.maximum(self.of_description(numbers), 1e-3))
-            scaled = np.exp((logits - logits.max()) / self.card["temperature"])
-            found[place] = scaled / scaled.sum()
+            chances = np.maximum(self.of_description(numbers), 1e-3)
+            found[place] = with_temperature(chances[None], self.card["temperature"])[0]
         return found
 
     def describe(self, window: Array | Points) -> Array | None:
@@ -332,6 +331,19 @@ class Recogniser:
         found = [numbers for own in windows if (numbers := self.describe(own)) is not None]
         if not found:
             return math.nan
-        away = np.array(found)[:, : len(usual["mean"])] - usual["mean"]
-        squares = np.einsum("wi,ij,wj->w", away, usual["inverse_covariance"], away)
-        return float(np.median(np.sqrt(squares)) / usual["most"])
+        first = np.array(found)[:, : len(usual["mean"])]
+        away = distances(first, usual["mean"], usual["inverse_covariance"])
+        return float(np.median(away) / usual["most"])
+
+
+def distances(numbers: Array, mean: Array, inverse: Array) -> Array:
+    """Return the Mahalanobis distance of each window (window,)."""
+    away = numbers - mean
+    return np.asarray(np.sqrt(np.einsum("wi,ij,wj->w", away, inverse, away)))
+
+
+def with_temperature(probabilities: Array, temperature: float) -> Array:
+    """Divide the logarithms of probabilities (answer, class) by a temperature."""
+    logits = np.log(np.maximum(probabilities, 1e-12)) / temperature
+    scaled = np.exp(logits - logits.max(axis=1, keepdims=True))
+    return np.asarray(scaled / scaled.sum(axis=1, keepdims=True))

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier
 
-from rtradar.campaign.recogniser import arrays_of, best_temperature, with_temperature
+from rtradar.campaign.recogniser import arrays_of, best_temperature
 from rtradar.classify.outcomes import Answers, calibration_error
 from rtradar.cli import main
 from rtradar.clouds.files import save_cloud_npz
@@ -34,6 +34,7 @@ from rtradar.recognition.recogniser import (
     envelopes,
     occupancy,
     outline,
+    with_temperature,
 )
 
 

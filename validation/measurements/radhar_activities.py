@@ -19,6 +19,7 @@ quiet arms (there are few moving points); still points of the person as figures.
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import sys
 import warnings
@@ -35,6 +36,7 @@ from rtradar.campaign.recogniser import (
     RecogniserPlan,
     Taught,
     build_recogniser,
+    points_of,
     taught_by,
     train_recogniser,
 )
@@ -53,11 +55,8 @@ ACTIVITIES = {
 }
 """Activities of the files, and those of actors."""
 
-CLASS_OF = {name.partition(":")[0]: label for label, own in ACTIVITIES.items() for name in own} | {
-    "stand": UNKNOWN,
-    "sit": UNKNOWN,
-}
 PEOPLE = Path(__file__).resolve().parents[1] / "radhar_people.toml"
+PLAN = RecogniserPlan(radar=rt.Radar.preset("radhar"), activities=ACTIVITIES)
 PADDED = 256 / 240  # the driver takes places for bins of 240 samples, which the chip pads to 256
 COUNTING = 4  # of the numbers of a window, the first ones say how many points there are
 Array = NDArray[np.float64]
@@ -225,7 +224,7 @@ def measure(quick: bool) -> list[Row]:
     with temporary_folder() as folder:
         out = folder / "radhar.npz"
         takes = 5 if quick else 60
-        plan = RecogniserPlan(radar="radhar", activities=ACTIVITIES, motions=people, takes=takes)
+        plan = dataclasses.replace(PLAN, motions=people, takes=takes)
         recogniser = build_recogniser(plan, out)
         places = [out.with_suffix("") / name for name in ("actors", "people")]
         return rows_from(recogniser, [place for place in places if place.is_dir()])
@@ -233,15 +232,15 @@ def measure(quick: bool) -> list[Row]:
 
 def rows_from(recogniser: Recogniser, folders: Sequence[Path]) -> list[Row]:
     """What a recogniser knows, beside ones that are taught otherwise."""
-    grid, radar = recogniser.grid, rt.Radar.preset("radhar")
+    grid, radar = recogniser.grid, PLAN.radar
     assert grid is not None
     parts = {part: recorded(part, grid) for part in ("Train", "Test")}
     actors, everyone = Collection(folders[0]), Collection(*folders)
-    simulated = taught_by(everyone, grid, CLASS_OF)
+    simulated = taught_by(everyone, grid, PLAN.class_of)
     rows = count_rows(windows_by(actors, grid), _by_activity(*parts.values()))
     rows += empty_rows(recogniser, parts["Test"])
     taught = {"actors and recorded people": recogniser}
-    taught["actors"] = train_recogniser(taught_by(actors, grid, CLASS_OF), radar, grid)
+    taught["actors"] = train_recogniser(taught_by(actors, grid, PLAN.class_of), radar, grid)
     for who, own in taught.items():
         for part, asked in parts.items():
             claim = f"{who}, asked of recorded ({part.lower()} files)"
@@ -256,7 +255,7 @@ def rows_from(recogniser: Recogniser, folders: Sequence[Path]) -> list[Row]:
         "without counts", train_recogniser(blind, radar, grid), parts["Test"], whole=False
     )
     short = Grid(**{**vars(grid), "window_s": 2.0})
-    two = train_recogniser(taught_by(everyone, short, CLASS_OF), radar, short)
+    two = train_recogniser(taught_by(everyone, short, PLAN.class_of), radar, short)
     rows += rows_of("windows of 2 s", two, recorded("Test", short), whole=False)
     for files in (1, 2, 5, None):
         count = "all" if files is None else str(files)
@@ -271,12 +270,8 @@ def windows_by(samples: Collection, grid: Grid) -> dict[str, list[Points]]:
     """Windows of simulated people, by activity."""
     found: dict[str, list[Points]] = {name: [] for name in ACTIVITIES}
     for index, label in enumerate(samples.labels.tolist()):
-        row = samples.provenance[index]
-        radar = rt.Radar(**{"name": "?", **row["radar_parameters"]})
-        table = samples.whole_cloud(index)
-        table[:, 1:4] = (table[:, 1:4] - row["radar_position_m"]) @ radar.axes
-        if (name := CLASS_OF[label]) in found:
-            found[name].append(Points.on_grid(table, grid, grid.window_s, grid.frame_s))
+        if (name := PLAN.class_of[label]) in found:
+            found[name].append(points_of(samples, index, grid))
     return found
 
 
